@@ -1,0 +1,1 @@
+//! Reflectance models, one file each, and the registry that names them.

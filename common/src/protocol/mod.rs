@@ -1,0 +1,1 @@
+//! The wire: messages, framing limits, handshake and versions between coordinator and worker.

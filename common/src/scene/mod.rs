@@ -1,0 +1,1 @@
+//! The photographed object: its shape, the camera, and where both lie in the photo.

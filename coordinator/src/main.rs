@@ -1,0 +1,3 @@
+//! `lookalike`: argument parsing only; everything else is in the library.
+
+fn main() {}

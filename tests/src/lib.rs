@@ -1,0 +1,1 @@
+//! The harness of the suites: scene builders, in-process clusters, real processes.

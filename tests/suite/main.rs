@@ -1,0 +1,1 @@
+//! One test binary of modules, so that the suite links once.
