@@ -1,1 +1,49 @@
 //! Reflectance models, one file each, and the registry that names them.
+//!
+//! A model is a sum of *basis lobes* with weights. For fixed lobe widths the radiance of a pixel is linear in the
+//! weights, which is what makes transport tables possible (design: "transport tables"):
+//!
+//! `f(wi, wo) cos(theta_i) = sum_t weight_t(parameters) * basis_t(wi, wo; width)`
+//!
+//! A [`Model`] therefore declares its [`Parameter`]s, its [`BasisLobe`]s, and the map (with derivative) from the former
+//! to the weights of the latter. Adding a model is one file and one line in [`MODELS`]; the tests of reciprocity, energy
+//! and derivatives below cover it from then on.
+//!
+//! Conventions: directions point away from the surface; `f` is in 1/sr; `alpha` is the microfacet width, not an artist's
+//! roughness.
+
+mod angles;
+mod cook_torrance;
+mod ggx;
+mod lambert;
+mod lobe;
+pub mod merl;
+mod model;
+mod parameter;
+mod reflectance;
+
+pub use angles::Angles;
+pub use cook_torrance::CookTorrance;
+pub use ggx::Ggx;
+pub use lambert::Lambert;
+pub use lobe::{Incident, Lobe, Split};
+pub use model::{BasisLobe, Model, lobe_terms, term_count};
+pub use parameter::{Channels, Parameter, ParameterError, Role, Scale, flat_bounds, flat_len, flat_names, offset_of};
+pub use reflectance::{Material, Reflectance};
+
+/// Every model, by the name users give it. The first is the default.
+pub static MODELS: &[&dyn Model] = &[&Ggx, &CookTorrance];
+
+/// Looks a model up by name.
+///
+/// # Errors
+/// Names the known models when there is none of that name.
+pub fn model(name: &str) -> Result<&'static dyn Model, ParameterError> {
+    MODELS.iter().copied().find(|m| m.name() == name).ok_or_else(|| ParameterError::UnknownModel {
+        name: name.to_owned(),
+        known: MODELS.iter().map(|m| m.name()).collect::<Vec<_>>().join(", "),
+    })
+}
+
+#[cfg(test)]
+mod tests;

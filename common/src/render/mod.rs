@@ -1,1 +1,16 @@
-//! From light, shape and BRDF to pixels: the direct integrator and the transport tables.
+//! From light, shape and BRDF to pixels.
+//!
+//! Two independent ways to the same numbers: the direct [`integrator`] (Monte Carlo, the slow reference, any
+//! reflectance) and the [`transport`] tables (deterministic adaptive quadrature over a [`pyramid`] of the light, for the
+//! basis lobes of a model), each tested against the other.
+//!
+//! Direct light from the environment only: a convex object, no inter-reflection.
+
+//pub mod cut;
+pub mod footprint;
+//pub mod integrator;
+pub mod knots;
+//pub mod pyramid;
+//pub mod subset;
+pub mod table;
+//pub mod transport;

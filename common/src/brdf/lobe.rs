@@ -1,0 +1,117 @@
+//! One basis lobe, and the loop that integrates it for many widths at once.
+
+use super::Angles;
+use std::fmt::Debug;
+
+/// How a lobe's integral splits into basis integrals.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Split {
+    /// One term.
+    Whole,
+    /// Two terms: the lobe times `(1 - F5)` and the lobe times `F5` (Schlick's Fresnel term is linear in `f0`).
+    Schlick,
+}
+
+/// One direction of incoming light with the energy that arrives from it.
+#[derive(Debug, Clone, Copy)]
+pub struct Incident {
+    /// Its angles at the surface point.
+    pub angles: Angles,
+    /// Radiance times solid angle, linear Rec. 709 (times any quadrature weight).
+    pub energy: [f64; 3],
+}
+
+/// A lobe `f(wi, wo) cos(theta_i)` without Fresnel term, of a given width.
+pub trait Lobe: Debug + Sync {
+    /// For messages and table headers.
+    fn name(&self) -> &'static str;
+
+    /// How its integral splits.
+    fn split(&self) -> Split;
+
+    /// The GGX alpha of a lobe about as wide, for importance sampling and adaptive quadrature; `None` for a lobe as wide as the
+    /// hemisphere.
+    fn equivalent_alpha(&self, width: f64) -> Option<f64>;
+
+    /// `f cos(theta_i)` in 1/sr, without Fresnel term; zero for light from below the horizon.
+    fn eval(&self, angles: &Angles, width: f64) -> f64;
+
+    /// Adds the lobe's basis integrals over `incident`, for every width.
+    ///
+    /// `sums` has shape `term x channel x width` and grows by `sum over incident of energy * split_t * lobe(width)`.
+    /// `cos_o` is that of all `incident`.
+    fn accumulate(&self, incident: &[Incident], cos_o: f64, widths: &[f64], sums: &mut [f64]);
+}
+
+/// Widths handled in one pass; longer lists go through in chunks.
+const LANES: usize = 16;
+
+/// The generic loop behind every [`Lobe::accumulate`]: directions outside, widths inside, so that the widths fill SIMD lanes.
+///
+/// Runs under run-time dispatch. Every operation is a plain IEEE one without contraction and each sum runs over directions in
+/// order, so all SIMD levels give the same bits.
+pub(super) fn accumulate(
+    split: Split,
+    incident: &[Incident],
+    cos_o: f64,
+    widths: &[f64],
+    sums: &mut [f64],
+    kernel: impl Fn(&Angles, f64) -> f64 + Copy,
+) {
+    pulp::Arch::new().dispatch(Accumulate { split, incident, cos_o, widths, sums, kernel });
+}
+
+struct Accumulate<'a, K> {
+    split: Split,
+    incident: &'a [Incident],
+    cos_o: f64,
+    widths: &'a [f64],
+    sums: &'a mut [f64],
+    kernel: K,
+}
+
+impl<K: Fn(&Angles, f64) -> f64 + Copy> pulp::NullaryFnOnce for Accumulate<'_, K> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let count = self.widths.len();
+        for first in (0..count).step_by(LANES) {
+            let lanes = LANES.min(count - first);
+            // Unused lanes repeat the last width; their sums are dropped.
+            let widths: [f64; LANES] = std::array::from_fn(|k| self.widths[first + k.min(lanes - 1)]);
+            let mut total = [[[0.0; LANES]; 3]; 2];
+            for light in self.incident {
+                let mut value = [0.0; LANES];
+                let angles = Angles { cos_o: self.cos_o, ..light.angles };
+                for (v, &width) in value.iter_mut().zip(&widths) {
+                    *v = (self.kernel)(&angles, width);
+                }
+                add(self.split, light, &value, &mut total);
+            }
+            let terms = if self.split == Split::Whole { 1 } else { 2 };
+            for (row, lane_sums) in total[..terms].iter().flatten().enumerate() {
+                let out = &mut self.sums[row * count + first..][..lanes];
+                out.iter_mut().zip(lane_sums).for_each(|(s, t)| *s += t);
+            }
+        }
+    }
+}
+
+#[inline(always)]
+fn add(split: Split, light: &Incident, value: &[f64; LANES], total: &mut [[[f64; LANES]; 3]; 2]) {
+    let parts = match split {
+        Split::Whole => [1.0, 0.0],
+        Split::Schlick => {
+            let f5 = light.angles.f5();
+            [1.0 - f5, f5]
+        }
+    };
+    let terms = if split == Split::Whole { 1 } else { 2 };
+    for (part, sums) in parts[..terms].iter().zip(total) {
+        for (energy, sum) in light.energy.iter().zip(sums) {
+            let weight = part * energy;
+            sum.iter_mut().zip(value).for_each(|(s, v)| *s += weight * v);
+        }
+    }
+}

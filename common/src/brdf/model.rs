@@ -1,0 +1,57 @@
+//! What a reflectance model declares.
+
+use super::{Lobe, Parameter, Split};
+use crate::math::Rgb;
+use std::fmt::Debug;
+
+/// A lobe of a model, and which entry of the flat parameter vector is its width.
+#[derive(Debug, Clone, Copy)]
+pub struct BasisLobe {
+    /// The shape.
+    pub lobe: &'static dyn Lobe,
+    /// Entry of the flat parameter vector that holds its width; `None` for a lobe of fixed shape.
+    pub width: Option<usize>,
+}
+
+/// A reflectance model: parameters, basis lobes, and the map between them.
+///
+/// Terms are counted lobe by lobe: a lobe that splits by Schlick's Fresnel term has two, `(1 - F5)` and `F5`; any other
+/// has one.
+pub trait Model: Debug + Sync {
+    /// The name users give it.
+    fn name(&self) -> &'static str;
+
+    /// The formula and its source, one line.
+    fn summary(&self) -> &'static str;
+
+    /// Parameters in the order of the flat vector.
+    fn parameters(&self) -> &'static [Parameter];
+
+    /// Basis lobes in the order of the terms.
+    fn lobes(&self) -> &'static [BasisLobe];
+
+    /// Weight of every term at a flat parameter vector; `weights.len()` is [`term_count`].
+    fn weights(&self, parameters: &[f64], weights: &mut [Rgb]);
+
+    /// Calls `push(term, channel, entry, value)` for every derivative of a weight with respect to an entry of the flat
+    /// parameter vector that is not always zero.
+    fn weight_derivatives(&self, parameters: &[f64], push: &mut dyn FnMut(usize, usize, usize, f64));
+
+    /// A name of the colour of the specular lobe at normal incidence and its value, for reports: `f0`, or `ks f0`.
+    fn normal_incidence_specular(&self, parameters: &[f64]) -> Rgb;
+}
+
+/// Terms of one lobe.
+#[must_use]
+pub fn lobe_terms(lobe: &dyn Lobe) -> usize {
+    match lobe.split() {
+        Split::Whole => 1,
+        Split::Schlick => 2,
+    }
+}
+
+/// Terms of a model.
+#[must_use]
+pub fn term_count(model: &dyn Model) -> usize {
+    model.lobes().iter().map(|b| lobe_terms(b.lobe)).sum()
+}

@@ -1,0 +1,157 @@
+//! The parameters of a model: names, bounds, units, and the part each plays in a search.
+//!
+//! A parameter vector is flat: colours take three consecutive entries (red, green, blue), scalars one, in the order of
+//! [`Model::parameters`](super::Model::parameters).
+
+use thiserror::Error;
+
+/// Scalar or colour.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Channels {
+    /// One value.
+    Scalar,
+    /// Linear Rec. 709 red, green, blue.
+    Rgb,
+}
+
+impl Channels {
+    /// Entries in the flat parameter vector.
+    #[must_use]
+    pub fn count(self) -> usize {
+        match self {
+            Self::Scalar => 1,
+            Self::Rgb => 3,
+        }
+    }
+}
+
+/// How a search should see the parameter.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Role {
+    /// The weights are affine in it while all other parameters are held.
+    Linear,
+    /// The width of a lobe: radiance depends on it through the table's knots.
+    Width,
+    /// It multiplies other parameters: the scan tries these values and solves for the linear ones.
+    Scanned(&'static [f64]),
+}
+
+/// The coordinate in which a search moves.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Scale {
+    /// The value itself.
+    Linear,
+    /// Its logarithm; the lower bound is positive.
+    Logarithmic,
+}
+
+/// One parameter of a model.
+#[derive(Debug, Clone, Copy)]
+pub struct Parameter {
+    /// The name in `fit.json` and `--params`.
+    pub name: &'static str,
+    /// What it means, with its unit.
+    pub meaning: &'static str,
+    /// Scalar or colour.
+    pub channels: Channels,
+    /// Smallest value.
+    pub lower: f64,
+    /// Largest value.
+    pub upper: f64,
+    /// Start of the paper's pattern search (design section 10, `--preset paper`).
+    pub start: f64,
+    /// The part it plays in a search.
+    pub role: Role,
+    /// The coordinate pattern search moves in. Least squares always moves widths by their logarithm.
+    pub scale: Scale,
+}
+
+/// What is wrong with a set of parameters.
+#[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
+pub enum ParameterError {
+    /// No model of that name.
+    #[error("unknown model '{name}': expected one of {known}")]
+    UnknownModel {
+        /// As given.
+        name: String,
+        /// The names there are.
+        known: String,
+    },
+    /// The model has no such parameter.
+    #[error("model {model} has no parameter '{name}': it has {known}")]
+    UnknownParameter {
+        /// The model.
+        model: &'static str,
+        /// As given.
+        name: String,
+        /// The names there are.
+        known: String,
+    },
+    /// A parameter was left out.
+    #[error("parameter '{name}' of model {model} is missing: give {name}={example}")]
+    Missing {
+        /// The model.
+        model: &'static str,
+        /// The parameter.
+        name: &'static str,
+        /// How it is written.
+        example: &'static str,
+    },
+    /// One number for a scalar, three (or one for grey) for a colour.
+    #[error("parameter '{name}' takes {expected} number(s), found {found}")]
+    Count {
+        /// The parameter.
+        name: &'static str,
+        /// Entries it takes.
+        expected: usize,
+        /// Entries given.
+        found: usize,
+    },
+    /// Outside its bounds, or not a number.
+    #[error("parameter '{name}' is {found}: expected a value in [{lower}, {upper}]")]
+    OutOfBounds {
+        /// The parameter.
+        name: &'static str,
+        /// The value given.
+        found: f64,
+        /// Smallest value.
+        lower: f64,
+        /// Largest value.
+        upper: f64,
+    },
+}
+
+/// Entries of the flat vector of these parameters.
+#[must_use]
+pub fn flat_len(parameters: &[Parameter]) -> usize {
+    parameters.iter().map(|p| p.channels.count()).sum()
+}
+
+/// Where a named parameter starts in the flat vector.
+#[must_use]
+pub fn offset_of(parameters: &[Parameter], name: &str) -> Option<usize> {
+    let index = parameters.iter().position(|p| p.name == name)?;
+    Some(flat_len(&parameters[..index]))
+}
+
+/// Lower and upper bounds of every entry of the flat vector.
+#[must_use]
+pub fn flat_bounds(parameters: &[Parameter]) -> (Vec<f64>, Vec<f64>) {
+    let spread = |f: fn(&Parameter) -> f64| {
+        parameters.iter().flat_map(|p| std::iter::repeat_n(f(p), p.channels.count())).collect()
+    };
+    (spread(|p| p.lower), spread(|p| p.upper))
+}
+
+/// A name for every entry of the flat vector: `kd.r`, `kd.g`, `kd.b`, `alpha`.
+#[must_use]
+pub fn flat_names(parameters: &[Parameter]) -> Vec<String> {
+    parameters
+        .iter()
+        .flat_map(|p| match p.channels {
+            Channels::Scalar => vec![p.name.to_owned()],
+            Channels::Rgb => ["r", "g", "b"].map(|c| format!("{}.{c}", p.name)).to_vec(),
+        })
+        .collect()
+}

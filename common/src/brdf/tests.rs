@@ -1,0 +1,229 @@
+//! Physics every model must obey; a model added to the registry is covered from then on.
+
+use super::*;
+use crate::math::{
+    Rgb, Vec3,
+    elementary::sin_cos,
+    sampling::{PointStream, key, uniform},
+    warp,
+};
+use std::f64::consts::{PI, TAU};
+
+fn random_parameters(model: &dyn Model, n: u64) -> Vec<f64> {
+    let (lower, upper) = flat_bounds(model.parameters());
+    let at = |i: usize| lower[i] + (upper[i] - lower[i]) * uniform(key(&[n, i as u64]));
+    (0..lower.len()).map(at).collect()
+}
+
+fn direction(n: u64) -> Vec3 {
+    let z = 0.02 + 0.97 * uniform(key(&[n, 100]));
+    let (s, c) = sin_cos(TAU * uniform(key(&[n, 101])));
+    let r = (1.0 - z * z).sqrt();
+    Vec3::new(r * c, r * s, z)
+}
+
+#[test]
+fn every_model_is_reciprocal() {
+    const TOLERANCE: f64 = 1e-12; // a few roundings; a swapped angle would show in the first digit
+    for model in MODELS {
+        for n in 0..2000 {
+            let material = Material::new(*model, random_parameters(*model, n)).unwrap();
+            let (a, b) = (direction(2 * n), direction(2 * n + 1));
+            let (there, back) = (material.eval_cos(a, b) / a.z, material.eval_cos(b, a) / b.z);
+            assert!((there - back).abs().max_element() <= TOLERANCE * there.max_element(), "{} {n}", model.name());
+        }
+    }
+}
+
+/// Directional albedo of a lobe (all terms, F = 1), by importance sampling with its equivalent GGX lobe.
+fn albedo(lobe: &dyn Lobe, width: f64, cos_o: f64) -> f64 {
+    let wo = Vec3::new((1.0 - cos_o * cos_o).sqrt(), 0.0, cos_o);
+    let stream = PointStream::new(17);
+    let n = 1 << 14;
+    let mut sum = 0.0;
+    for i in 0..n {
+        let [u, v, ..] = stream.point(i);
+        let (wi, pdf) = match lobe.equivalent_alpha(width) {
+            None => {
+                let wi = warp::cosine_hemisphere([u, v]);
+                (wi, warp::cosine_hemisphere_pdf(wi.z))
+            }
+            Some(alpha) => {
+                let h = warp::ggx_visible_normal(wo, alpha, [u, v]);
+                (2.0 * wo.dot(h) * h - wo, warp::ggx_reflection_pdf(cos_o, h.z, alpha))
+            }
+        };
+        if wi.z > 0.0 && pdf > 0.0 {
+            sum += lobe.eval(&Angles::new(Vec3::Z, wi, wo), width) / pdf;
+        }
+    }
+    sum / f64::from(n)
+}
+
+#[test]
+fn no_lobe_reflects_more_than_it_receives() {
+    const NOISE: f64 = 2e-3; // of 16k Sobol points
+    for basis in MODELS.iter().flat_map(|m| m.lobes()) {
+        let widths: &[f64] = if basis.width.is_some() { &[0.005, 0.02, 0.1, 0.3, 0.6, 1.0] } else { &[0.0] };
+        for &width in widths {
+            for cos_o in [0.05, 0.2, 0.5, 0.8, 0.99] {
+                let value = albedo(basis.lobe, width, cos_o);
+                assert!(value <= 1.0 + NOISE, "{} width {width} cos {cos_o}: {value}", basis.lobe.name());
+                if width <= 0.02 && basis.width.is_some() && cos_o >= 0.5 {
+                    assert!(value > 0.99, "a sharp {} lobe is a mirror: {value}", basis.lobe.name());
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn lambert_reflects_its_albedo() {
+    assert!((albedo(&Lambert, 0.0, 0.7) - 1.0).abs() < 1e-12);
+}
+
+/// D and V of the design's table, written out naively.
+fn ggx_by_the_book(g: &Angles, a: f64) -> (f64, f64) {
+    let d = a * a / (PI * (g.cos_h * g.cos_h * (a * a - 1.0) + 1.0).powi(2));
+    let lambda = |c: f64| 0.5 * ((1.0 + a * a * (1.0 / (c * c) - 1.0)).sqrt() - 1.0);
+    (d, 1.0 / (1.0 + lambda(g.cos_o) + lambda(g.cos_i)) / (4.0 * g.cos_i * g.cos_o))
+}
+
+#[test]
+fn the_ggx_lobe_is_d_v_cos() {
+    let lobe = Ggx.lobes()[1].lobe;
+    for n in 0..500 {
+        let g = Angles::new(Vec3::Z, direction(2 * n), direction(2 * n + 1));
+        for alpha in [0.05, 0.3, 1.0] {
+            let (d, v) = ggx_by_the_book(&g, alpha);
+            assert!((lobe.eval(&g, alpha) / (d * v * g.cos_i) - 1.0).abs() < 1e-9);
+        }
+    }
+}
+
+/// Weak white furnace (Heitz 2014, eq. 85): masked by G1 alone, the distribution reflects exactly everything.
+#[test]
+fn ggx_passes_the_weak_white_furnace() {
+    for alpha in [0.02_f64, 0.1, 0.3, 0.6, 1.0] {
+        for cos_o in [0.1_f64, 0.4, 0.9] {
+            let wo = Vec3::new((1.0 - cos_o * cos_o).sqrt(), 0.0, cos_o);
+            let lambda = 0.5 * ((1.0 + alpha * alpha * (1.0 / (cos_o * cos_o) - 1.0)).sqrt() - 1.0);
+            let (n, m) = (4000, 400);
+            let mut sum = 0.0;
+            for i in 0..n {
+                // Stretch tan(theta_h) so that the quadrature follows the peak; D by the book.
+                let s = (f64::from(i) + 0.5) / f64::from(n);
+                let rest = (1.0 - s) * (1.0 - s) * (1.0 - s);
+                let u = 1.0 - rest;
+                let tan2 = alpha * alpha * u / rest;
+                let cos_h = 1.0 / (1.0 + tan2).sqrt();
+                let d = alpha * alpha / (PI * (cos_h * cos_h * (alpha * alpha - 1.0) + 1.0).powi(2));
+                // d(solid angle) = sin dtheta dphi; sin dtheta = cos^3/2 d(tan2)
+                let measure =
+                    0.5 * cos_h.powi(3) * alpha * alpha / (rest * rest) * 3.0 * (1.0 - s) * (1.0 - s) / f64::from(n);
+                for j in 0..m {
+                    let (s, c) = sin_cos(TAU * (f64::from(j) + 0.5) / f64::from(m));
+                    let sin_h = (1.0 - cos_h * cos_h).max(0.0).sqrt();
+                    let dot = wo.dot(Vec3::new(sin_h * c, sin_h * s, cos_h)).max(0.0);
+                    sum += d * dot / cos_o / (1.0 + lambda) * measure * TAU / f64::from(m);
+                }
+            }
+            assert!((sum - 1.0).abs() < 1e-3, "alpha {alpha} cos {cos_o}: {sum}");
+        }
+    }
+}
+
+#[test]
+fn weight_derivatives_are_derivatives() {
+    for model in MODELS {
+        let terms = term_count(*model);
+        for n in 0..50 {
+            let p = random_parameters(*model, n);
+            let mut analytic = vec![vec![[0.0; 3]; terms]; p.len()];
+            model.weight_derivatives(&p, &mut |term, channel, entry, value| analytic[entry][term][channel] += value);
+            for entry in 0..p.len() {
+                let shifted = |h: f64| {
+                    let mut q = p.clone();
+                    q[entry] += h;
+                    let mut weights = vec![Rgb::ZERO; terms];
+                    model.weights(&q, &mut weights);
+                    weights
+                };
+                let (up, down) = (shifted(1e-5), shifted(-1e-5));
+                for term in 0..terms {
+                    for channel in 0..3 {
+                        let numeric = (up[term][channel] - down[term][channel]) / 2e-5;
+                        let error = (numeric - analytic[entry][term][channel]).abs();
+                        assert!(error < 1e-8, "{} entry {entry} term {term} channel {channel}", model.name());
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn parameters_called_linear_are_affine_in_the_weights() {
+    for model in MODELS {
+        let p = random_parameters(*model, 1);
+        let mut entry = 0;
+        for parameter in model.parameters() {
+            for _ in 0..parameter.channels.count() {
+                if parameter.role == Role::Linear {
+                    let at = |x: f64| {
+                        let mut q = p.clone();
+                        q[entry] = x;
+                        let mut weights = vec![Rgb::ZERO; term_count(*model)];
+                        model.weights(&q, &mut weights);
+                        weights
+                    };
+                    let (zero, half, one) = (at(0.0), at(0.5), at(1.0));
+                    for t in 0..zero.len() {
+                        assert!((half[t] - (zero[t] + one[t]) * 0.5).length() < 1e-12, "{}", model.name());
+                    }
+                }
+                entry += 1;
+            }
+        }
+    }
+}
+
+/// The SIMD path against a scalar loop in the same order: the same bits, whatever the processor.
+#[test]
+fn accumulation_has_the_bits_of_a_scalar_loop() {
+    let wo = direction(999);
+    let lights: Vec<Incident> = (0..77)
+        .map(|n| Incident {
+            angles: Angles::new(Vec3::Z, direction(n), wo),
+            energy: [0.1 * n as f64, 1.0, 3.0 / (1.0 + n as f64)],
+        })
+        .collect();
+    for basis in MODELS.iter().flat_map(|m| m.lobes()) {
+        let widths: Vec<f64> = (0..21).map(|k| 0.01 * (1.0 + f64::from(k))).collect();
+        let terms = lobe_terms(basis.lobe);
+        let mut sums = vec![0.0; terms * 3 * widths.len()];
+        basis.lobe.accumulate(&lights, wo.z, &widths, &mut sums);
+        for (k, &width) in widths.iter().enumerate() {
+            for t in 0..terms {
+                for c in 0..3 {
+                    let mut expected = 0.0;
+                    for light in &lights {
+                        let f5 = light.angles.f5();
+                        let part = if terms == 1 { 1.0 } else { [1.0 - f5, f5][t] };
+                        expected += part * light.energy[c] * basis.lobe.eval(&light.angles, width);
+                    }
+                    let found = sums[(t * 3 + c) * widths.len() + k];
+                    assert_eq!(found.to_bits(), expected.to_bits(), "{} width {width}", basis.lobe.name());
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn bad_parameters_are_named() {
+    let message = |p: Vec<f64>| Material::new(&Ggx, p).unwrap_err().to_string();
+    assert_eq!(message(vec![0.1, 0.1, 0.1, 0.5, 1.5, 0.5, 0.1]), "parameter 'f0' is 1.5: expected a value in [0, 1]");
+    assert!(message(vec![0.1, 0.1, 0.1, 0.5, 0.5, 0.5, f64::NAN]).contains("'alpha' is NaN"));
+    assert!(model("phong").unwrap_err().to_string().contains("expected one of ggx, cook-torrance"));
+}

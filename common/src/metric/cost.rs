@@ -1,0 +1,119 @@
+//! The per-pixel cost of stage one (\[BP20b\] Eq. 1):
+//!
+//! `C(A, B, gamma) = sum_p w_p sum_rgb (A[p]^(1/gamma) - B[p]^(1/gamma))^2`
+//!
+//! without clamping. A power below 1 has an infinite slope at zero, so below a small e the power continues as its
+//! tangent line: once continuously differentiable, finite gradient, negative values keep their order. The same for A and B.
+
+use crate::math::elementary::pow;
+
+/// The compression `x^(1/gamma)`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Compression {
+    exponent: f64,
+    /// Below this the tangent line takes over; 0 for the paper's `max(x, 0)`.
+    knee: f64,
+    value_at_knee: f64,
+    slope_at_knee: f64,
+}
+
+/// Where the tangent line takes over, as a share of the photo's mean radiance (design section 1).
+pub const KNEE: f64 = 1e-6;
+
+impl Compression {
+    /// Compression with the tangent line below [`KNEE`] times the photo's mean radiance.
+    ///
+    /// # Panics
+    /// Unless gamma and the mean radiance are positive.
+    #[must_use]
+    pub fn new(gamma: f64, mean_radiance: f64) -> Self {
+        assert!(gamma > 0.0 && mean_radiance > 0.0, "gamma {gamma}, mean radiance {mean_radiance}");
+        let (exponent, knee) = (1.0 / gamma, KNEE * mean_radiance);
+        let value = pow(knee, exponent);
+        Self { exponent, knee, value_at_knee: value, slope_at_knee: exponent * value / knee }
+    }
+
+    /// The paper's compression: `max(x, 0)^(1/gamma)`.
+    ///
+    /// # Panics
+    /// Unless gamma is positive.
+    #[must_use]
+    pub fn clamped(gamma: f64) -> Self {
+        assert!(gamma > 0.0, "gamma {gamma}");
+        Self { exponent: 1.0 / gamma, knee: 0.0, value_at_knee: 0.0, slope_at_knee: 0.0 }
+    }
+
+    /// The compressed value.
+    #[must_use]
+    pub fn apply(&self, x: f64) -> f64 {
+        if x >= self.knee {
+            if self.exponent == 1.0 { x } else { pow(x, self.exponent) }
+        } else {
+            self.value_at_knee + self.slope_at_knee * (x - self.knee)
+        }
+    }
+
+    /// The compressed value and its derivative.
+    #[must_use]
+    pub fn apply_with_slope(&self, x: f64) -> (f64, f64) {
+        let value = self.apply(x);
+        let slope = if x > self.knee {
+            if self.exponent == 1.0 { 1.0 } else { self.exponent * value / x }
+        } else {
+            self.slope_at_knee
+        };
+        (value, slope)
+    }
+}
+
+/// The weighted sum of squared differences over all pixels and channels, in pixel order. `reference` holds compressed values.
+#[must_use]
+pub fn cost(compression: &Compression, weights: &[f64], reference: &[Vec<f64>; 3], radiance: &[Vec<f64>; 3]) -> f64 {
+    let mut sum = 0.0;
+    for (p, weight) in weights.iter().enumerate() {
+        let mut pixel = 0.0;
+        for c in 0..3 {
+            let difference = reference[c][p] - compression.apply(radiance[c][p]);
+            pixel += difference * difference;
+        }
+        sum += weight * pixel;
+    }
+    sum
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn compression_is_smooth_at_the_knee_and_keeps_the_order_of_negative_values() {
+        let c = Compression::new(2.2, 0.5);
+        let knee = KNEE * 0.5;
+        let (below, above) = (c.apply_with_slope(knee * (1.0 - 1e-9)), c.apply_with_slope(knee * (1.0 + 1e-9)));
+        assert!((below.0 / above.0 - 1.0).abs() < 1e-8 && (below.1 / above.1 - 1.0).abs() < 1e-8);
+        assert!(c.apply(-2.0) < c.apply(-1.0) && c.apply(-1.0) < c.apply(0.0));
+    }
+
+    #[test]
+    fn slopes_are_derivatives() {
+        for gamma in [1.0, 1.7, 3.0] {
+            for c in [Compression::new(gamma, 1.0), Compression::clamped(gamma)] {
+                for x in [1e-4, 0.03, 0.7, 20.0] {
+                    let h = 1e-6 * x;
+                    let numeric = (c.apply(x + h) - c.apply(x - h)) / (2.0 * h);
+                    assert!((c.apply_with_slope(x).1 / numeric - 1.0).abs() < 1e-7, "gamma {gamma} x {x}");
+                }
+            }
+        }
+        assert_eq!(Compression::clamped(2.0).apply_with_slope(-1.0), (0.0, 0.0));
+        assert_eq!(Compression::clamped(2.0).apply_with_slope(0.0), (0.0, 0.0));
+    }
+
+    #[test]
+    fn the_cost_is_equation_one() {
+        let compression = Compression::clamped(2.0);
+        let reference = [vec![2.0, 0.0], vec![1.0, 0.0], vec![0.0, 3.0]]; // already compressed
+        let radiance = [vec![1.0, 4.0], vec![1.0, 0.0], vec![0.25, 9.0]];
+        assert_eq!(cost(&compression, &[1.0, 10.0], &reference, &radiance), (1.0 + 0.0 + 0.25) + 10.0 * 4.0);
+    }
+}

@@ -1,0 +1,118 @@
+//! The direct integrator: one pixel of any reflectance by Monte Carlo integration. The slow reference.
+//!
+//! Each sample has its own position inside the pixel, and so its own normal. Directions come from one mixture, half from the
+//! environment's density and half from the lobes of the reflectance (visible GGX normals), weighted by the balance heuristic
+//! (Veach 1997): every sample counts with `1 / sum_j n_j p_j(d)`. Points are scrambled Sobol points, a pure function of (seed, pixel,
+//! technique, index).
+
+use crate::{
+    brdf::Reflectance,
+    light::EnvironmentDistribution,
+    math::{
+        Rgb, Vec3,
+        frame::Frame,
+        sampling::{PointStream, key},
+        warp,
+    },
+    scene::Geometry,
+};
+
+/// Renders pixels of one scene.
+#[derive(Debug, Clone, Copy)]
+pub struct Integrator<'a> {
+    /// The object and the camera.
+    pub geometry: &'a Geometry,
+    /// The light with its sampling density.
+    pub light: &'a EnvironmentDistribution,
+    /// Samples per pixel, split among the techniques.
+    pub samples: u32,
+    /// Seed of the run.
+    pub seed: u64,
+}
+
+/// A technique that proposes directions.
+#[derive(Debug, Clone, Copy)]
+enum Technique {
+    Environment,
+    Lobe(f64),
+    Cosine,
+}
+
+/// Lobes at least this wide are proposed by the cosine instead.
+const WIDE: f64 = 0.7;
+
+impl Integrator<'_> {
+    /// Mean radiance over the part of a pixel that sees the object; zero when it sees none.
+    #[must_use]
+    pub fn pixel(&self, [column, row]: [u32; 2], reflectance: &dyn Reflectance) -> Rgb {
+        let techniques = self.techniques(reflectance);
+        let (mut sum, mut hits) = (Rgb::ZERO, 0u32);
+        for (t, &(technique, count)) in techniques.iter().enumerate() {
+            let stream = PointStream::new(key(&[self.seed, u64::from(row), u64::from(column), t as u64]));
+            for index in 0..count {
+                let [x, y, u, v] = stream.point(index);
+                let position = (f64::from(column) + x, f64::from(row) + y);
+                let Some(surface) = self.geometry.point(position.0, position.1) else { continue };
+                hits += 1;
+                let frame = Frame::from_normal(surface.normal);
+                let wo = frame.to_local(surface.view);
+                if wo.z > 0.0 {
+                    sum += self.sample(technique, [u, v], &frame, wo, &techniques, reflectance);
+                }
+            }
+        }
+        let drawn: u32 = techniques.iter().map(|(_, n)| n).sum();
+        // Each technique's sum estimates the mean over the pixel; samples that miss the object add nothing.
+        if hits == 0 { Rgb::ZERO } else { sum * (f64::from(drawn) / f64::from(hits)) }
+    }
+
+    fn techniques(&self, reflectance: &dyn Reflectance) -> Vec<(Technique, u32)> {
+        let lobes = reflectance.sampling_alphas();
+        let mut list: Vec<Technique> = vec![Technique::Environment];
+        for alpha in lobes {
+            let technique = if alpha >= WIDE { Technique::Cosine } else { Technique::Lobe(alpha) };
+            list.push(technique);
+        }
+        let others = u32::try_from(list.len() - 1).unwrap_or(1).max(1);
+        let each = (self.samples / 2 / others).max(1);
+        let environment = self.samples.saturating_sub(each * others).max(1);
+        list.into_iter().enumerate().map(|(i, t)| (t, if i == 0 { environment } else { each })).collect()
+    }
+
+    fn sample(
+        &self,
+        technique: Technique,
+        u: [f64; 2],
+        frame: &Frame,
+        wo: Vec3,
+        techniques: &[(Technique, u32)],
+        reflectance: &dyn Reflectance,
+    ) -> Rgb {
+        let world = match technique {
+            Technique::Environment => self.light.sample(u).0,
+            Technique::Cosine => frame.to_world(warp::cosine_hemisphere(u)),
+            Technique::Lobe(alpha) => {
+                let h = warp::ggx_visible_normal(wo, alpha, u);
+                frame.to_world((2.0 * wo.dot(h) * h - wo).normalize())
+            }
+        };
+        let wi = frame.to_local(world);
+        if wi.z <= 0.0 {
+            return Rgb::ZERO;
+        }
+        let (radiance, light_pdf) = self.light.radiance_and_pdf(world);
+        let cos_h = (wi + wo).normalize().z;
+        let density: f64 = techniques
+            .iter()
+            .map(|&(technique, count)| {
+                f64::from(count)
+                    * match technique {
+                        Technique::Environment => light_pdf,
+                        Technique::Cosine => warp::cosine_hemisphere_pdf(wi.z),
+                        Technique::Lobe(alpha) => warp::ggx_reflection_pdf(wo.z, cos_h, alpha),
+                    }
+            })
+            .sum();
+        if density > 0.0 { radiance * reflectance.eval_cos(wi, wo) / density } else { Rgb::ZERO }
+    }
+}

@@ -1,0 +1,192 @@
+//! A pyramid of the environment light: per node the energy, its centroid direction and its spread.
+//!
+//! Level 0 holds one node per texel of the lat-long map; each coarser level joins 2 x 2 nodes. The energy of a texel is the
+//! integral of the *bilinear* radiance over the texel's area (the mean of a bilinear function over a rectangle within one
+//! patch is its value at the centre, so four quadrants suffice; only the variation of sin(theta) over a quadrant is
+//! neglected). Where a texel is too coarse for a lobe, [`Cell`]s finer than texels are made on the fly.
+
+use crate::{
+    light::Environment,
+    math::{Vec3, elementary::sin_cos, to_f32, widen},
+};
+use rayon::prelude::*;
+use std::f64::consts::{PI, TAU};
+
+/// Light from one node of the pyramid, seen as a point with a spread.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Node {
+    /// Radiance integrated over solid angle, linear Rec. 709.
+    pub energy: [f32; 3],
+    /// Energy-weighted mean direction, normalised, world space.
+    pub centroid: [f32; 3],
+    /// Energy-weighted mean square distance from the centroid, as a chord of the unit sphere.
+    pub spread2: f32,
+    /// No point of the node is farther from the centroid than this chord.
+    pub radius: f32,
+}
+
+/// A rectangle of the map: level (negative is finer than texels), row and column at that level.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Cell {
+    level: i8,
+    row: u32,
+    column: u32,
+}
+
+#[derive(Debug)]
+struct Level {
+    rows: u32,
+    columns: u32,
+    nodes: Vec<Node>,
+}
+
+/// The pyramid.
+#[derive(Debug)]
+pub struct LightPyramid {
+    environment: Environment,
+    levels: Vec<Level>,
+    mean_radiance: f64,
+}
+
+/// Cells are not split further than this many halvings of a texel.
+const DEEPEST: i8 = -6;
+
+/// Coarsening stops at this many rows.
+const TOP_ROWS: u32 = 4;
+
+impl LightPyramid {
+    /// Builds the pyramid of a map.
+    #[must_use]
+    pub fn new(environment: Environment) -> Self {
+        let mut levels = vec![texel_level(&environment)];
+        while let Some(finest) = levels.last().filter(|l| l.rows > TOP_ROWS) {
+            levels.push(coarsen(finest));
+        }
+        let energy: f64 = levels[levels.len() - 1].nodes.iter().map(|n| f64::from(strongest(n.energy))).sum();
+        Self { environment, levels, mean_radiance: energy / (4.0 * PI) }
+    }
+
+    /// The map.
+    #[must_use]
+    pub fn environment(&self) -> &Environment {
+        &self.environment
+    }
+
+    /// Mean over the sphere of the strongest channel's radiance: the scale of error tolerances.
+    #[must_use]
+    pub fn mean_radiance(&self) -> f64 {
+        self.mean_radiance
+    }
+
+    /// The coarsest cells, which cover the sphere.
+    pub fn roots(&self) -> impl Iterator<Item = Cell> + '_ {
+        let level = self.levels.len() - 1;
+        let top = &self.levels[level];
+        let level = i8::try_from(level).unwrap_or(i8::MAX);
+        (0..top.rows).flat_map(move |row| (0..top.columns).map(move |column| Cell { level, row, column }))
+    }
+
+    /// The light of a cell.
+    #[must_use]
+    pub fn node(&self, cell: Cell) -> Node {
+        match usize::try_from(cell.level) {
+            Ok(level) => {
+                let level = &self.levels[level];
+                level.nodes[cell.row as usize * level.columns as usize + cell.column as usize]
+            }
+            Err(_) => self.sub_texel(cell),
+        }
+    }
+
+    /// The cells that a cell is made of; none when it is as fine as they get.
+    pub fn children(&self, cell: Cell) -> impl Iterator<Item = Cell> + use<> {
+        let (rows, columns) = match usize::try_from(cell.level - 1) {
+            Ok(level) => (self.levels[level].rows, self.levels[level].columns),
+            Err(_) => (u32::MAX, u32::MAX),
+        };
+        let fine = cell.level > DEEPEST;
+        (0..4u32).filter_map(move |k| {
+            let (row, column) = (2 * cell.row + k / 2, 2 * cell.column + k % 2);
+            (fine && row < rows && column < columns).then_some(Cell { level: cell.level - 1, row, column })
+        })
+    }
+
+    fn sub_texel(&self, cell: Cell) -> Node {
+        let scale = f64::from(1u32 << cell.level.unsigned_abs());
+        let size = [self.environment.height() as f64 * scale, self.environment.width() as f64 * scale];
+        quadrant(&self.environment, f64::from(cell.row) / size[0], f64::from(cell.column) / size[1], size)
+    }
+}
+
+/// The light of the rectangle whose top left corner is (v, u) and whose sides are 1/size of the map; it must lie within one
+/// bilinear patch.
+fn quadrant(environment: &Environment, v: f64, u: f64, size: [f64; 2]) -> Node {
+    let (v_mid, u_mid) = (v + 0.5 / size[0], u + 0.5 / size[1]);
+    let (sin, _) = sin_cos(PI * v_mid);
+    let (dtheta, dphi) = (PI / size[0], TAU / size[1]);
+    // Exact: integral of sin(theta) over the row is 2 sin(mid) sin(dtheta / 2).
+    let solid_angle = dphi * 2.0 * sin * sin_cos(0.5 * dtheta).0;
+    let energy = environment.radiance_at([u_mid, v_mid]) * solid_angle;
+    let width = sin * dphi;
+    Node {
+        energy: crate::math::narrow(energy),
+        centroid: crate::math::narrow(environment.direction(u_mid, v_mid)),
+        spread2: to_f32((dtheta * dtheta + width * width) / 12.0),
+        // Rows widen towards the equator: take the wider edge.
+        radius: to_f32(0.5 * (dtheta * dtheta + (width + dtheta * dphi) * (width + dtheta * dphi)).sqrt()),
+    }
+}
+
+fn texel_level(environment: &Environment) -> Level {
+    let (height, width) = (environment.height(), environment.width());
+    let size = [2.0 * height as f64, 2.0 * width as f64];
+    let nodes = (0..height).into_par_iter().flat_map_iter(|i| {
+        (0..width).map(move |j| {
+            let quadrants: [Node; 4] = std::array::from_fn(|k| {
+                let (v, u) = ((2 * i + k / 2) as f64 / size[0], (2 * j + k % 2) as f64 / size[1]);
+                quadrant(environment, v, u, size)
+            });
+            join(&quadrants)
+        })
+    });
+    let count = |n: usize| u32::try_from(n).unwrap_or(u32::MAX);
+    Level { rows: count(height), columns: count(width), nodes: nodes.collect() }
+}
+
+fn coarsen(fine: &Level) -> Level {
+    let (rows, columns) = (fine.rows.div_ceil(2), fine.columns.div_ceil(2));
+    let nodes = (0..rows).into_par_iter().flat_map_iter(|row| {
+        (0..columns).map(move |column| {
+            let mut children = Vec::with_capacity(4);
+            for k in 0..4 {
+                let (r, c) = (2 * row + k / 2, 2 * column + k % 2);
+                if r < fine.rows && c < fine.columns {
+                    children.push(fine.nodes[r as usize * fine.columns as usize + c as usize]);
+                }
+            }
+            join(&children)
+        })
+    });
+    Level { rows, columns, nodes: nodes.collect() }
+}
+
+/// Joins nodes: energies add, the centroid is their energy-weighted mean, the spread adds by the parallel axis theorem.
+fn join(parts: &[Node]) -> Node {
+    let weight = |n: &Node| f64::from(n.energy.iter().sum::<f32>());
+    let total: f64 = parts.iter().map(weight).sum();
+    // A dark node still has a place and a size.
+    let share = |n: &Node| if total > 0.0 { weight(n) / total } else { 1.0 / parts.len() as f64 };
+    let mean: Vec3 = parts.iter().map(|n| widen(n.centroid) * share(n)).sum();
+    let centroid = mean.normalize_or(widen(parts[0].centroid));
+    let distance2 = |n: &Node| (widen(n.centroid) - centroid).length_squared();
+    let spread2: f64 = parts.iter().map(|n| share(n) * (f64::from(n.spread2) + distance2(n))).sum();
+    let radius = parts.iter().map(|n| distance2(n).sqrt() + f64::from(n.radius)).fold(0.0, f64::max);
+    let energy = std::array::from_fn(|c| parts.iter().map(|n| n.energy[c]).sum());
+    Node { energy, centroid: crate::math::narrow(centroid), spread2: to_f32(spread2), radius: to_f32(radius) }
+}
+
+/// The strongest channel.
+#[must_use]
+pub fn strongest(energy: [f32; 3]) -> f32 {
+    energy[0].max(energy[1]).max(energy[2])
+}
