@@ -17,7 +17,7 @@
 //! `ks` and `f0` trade against each other: only `ks f0`, the specular colour at normal incidence, is well determined.
 
 use super::{
-    Angles, BasisLobe, Channels, Incident, Lambert, Lobe, Model, Parameter, Role, Scale, Split, lobe::accumulate,
+    Angles, BasisLobe, Channels, Incident, Lambert, Lobe, Model, Parameter, Role, Scale, Spread, Split, lobe::{accumulate, second_order},
 };
 use crate::math::{Rgb, elementary::exp_nonpositive};
 use std::f64::consts::PI;
@@ -134,7 +134,7 @@ impl Lobe for CookTorranceLobe {
     }
 
     fn eval(&self, angles: &Angles, width: f64) -> f64 {
-        kernel(angles, width)
+        kernel(angles, &Spread::default(), width)
     }
 
     fn accumulate(&self, incident: &[Incident], cos_o: f64, widths: &[f64], sums: &mut [f64]) {
@@ -143,12 +143,16 @@ impl Lobe for CookTorranceLobe {
 }
 
 /// `D G / (4 n.v)`; zero below the horizon of the light and for half vectors below the surface.
+///
+/// Spread: with `u = tan^2(th)` the Laplacian of `exp(-u/m^2)` is `4 (u - m^2) / m^4` times itself; a quarter of it times the mean
+/// square distance is the second-order term.
 #[inline(always)]
-fn kernel(g: &Angles, m: f64) -> f64 {
+fn kernel(g: &Angles, spread: &Spread, m: f64) -> f64 {
     let m2 = m * m;
     let cos2 = (g.cos_h * g.cos_h).max(f64::MIN_POSITIVE);
     let cos_i = g.cos_i.max(0.0);
     let distribution = exp_nonpositive(-g.sin2_h / (cos2 * m2)) / (PI * m2 * cos2 * cos2);
     let masking = (2.0 * g.cos_h.max(0.0) * g.cos_o.min(cos_i) / g.cos_d).min(1.0);
-    distribution * masking / (4.0 * g.cos_o)
+    let blur = second_order(spread.half2 * (g.sin2_h / cos2 - m2) / (m2 * m2));
+    distribution * masking * blur / (4.0 * g.cos_o)
 }

@@ -14,7 +14,7 @@
 //! | `alpha` | microfacet width (an artist's roughness is its square root) | [0.005, 1] |
 
 use super::{
-    Angles, BasisLobe, Channels, Incident, Lambert, Lobe, Model, Parameter, Role, Scale, Split, lobe::accumulate,
+    Angles, BasisLobe, Channels, Incident, Lambert, Lobe, Model, Parameter, Role, Scale, Spread, Split, lobe::{accumulate, second_order},
 };
 use crate::math::Rgb;
 use std::f64::consts::PI;
@@ -116,7 +116,7 @@ impl Lobe for GgxLobe {
     }
 
     fn eval(&self, angles: &Angles, width: f64) -> f64 {
-        kernel(angles, width)
+        kernel(angles, &Spread::default(), width)
     }
 
     fn accumulate(&self, incident: &[Incident], cos_o: f64, widths: &[f64], sums: &mut [f64]) {
@@ -126,12 +126,16 @@ impl Lobe for GgxLobe {
 
 /// `D V n.l`: with `d = sin^2(th) + a^2 cos^2(th)` the distribution is `a^2 / (pi d^2)`, and
 /// `V n.l = n.l / (2 (n.l s(n.v) + n.v s(n.l)))`, `s(c) = sqrt(a^2 + (1 - a^2) c^2)`.
+///
+/// Spread: with `u = sin^2(th)`, `D = a^2 / (pi (u + a^2)^2)` near the peak has the Laplacian `8 D (2u - a^2) / (u + a^2)^2`; a
+/// quarter of it times the mean square distance is the second-order term.
 #[inline(always)]
-fn kernel(g: &Angles, alpha: f64) -> f64 {
+fn kernel(g: &Angles, spread: &Spread, alpha: f64) -> f64 {
     let a2 = alpha * alpha;
     let d = g.sin2_h + a2 * g.cos_h * g.cos_h;
     let cos_i = g.cos_i.max(0.0);
     let s_o = (a2 + (1.0 - a2) * g.cos_o * g.cos_o).sqrt();
     let s_i = (a2 + (1.0 - a2) * cos_i * cos_i).sqrt();
-    a2 * cos_i / (2.0 * PI * d * d * (cos_i * s_o + g.cos_o * s_i))
+    let blur = second_order(2.0 * spread.half2 * (2.0 * g.sin2_h - a2) / (d * d));
+    a2 * cos_i * blur / (2.0 * PI * d * d * (cos_i * s_o + g.cos_o * s_i))
 }

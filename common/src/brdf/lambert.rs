@@ -1,6 +1,6 @@
 //! Lambert's diffuse lobe, `1/pi`.
 
-use super::{Angles, Incident, Lobe, Split, lobe::accumulate};
+use super::{Angles, Incident, Lobe, Split, lobe::Spread, lobe::accumulate};
 use std::f64::consts::FRAC_1_PI;
 
 /// `f = 1/pi`, so that a weight is the diffuse albedo.
@@ -21,7 +21,7 @@ impl Lobe for Lambert {
     }
 
     fn eval(&self, angles: &Angles, _width: f64) -> f64 {
-        kernel(angles, 0.0)
+        kernel(angles, &Spread::default(), 0.0)
     }
 
     fn accumulate(&self, incident: &[Incident], cos_o: f64, widths: &[f64], sums: &mut [f64]) {
@@ -30,6 +30,7 @@ impl Lobe for Lambert {
 }
 
 #[inline(always)]
-fn kernel(angles: &Angles, _width: f64) -> f64 {
-    FRAC_1_PI * angles.cos_i.max(0.0)
+fn kernel(angles: &Angles, spread: &Spread, _width: f64) -> f64 {
+    // The mean vector of directions spread around their centroid is shorter than 1 by half the mean square chord: exact.
+    FRAC_1_PI * angles.cos_i.max(0.0) * (1.0 - 0.5 * spread.light2)
 }

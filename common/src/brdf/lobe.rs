@@ -19,6 +19,26 @@ pub struct Incident {
     pub angles: Angles,
     /// Radiance times solid angle, linear Rec. 709 (times any quadrature weight).
     pub energy: [f64; 3],
+    /// How far the light is spread around its direction.
+    pub spread: Spread,
+}
+
+/// Mean square distance of light from its mean direction: total over both axes, as square chords of the unit sphere.
+///
+/// A lobe adds the second-order term `1/2 tr(H S)` of its mean over the spread, taken as isotropic, so that a quadrature may
+/// use fewer directions.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Spread {
+    /// Of the light direction.
+    pub light2: f64,
+    /// Of the half vector that goes with it.
+    pub half2: f64,
+}
+
+/// The factor `1 + x` of a second-order correction, kept where a second-order expansion means anything.
+#[inline(always)]
+pub(super) fn second_order(x: f64) -> f64 {
+    (1.0 + x).clamp(0.25, 2.0)
 }
 
 /// A lobe `f(wi, wo) cos(theta_i)` without Fresnel term, of a given width.
@@ -39,7 +59,7 @@ pub trait Lobe: Debug + Sync {
     /// Adds the lobe's basis integrals over `incident`, for every width.
     ///
     /// `sums` has shape `term x channel x width` and grows by `sum over incident of energy * split_t * lobe(width)`.
-    /// `cos_o` is that of all `incident`.
+    /// `cos_o` is that of all `incident`; it is apart so that the terms that depend on it alone leave the loop.
     fn accumulate(&self, incident: &[Incident], cos_o: f64, widths: &[f64], sums: &mut [f64]);
 }
 
@@ -56,7 +76,7 @@ pub(super) fn accumulate(
     cos_o: f64,
     widths: &[f64],
     sums: &mut [f64],
-    kernel: impl Fn(&Angles, f64) -> f64 + Copy,
+    kernel: impl Fn(&Angles, &Spread, f64) -> f64 + Copy,
 ) {
     pulp::Arch::new().dispatch(Accumulate { split, incident, cos_o, widths, sums, kernel });
 }
@@ -70,7 +90,7 @@ struct Accumulate<'a, K> {
     kernel: K,
 }
 
-impl<K: Fn(&Angles, f64) -> f64 + Copy> pulp::NullaryFnOnce for Accumulate<'_, K> {
+impl<K: Fn(&Angles, &Spread, f64) -> f64 + Copy> pulp::NullaryFnOnce for Accumulate<'_, K> {
     type Output = ();
 
     #[inline(always)]
@@ -85,7 +105,7 @@ impl<K: Fn(&Angles, f64) -> f64 + Copy> pulp::NullaryFnOnce for Accumulate<'_, K
                 let mut value = [0.0; LANES];
                 let angles = Angles { cos_o: self.cos_o, ..light.angles };
                 for (v, &width) in value.iter_mut().zip(&widths) {
-                    *v = (self.kernel)(&angles, width);
+                    *v = (self.kernel)(&angles, &light.spread, width);
                 }
                 add(self.split, light, &value, &mut total);
             }

@@ -26,7 +26,7 @@ pub use angles::Angles;
 pub use cook_torrance::CookTorrance;
 pub use ggx::Ggx;
 pub use lambert::Lambert;
-pub use lobe::{Incident, Lobe, Split};
+pub use lobe::{Incident, Lobe, Split, Spread};
 pub use model::{BasisLobe, Model, lobe_terms, term_count};
 pub use parameter::{Channels, Parameter, ParameterError, Role, Scale, flat_bounds, flat_len, flat_names, offset_of};
 pub use reflectance::{Material, Reflectance};

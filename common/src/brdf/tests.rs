@@ -196,6 +196,7 @@ fn accumulation_has_the_bits_of_a_scalar_loop() {
         .map(|n| Incident {
             angles: Angles::new(Vec3::Z, direction(n), wo),
             energy: [0.1 * n as f64, 1.0, 3.0 / (1.0 + n as f64)],
+            spread: Spread::default(),
         })
         .collect();
     for basis in MODELS.iter().flat_map(|m| m.lobes()) {

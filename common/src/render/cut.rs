@@ -7,7 +7,7 @@
 
 use super::pyramid::{Cell, LightPyramid, Node, strongest};
 use crate::{
-    brdf::{Angles, Incident},
+    brdf::{Angles, Incident, Spread},
     math::{Vec3, widen},
 };
 use std::f64::consts::PI;
@@ -70,10 +70,17 @@ impl Cut {
                 }
             }
             if angles.cos_i > 0.0 {
-                self.lights.push(Incident { angles, energy: node.energy.map(f64::from) });
+                self.lights.push(Incident { angles, energy: node.energy.map(f64::from), spread: spread(&node, &angles) });
             }
         }
     }
+}
+
+/// The half vector turns by half of the light's step in the plane of reflection, by `1/(2 v.h)` of it across.
+fn spread(node: &Node, angles: &Angles) -> Spread {
+    let light2 = f64::from(node.spread2);
+    let cos_d2 = (angles.cos_d * angles.cos_d).max(0.05);
+    Spread { light2, half2: 0.125 * light2 * (1.0 + 1.0 / cos_d2) }
 }
 
 fn error_bound(node: &Node, angles: &Angles, band: Band) -> f64 {

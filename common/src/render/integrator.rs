@@ -7,7 +7,7 @@
 
 use crate::{
     brdf::Reflectance,
-    light::EnvironmentDistribution,
+    light::LightDistribution,
     math::{
         Rgb, Vec3,
         frame::Frame,
@@ -23,7 +23,7 @@ pub struct Integrator<'a> {
     /// The object and the camera.
     pub geometry: &'a Geometry,
     /// The light with its sampling density.
-    pub light: &'a EnvironmentDistribution,
+    pub light: &'a LightDistribution,
     /// Samples per pixel, split among the techniques.
     pub samples: u32,
     /// Seed of the run.
@@ -89,7 +89,7 @@ impl Integrator<'_> {
         reflectance: &dyn Reflectance,
     ) -> Rgb {
         let world = match technique {
-            Technique::Environment => self.light.sample(u).0,
+            Technique::Environment => self.light.sample(u).direction,
             Technique::Cosine => frame.to_world(warp::cosine_hemisphere(u)),
             Technique::Lobe(alpha) => {
                 let h = warp::ggx_visible_normal(wo, alpha, u);

@@ -6,11 +6,11 @@
 //!
 //! Direct light from the environment only: a convex object, no inter-reflection.
 
-//pub mod cut;
+pub mod cut;
 pub mod footprint;
-//pub mod integrator;
+pub mod integrator;
 pub mod knots;
-//pub mod pyramid;
-//pub mod subset;
+pub mod pyramid;
+pub mod subset;
 pub mod table;
-//pub mod transport;
+pub mod transport;

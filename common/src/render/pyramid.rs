@@ -126,7 +126,7 @@ fn quadrant(environment: &Environment, v: f64, u: f64, size: [f64; 2]) -> Node {
     let (dtheta, dphi) = (PI / size[0], TAU / size[1]);
     // Exact: integral of sin(theta) over the row is 2 sin(mid) sin(dtheta / 2).
     let solid_angle = dphi * 2.0 * sin * sin_cos(0.5 * dtheta).0;
-    let energy = environment.radiance_at([u_mid, v_mid]) * solid_angle;
+    let energy = environment.radiance_at(u_mid, v_mid) * solid_angle;
     let width = sin * dphi;
     Node {
         energy: crate::math::narrow(energy),
