@@ -2,14 +2,15 @@
 //!
 //! Minimises `|A x - b|^2`, that is `x^T (A^T A) x / 2 - (A^T b)^T x` up to constants, over lower <= x <= upper.
 //!
-//! Source: Stark & Parker, *Bounded-Variable Least-Squares: an Algorithm and Applications* (Computational Statistics 10,
-//! 1995). Variables are free or at a bound. Free ones take their unconstrained minimum, going only as far as the first
-//! bound on the way, whose variable then stays there. At the minimum of the free ones, the bound variable whose gradient
-//! pulls inwards hardest is freed, until none pulls: the Karush-Kuhn-Tucker conditions, sufficient as the problem is convex.
+//! Source: Stark & Parker, *Bounded-Variable Least-Squares: an Algorithm and Applications* (Computational Statistics
+//! 10, 1995). Variables are free or at a bound. Free ones take their unconstrained minimum, going only as far as the
+//! first bound on the way, whose variable then stays there. At the minimum of the free ones, the bound variable whose
+//! gradient pulls inwards hardest is freed, until none pulls: the Karush-Kuhn-Tucker conditions, sufficient as the
+//! problem is convex.
 //!
-//! Ours differs in two ways. It works on the normal equations (Stark & Parker: a QR factorisation of A), because these are
-//! what many pixels sum to. And freeing a variable is undone unless it lowers the objective by a positive amount, measured
-//! from the step itself; that rules out cycling, for which they test the sign of one step.
+//! Ours differs in two ways. It works on the normal equations (Stark & Parker: a QR factorisation of A), because these
+//! are what many pixels sum to. And freeing a variable is undone unless it lowers the objective by a positive amount,
+//! measured from the step itself; that rules out cycling, for which they test the sign of one step.
 //!
 //! A singular `A^T A` is no fault: among equal minima one is returned, dependent variables staying where they were.
 

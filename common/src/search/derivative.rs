@@ -1,7 +1,7 @@
 //! Checks of analytic derivatives against differences, for tests.
 //!
-//! Central differences at steps h and h/2, extrapolated to remove the h^2 term (Richardson): the error is of order h^4 plus
-//! rounding of order 1e-16 / h. With h a thousandth of the scale on which a function bends, ten digits or so.
+//! Central differences at steps h and h/2, extrapolated to remove the h^2 term (Richardson): the error is of order h^4
+//! plus rounding of order 1e-16 / h. With h a thousandth of the scale on which a function bends, ten digits or so.
 
 use super::least_squares::LeastSquaresProblem;
 use super::normal_equations::NormalEquations;
@@ -45,7 +45,7 @@ pub fn check_jacobian(
             let difference = (analytic(row) - numeric).abs();
             let error = if difference == 0.0 { 0.0 } else { difference / largest };
             // NaN is worse than anything, and stays.
-            if !worst.error.is_nan() && !(error <= worst.error) {
+            if !worst.error.is_nan() && (error.is_nan() || error > worst.error) {
                 worst = DerivativeCheck { row, column, analytic: analytic(row), numeric, error };
             }
         }

@@ -1,25 +1,27 @@
 //! Levenberg-Marquardt for residuals r(x) in R^m over a box, m up to hundreds of thousands, n a handful.
 //!
 //! Minimises `|r(x)|^2`. With J the Jacobian, each iteration takes the step d that minimises the damped linear model
-//! `|r + J d|^2 + mu |D d|^2` *over the box itself*: a bounded linear least-squares problem that [`bvls`](super::bvls) solves
-//! exactly. So a coordinate that belongs at its bound gets there in one step and equals it to the bit, one that wants to
-//! leave does, and no step is cut short or projected. At a minimum d = 0 is equivalent to the Karush-Kuhn-Tucker
-//! conditions of the box.
+//! `|r + J d|^2 + mu |D d|^2` *over the box itself*: a bounded linear least-squares problem that [`bvls`] solves
+//! exactly. So a coordinate that belongs at its bound gets there in one step and equals it to the bit, one that wants
+//! to leave does, and no step is cut short or projected. The step vanishes exactly where the Karush-Kuhn-Tucker
+//! conditions of the box hold.
 //!
-//! - Damping mu: Nielsen, *Damping Parameter in Marquardt's Method* (IMM-REP-1999-05), eqs. 2.5 and 3.3 of Madsen, Nielsen &
-//!   Tingleff, *Methods for Non-Linear Least Squares Problems* (2004). It stays above a floor, so that a singular `J^T J`
-//!   (two parameters that the residuals cannot tell apart) still gives a bounded step: the undetermined combination stays put.
+//! - Damping mu: Nielsen, *Damping Parameter in Marquardt's Method* (IMM-REP-1999-05), the rule of Madsen,
+//!   Nielsen & Tingleff, *Methods for Non-Linear Least Squares Problems* (2004). It stays above a floor, so that a
+//!   singular `J^T J` (two parameters that the residuals cannot tell apart) still gives a bounded step: the
+//!   undetermined combination stays put.
 //! - D^2: the largest diagonal of `J^T J` seen so far (More 1978), which makes the path independent of units.
 //! - Bounds: Kanzow, Yamashita & Fukushima, *Levenberg-Marquardt Methods with Strong Local Convergence Properties for
-//!   Solving Nonlinear Equations with Convex Constraints* (J. Comput. Appl. Math. 172, 2004) show local quadratic convergence
-//!   of this constrained step; they damp by the residual, we by Nielsen's rule.
+//!   Solving Nonlinear Equations with Convex Constraints* (J. Comput. Appl. Math. 172, 2004) show local quadratic
+//!   convergence of this constrained step; they damp by the residual, we by Nielsen's rule.
 //!
-//! Coordinates are scaled by the box (see [`bounds`](super::bounds)), so a logarithmic parameter is searched in its logarithm;
-//! problems are stated in natural parameters and the chain rule is applied here.
+//! Coordinates are scaled by the box (see [`bounds`](super::bounds)), so a logarithmic parameter is searched in its
+//! logarithm; problems are stated in natural parameters and the chain rule is applied here.
 //!
-//! Why not a crate: `levenberg-marquardt` 0.13 (MINPACK's `lmder`) has no bounds and stores J; `argmin` 0.10 has Gauss-Newton
-//! without bounds; `basin` has bounded variants on a stored J and a linear-algebra backend. None takes normal equations, which
-//! is what keeps 200,000 rows out of memory, and the same bits on every platform need an elimination whose order is ours.
+//! Why not a crate: `levenberg-marquardt` 0.13 (MINPACK's `lmder`) has no bounds and stores J; `argmin` 0.10 has
+//! Gauss-Newton without bounds; `basin` has bounded variants on a stored J and a linear-algebra backend. None takes
+//! normal equations, which is what keeps 200,000 rows out of memory, and the same bits on every platform need an
+//! elimination whose order is ours.
 
 use super::bounds::Bounds;
 use super::bvls::{self, BoundState};
@@ -45,12 +47,14 @@ pub trait LeastSquaresProblem {
 /// Settings of a least-squares search.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LeastSquaresOptions {
-    /// The search ends when the cosine of the angle between the residuals and every column of J that can be followed inside
-    /// the box is at most this (MINPACK's gtol). At least 0.
+    /// The search ends when the cosine of the angle between the residuals and every column of J that can be followed
+    /// inside the box is at most this (MINPACK's gtol). At least 0.
     pub gradient_tolerance: f64,
-    /// The search ends when a step, in scaled coordinates, is at most this fraction of the point's length plus this. At least 0.
+    /// The search ends when a step, in scaled coordinates, is at most this fraction of the point's length plus this. At
+    /// least 0.
     pub step_tolerance: f64,
-    /// The search ends when both the actual and the predicted change of the cost are at most this fraction of it. At least 0.
+    /// The search ends when both the actual and the predicted change of the cost are at most this fraction of it. At
+    /// least 0.
     pub cost_tolerance: f64,
     /// First damping mu, in units of the squared column lengths, above 0.
     pub initial_damping: f64,
@@ -89,7 +93,8 @@ impl LeastSquaresOptions {
 pub struct Minimum {
     /// The best point, natural, inside the box.
     pub point: Vec<f64>,
-    /// The sum of squares there: what [`LeastSquaresProblem::cost`] returned for exactly this point, at most that at the start.
+    /// The sum of squares there: what [`LeastSquaresProblem::cost`] returned for exactly this point, at most that at
+    /// the start.
     pub value: f64,
     /// Calls of `cost`.
     pub evaluations: usize,
@@ -99,8 +104,8 @@ pub struct Minimum {
     pub termination: Termination,
     /// Which coordinates equal a bound.
     pub states: Vec<BoundState>,
-    /// `J^T J` and `J^T r` at the point, in natural parameters. [`NormalEquations::variances`] of the free parameters, times
-    /// the variance of the residuals, predicts the variances of the parameters.
+    /// `J^T J` and `J^T r` at the point, in natural parameters. [`NormalEquations::variances`] of the free parameters,
+    /// times the variance of the residuals, predicts the variances of the parameters.
     pub normal: NormalEquations,
 }
 
@@ -200,7 +205,7 @@ impl Search<'_> {
                 return Ok(Termination::StepTolerance);
             }
             // Not positive only by rounding: the model has nothing left to gain.
-            if !(step.predicted > 0.0) {
+            if step.predicted <= 0.0 {
                 return Ok(Termination::FunctionTolerance);
             }
             if self.evaluations >= self.options.max_evaluations {
@@ -360,8 +365,8 @@ fn norm(x: &[f64]) -> f64 {
     x.iter().map(|x| x * x).sum::<f64>().sqrt()
 }
 
-/// The floor of the damping: a hundred times what the elimination takes for rounding, so that a dependent column is never
-/// taken for an empty one, and too small to slow the last, quadratic steps.
+/// The floor of the damping: a hundred times what the elimination takes for rounding, so that a dependent column is
+/// never taken for an empty one, and too small to slow the last, quadratic steps.
 const MIN_DAMPING: f64 = 1e-12;
 
 #[cfg(test)]

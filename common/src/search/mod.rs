@@ -2,7 +2,7 @@
 //!
 //! | module | minimises | where it comes from |
 //! |---|---|---|
-//! | [`pattern`] | any function, no derivatives | generalised pattern search, the settings of MATLAB's `patternsearch` |
+//! | [`pattern`] | any function, no derivatives | generalised pattern search, settings of MATLAB's `patternsearch` |
 //! | [`least_squares`] | a sum of squares with a Jacobian | Levenberg-Marquardt with the box inside the step |
 //! | [`bvls`] | a linear sum of squares | bounded-variable least squares, Stark & Parker 1995 |
 //! | [`multi_start`] | whatever one of the above does | the best few of many starts, equal minima merged |
@@ -13,6 +13,15 @@
 //! error; elsewhere it is a rejected point.
 //!
 //! [`derivative`] checks a Jacobian against differences, for the tests of whoever writes one.
+//!
+//! ```
+//! use lookalike::search::{Bounds, pattern};
+//! let bounds = Bounds::linear(&[0.0, 0.0], &[1.0, 1.0])?;
+//! let bowl = |x: &[f64]| (x[0] - 0.25).abs() + (x[1] - 0.5).abs();
+//! let minimum = pattern::minimise(bowl, &[1.0, 1.0], &bounds, &pattern::PatternOptions::matlab(2))?;
+//! assert_eq!(minimum.point, [0.25, 0.5]);
+//! # Ok::<(), lookalike::search::SearchError>(())
+//! ```
 
 pub mod bounds;
 pub mod bvls;

@@ -1,7 +1,8 @@
 //! From many starts to a few minima: the cheapest starts that are not alike are refined, and equal minima merged.
 //!
 //! Distances are the largest difference in any scaled coordinate of the box, so 0.01 is a hundredth of a (linear or
-//! logarithmic) range. Selection, refinement and merging are also there one by one, for callers that refine in parallel.
+//! logarithmic) range. Selection, refinement and merging are also there one by one, for callers that refine in
+//! parallel.
 
 use super::bounds::Bounds;
 use super::{least_squares, pattern};

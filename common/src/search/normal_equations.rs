@@ -1,12 +1,12 @@
 //! The normal equations of a small least-squares problem with many residuals.
 //!
-//! Residuals are added one row at a time and the Jacobian is never stored: n (n + 3) / 2 numbers stand for 200,000 rows.
-//! The price is the squared condition number, which the few, scaled parameters of a BRDF can afford.
+//! Residuals are added one row at a time and the Jacobian is never stored: n (n + 3) / 2 numbers stand for 200,000
+//! rows. The price is the squared condition number, which the few, scaled parameters of a BRDF can afford.
 
 use super::semidefinite::Factor;
 
-/// `J^T J` (n x n, symmetric, positive semidefinite) and `J^T r` (n) of residuals r with Jacobian J; equally `A^T A` and
-/// `A^T b` of a linear problem. Sums run in the order in which rows are added.
+/// `J^T J` (n x n, symmetric, positive semidefinite) and `J^T r` (n) of residuals r with Jacobian J; equally `A^T A`
+/// and `A^T b` of a linear problem. Sums run in the order in which rows are added.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NormalEquations {
     /// The upper triangle, row by row: (0,0), (0,1), ..., (0,n-1), (1,1), ...

@@ -1,11 +1,11 @@
 //! Generalised pattern search with the settings of MATLAB's `patternsearch`: the search of \[BP20b\].
 //!
-//! From the incumbent x the poll tries x + m e_1, ..., x + m e_n, x - m e_1, ..., x - m e_n, in this order, m being the mesh
-//! size in the box's scaled coordinates. The first point that is better becomes the incumbent (no complete poll) and the mesh
-//! size doubles, without limit; the next poll starts from e_1 again. If none is better the mesh size halves. There is no
-//! search step, no accelerator, no cache of visited points. Source: the Global Optimization Toolbox pages "How Pattern
-//! Search Polling Works", "Set Mesh Options", "Set Options" (its table of defaults) and the exit flags of `patternsearch`;
-//! Torczon, *On the Convergence of Pattern Search Algorithms* (SIAM J. Optim. 7(1), 1997).
+//! From the incumbent x the poll tries x + m e_1, ..., x + m e_n, x - m e_1, ..., x - m e_n, in this order, m being the
+//! mesh size in the box's scaled coordinates. The first point that is better becomes the incumbent (no complete poll)
+//! and the mesh size doubles, without limit; the next poll starts from e_1 again. If none is better the mesh size
+//! halves. There is no search step, no accelerator, no cache of visited points. Source: the Global Optimization Toolbox
+//! pages "How Pattern Search Polling Works", "Set Mesh Options", "Set Options" (its table of defaults) and the exit
+//! flags of `patternsearch`; Torczon, *On the Convergence of Pattern Search Algorithms* (SIAM J. Optim. 7(1), 1997).
 //!
 //! It ends, tested in this order after each iteration, when
 //! 1. the mesh size is below the mesh tolerance;
@@ -13,14 +13,16 @@
 //! 3. the mesh size is below the step tolerance and the decrease of a successful poll was below the function tolerance;
 //! 4. 100 n iterations or 2000 n evaluations are used up.
 //!
-//! 2 and 3 are MATLAB's exit flags 2 and 3 ("the change in x", or in the function, "and the mesh size are both less than the
-//! specified tolerance"; the page "Setting Solver Tolerances" leaves the mesh out). As the three default tolerances are
-//! equal, 1 always comes first: they only act when a caller sets a step tolerance above the mesh tolerance.
+//! 2 and 3 are MATLAB's exit flags 2 and 3 ("the change in x", or in the function, "and the mesh size are both less
+//! than the specified tolerance"; the page "Setting Solver Tolerances" leaves the mesh out). As the three default
+//! tolerances are equal, 1 always comes first: they only act when a caller sets a step tolerance above the mesh
+//! tolerance.
 //!
 //! Where ours differs, or MATLAB's documentation is silent:
 //! - Scaling is by the bounds (see [`bounds`](super::bounds)), not `ScaleMesh`.
 //! - A point outside the box is skipped and not counted. MATLAB "modifies poll points to be feasible", in a way it does
-//!   not describe for bounds. Skipping means that a bound which no step lands on is approached to within the final mesh size.
+//!   not describe for bounds. Skipping means that a bound which no step lands on is approached to within the final mesh
+//!   size.
 //! - The evaluation limit is exact, even within a poll.
 //! - A point whose value is not finite is rejected like a worse one; at the start it is an error.
 

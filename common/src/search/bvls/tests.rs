@@ -1,8 +1,8 @@
 use super::*;
 use crate::math::sampling::{key, uniform};
 
-/// The normal equations of m rows in n unknowns, pseudo-random in [-1, 1], with the last column a mixture of the first two
-/// when `dependent`.
+/// The normal equations of m rows in n unknowns, pseudo-random in [-1, 1], with the last column a mixture of the first
+/// two when `dependent`.
 fn random_problem(seed: u64, m: usize, n: usize, dependent: bool) -> NormalEquations {
     let number = |i: usize, j: usize| 2.0 * uniform(key(&[seed, i as u64, j as u64])) - 1.0;
     let mut normal = NormalEquations::new(n);
@@ -122,7 +122,8 @@ fn dependent_columns_and_fewer_rows_than_unknowns_still_give_a_minimum() {
         let (lower, upper) = random_box(seed, n);
         let solution = solve(&normal, &lower, &upper).unwrap();
         let violation = violation(&normal, &solution, &lower, &upper);
-        // A dependent column's square is eliminated to some 1e-15 of itself, hence its part of the gradient to the root.
+        // A dependent column's square is eliminated to some 1e-15 of itself, hence its part of the gradient to the
+        // root.
         assert!(violation < 1e-7, "{seed}: {violation:e}");
     }
 }

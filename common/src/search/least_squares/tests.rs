@@ -2,6 +2,7 @@ use super::super::bounds::Scale;
 use super::super::test_functions::{Degenerate, Exponential, PowellSingular, Rosenbrock, Rows};
 use super::*;
 use crate::math::elementary::ln;
+use crate::math::sampling::{key, uniform};
 
 fn wide(dimension: usize) -> Bounds {
     Bounds::unscaled(&vec![-1e3; dimension], &vec![1e3; dimension]).unwrap()
@@ -29,7 +30,8 @@ fn rosenbrock_is_solved_from_the_classical_start() {
 
 #[test]
 fn exponential_fit_agrees_with_scipy_free_and_at_bounds() {
-    // scipy 1.17.1, least_squares(jac, bounds, xtol = ftol = gtol = 1e-15), from (1, -0.5, 0.7); costs are sums of squares.
+    // scipy 1.17.1, least_squares(jac, bounds, xtol = ftol = gtol = 1e-15), from (1, -0.5, 0.7); costs are sums of
+    // squares.
     let cases = [
         (
             ([0.0, -5.0, -5.0], [10.0, 0.0, 5.0]),
@@ -84,7 +86,8 @@ fn bounded_rosenbrock_agrees_with_scipy() {
 fn singular_jacobian_at_the_minimum_slows_but_does_not_stop() {
     let bounds = Bounds::linear(&[-4.0; 4], &[4.0; 4]).unwrap();
     let minimum = solve(&mut PowellSingular, &[3.0, -1.0, 0.0, 1.0], &bounds);
-    // Linear convergence: the distance halves and the cost falls sixteenfold, until the damping's floor is what remains.
+    // Linear convergence: the distance halves and the cost falls sixteenfold, until the damping's floor is what
+    // remains.
     assert!(minimum.value < 1e-22, "{minimum:?}");
     assert!(minimum.point.iter().all(|x| x.abs() < 1e-5), "{minimum:?}");
 }
@@ -214,4 +217,59 @@ fn minimum_in_a_corner_and_fixed_parameters_end_by_the_gradient() {
     assert_eq!(minimum.point[2], 1.0);
     assert_eq!(minimum.point[0], 0.2);
     assert_eq!(minimum.termination, Termination::GradientTolerance);
+}
+
+/// `A x - b` of pseudo-random numbers in [-1, 1], ten rows.
+struct Linear {
+    seed: u64,
+}
+
+impl Rows for Linear {
+    const DIMENSION: usize = 7;
+    fn rows(&self, x: &[f64]) -> Vec<(Vec<f64>, f64)> {
+        let number = |i: u64, j: u64| 2.0 * uniform(key(&[self.seed, i, j])) - 1.0;
+        (0..10)
+            .map(|i| {
+                let row: Vec<f64> = (0..7).map(|j| number(i, j)).collect();
+                let value: f64 = row.iter().zip(x).map(|(a, x)| a * x).sum();
+                (row, value - 2.0 * number(i, 7))
+            })
+            .collect()
+    }
+}
+
+#[test]
+fn linear_problems_end_at_the_solution_of_bvls_from_anywhere_in_the_box() {
+    let bounds = Bounds::linear(&[-0.3; 7], &[0.4; 7]).unwrap();
+    let mut at_bounds = 0;
+    for seed in 0..40 {
+        let mut problem = Linear { seed };
+        let start: Vec<f64> = (0..7).map(|i| bounds.to_natural(i, uniform(key(&[seed, 99, i as u64])))).collect();
+        let minimum = solve(&mut problem, &start, &bounds);
+        let mut normal = NormalEquations::new(7);
+        problem.rows(&[0.0; 7]).iter().for_each(|(row, residual)| normal.add_row(row, -residual));
+        let expected = bvls::solve(&normal, bounds.lower(), bounds.upper()).unwrap();
+        assert_eq!(minimum.states, expected.states, "{seed}");
+        assert_near(&minimum, &expected.point, 1e-7);
+        at_bounds += minimum.states.iter().filter(|&&state| state != BoundState::Free).count();
+    }
+    assert!((40..240).contains(&at_bounds), "{at_bounds} of 280 coordinates at bounds");
+}
+
+#[test]
+fn damping_follows_the_gain_as_nielsen_has_it() {
+    let mut damping = Damping { mu: 1.0, growth: 2.0 };
+    damping.tighten();
+    damping.tighten();
+    damping.tighten();
+    assert_eq!((damping.mu, damping.growth), (2.0 * 4.0 * 8.0, 16.0));
+    // A gain of 1/2 leaves it, one of 1/4 raises it by 1/8, and a perfect one divides it by 3.
+    damping.relax(0.5);
+    assert_eq!((damping.mu, damping.growth), (64.0, 2.0));
+    damping.relax(0.25);
+    assert_eq!(damping.mu, 72.0);
+    damping.relax(1.0);
+    assert_eq!(damping.mu, 72.0 * (1.0 / 3.0));
+    (0..100).for_each(|_| damping.relax(1.0));
+    assert_eq!(damping.mu, MIN_DAMPING);
 }

@@ -181,7 +181,8 @@ fn smooth_kinked_and_discontinuous_minima_are_found() {
     let cases: [Case; 4] = [
         ("quadratic", |x| (x[0] - 0.3) * (x[0] - 0.3) + 4.0 * (x[1] - 0.7) * (x[1] - 0.7), [0.3, 0.7], 2e-6),
         ("sum of moduli", |x| (x[0] - 0.3).abs() + 2.0 * (x[1] - 0.7).abs(), [0.3, 0.7], 2e-6),
-        // Descent along the kink is diagonal: polling the axes stops on it, but only within the mesh when it starts there.
+        // Descent along the kink is diagonal: polling the axes stops on it, but only within the mesh when it starts
+        // there.
         ("largest modulus", |x| (x[0] - 0.3).abs().max(0.1 * (x[1] - 0.7).abs()), [0.3, 0.7], 2e-5),
         ("step", |x| (x[0] - 0.3).abs() + if x[1] < 0.6 { 1.0 } else { x[1] }, [0.3, 0.6], 2e-6),
     ];
