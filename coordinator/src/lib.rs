@@ -5,6 +5,7 @@ use std::process::ExitCode;
 
 mod cli;
 mod commands;
+pub mod demo;
 pub mod settings;
 
 pub use cli::Exit;

@@ -26,7 +26,7 @@ pub(crate) fn compress_at_zero(preset: Option<Preset>) -> CompressAtZero {
     }
 }
 
-/// [BP20b] section 3, with the start of design section 10 and one pixel subset.
+/// \[BP20b\] section 3, with the start of design section 10 and one pixel subset.
 const PAPER: [&str; 8] = [
     "--model=cook-torrance",
     "--gammas=1:3:0.1",

@@ -1,4 +1,4 @@
-//! `--gammas`: the exponents of stage one ([BP20b] section 3 tries 1.0, 1.1, ..., 3.0).
+//! `--gammas`: the exponents of stage one (\[BP20b\] section 3 tries 1.0, 1.1, ..., 3.0).
 
 use anyhow::{Context, bail};
 use std::{fmt, str::FromStr};
