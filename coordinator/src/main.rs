@@ -1,3 +1,7 @@
-//! `lookalike`: argument parsing only; everything else is in the library.
+//! `lookalike`: everything is in the library.
 
-fn main() {}
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    lookalike_coordinator::main()
+}

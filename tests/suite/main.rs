@@ -1,1 +1,3 @@
 //! One test binary of modules, so that the suite links once.
+
+mod cli;

@@ -1,0 +1,101 @@
+//! `lookalike fit`.
+
+use super::{
+    super::NotThereYet,
+    cluster::ClusterArgs,
+    method::MethodArgs,
+    scene::{EnvironmentArgs, PhotoArgs, SphereArgs, ViewArgs},
+};
+use crate::settings::{FitSettings, ProgressKind};
+use anyhow::bail;
+use clap::Args;
+use std::path::PathBuf;
+
+#[derive(Debug, Args)]
+#[command(args_override_self = true, after_long_help = EXAMPLES)]
+pub(crate) struct FitArgs {
+    #[command(flatten)]
+    photo: PhotoArgs,
+    #[command(flatten)]
+    environment: EnvironmentArgs,
+    #[command(flatten)]
+    view: ViewArgs,
+    #[command(flatten)]
+    sphere: SphereArgs,
+    #[command(flatten)]
+    pub(crate) method: MethodArgs,
+    #[command(flatten)]
+    output: OutputArgs,
+    #[command(flatten)]
+    cluster: ClusterArgs,
+    #[command(flatten)]
+    diagnostics: DiagnosticsArgs,
+}
+
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Output")]
+struct OutputArgs {
+    /// Folder of results; must not hold a run
+    #[arg(long, short, value_name = "DIR")]
+    out: PathBuf,
+    /// Exit with code 1 if the final CSSIM lies above this
+    #[arg(long, value_name = "X", value_parser = score, allow_negative_numbers = true)]
+    max_cssim: Option<f64>,
+    /// Go on with the run that is in the folder (not there yet)
+    #[arg(long)]
+    resume: bool,
+}
+
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Diagnostics")]
+pub(crate) struct DiagnosticsArgs {
+    /// How progress is shown on stderr
+    #[arg(long, value_name = "PROGRESS", value_enum, default_value_t)]
+    progress: ProgressKind,
+}
+
+impl FitArgs {
+    pub(crate) fn into_settings(self) -> anyhow::Result<FitSettings> {
+        if self.output.resume {
+            return Err(NotThereYet { what: "--resume", instead: "start again with another --out" }.into());
+        }
+        self.photo.check_gain()?;
+        self.sphere.check(&self.view)?;
+        Ok(FitSettings {
+            photo: self.photo.photo,
+            mask: self.photo.mask,
+            environment: self.environment.into_settings(),
+            view: self.view.into_settings(),
+            sphere: self.sphere.sphere,
+            display_exposure: self.method.display_exposure.clone(),
+            method: self.method.into_settings(),
+            max_cssim: self.output.max_cssim,
+            out: self.output.out,
+            cluster: self.cluster.into_settings()?,
+            progress: self.diagnostics.progress,
+        })
+    }
+}
+
+/// Accepts a score of the metric: finite, at or above 0.
+fn score(text: &str) -> anyhow::Result<f64> {
+    match text.parse::<f64>() {
+        Ok(score) if score.is_finite() && score >= 0.0 => Ok(score),
+        _ => bail!("expected a number at or above 0"),
+    }
+}
+
+const EXAMPLES: &str = "\
+Examples:
+  lookalike fit ball.exr --env garden.hdr --out run
+  lookalike fit ball.exr --env garden.hdr --sphere 128,128,100 --camera perspective:30 --out run
+  lookalike fit ball.exr --env grace_cross.hdr --preset paper --out run
+  lookalike fit ball.exr --env garden.hdr --out run --workers 0 --listen 10.0.0.1:4100
+  lookalike fit fit.toml --seed 3
+
+where fit.toml is, for instance (its relative paths are relative to the file):
+  photo = \"ball.exr\"
+  env = \"garden.hdr\"
+  out = \"run\"
+  sphere = [128, 128, 100]
+  polish = \"off\"";

@@ -1,0 +1,53 @@
+//! Exit codes, a contract that scripts rely on (design section 10).
+
+use std::{fmt, process::ExitCode};
+
+/// How the program ended. Attached to an error with `.context(Exit::ClusterFailed)`, it is also that error's heading;
+/// an error without one is bad input.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Exit {
+    /// Done.
+    Done = 0,
+    /// Done, but the score of `--max-cssim` was missed.
+    MissedMaxCssim = 1,
+    /// Bad input or usage.
+    BadInput = 2,
+    /// The cluster failed.
+    ClusterFailed = 3,
+    /// Some fits of a batch failed, the others are complete.
+    SomeFitsFailed = 4,
+    /// Interrupted by the user.
+    Interrupted = 130,
+}
+
+impl From<Exit> for ExitCode {
+    fn from(exit: Exit) -> Self {
+        Self::from(exit as u8)
+    }
+}
+
+impl fmt::Display for Exit {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Done => "done",
+            Self::MissedMaxCssim => "the score of --max-cssim was missed",
+            Self::BadInput => "bad input",
+            Self::ClusterFailed => "the cluster failed",
+            Self::SomeFitsFailed => "some fits failed",
+            Self::Interrupted => "interrupted",
+        })
+    }
+}
+
+impl std::error::Error for Exit {}
+
+/// Something of the design that this version does not have. Its exit code is 2.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{what} is not there yet: {instead}")]
+pub(crate) struct NotThereYet {
+    /// The command or flag, as typed.
+    pub(crate) what: &'static str,
+    /// What this version does, and what to do meanwhile.
+    pub(crate) instead: &'static str,
+}

@@ -1,0 +1,87 @@
+//! The command line (design section 10): raw arguments, a TOML file and a preset become one argument list; clap parses
+//! it; the result becomes typed settings; a command runs them.
+//!
+//! A TOML file and a preset are *rewritten into flags that precede the user's* (`expand`), and a later flag overrides
+//! an earlier one. So each input has one grammar, one default and one error message, wherever it comes from, and
+//! precedence is an order: preset, then file, then command line.
+
+mod args;
+mod config;
+mod exit;
+mod expand;
+mod preset;
+mod report;
+mod tokens;
+
+pub use exit::Exit;
+pub(crate) use exit::NotThereYet;
+
+use anyhow::Context;
+use args::{Cli, Command, FitArgs};
+use clap::{CommandFactory, Parser};
+use std::{
+    ffi::OsString,
+    io::{self, IsTerminal},
+    process::ExitCode,
+};
+use tracing_subscriber::EnvFilter;
+
+/// Runs the program on its argument list, program name first.
+pub(crate) fn main(argv: Vec<OsString>) -> ExitCode {
+    let cli = match parse(argv) {
+        Ok(cli) => cli,
+        Err(error) => return report::failure(&error),
+    };
+    let result = start_tracing(&cli.log).and_then(|()| dispatch(cli.command));
+    result.unwrap_or_else(|error| report::failure(&error))
+}
+
+/// The argument list with its TOML file and its preset applied, parsed.
+///
+/// # Errors
+/// A [`clap::Error`], which also stands for `--help` and `--version`, or what is wrong with the TOML file.
+fn parse(argv: Vec<OsString>) -> anyhow::Result<Cli> {
+    let mut grammar = Cli::command();
+    grammar.build();
+    let argv = expand::expand_config(&grammar, argv)?;
+    let cli = Cli::try_parse_from(&argv)?;
+    let Some(preset) = cli.command.preset() else { return Ok(cli) };
+    let argv = expand::insert_flags(&grammar, argv, preset::flags(preset));
+    Ok(Cli::try_parse_from(argv)?)
+}
+
+fn start_tracing(filter: &str) -> anyhow::Result<()> {
+    tracing_subscriber::fmt()
+        .with_env_filter(EnvFilter::try_new(filter).context("--log")?)
+        .with_writer(io::stderr)
+        .with_ansi(io::stderr().is_terminal())
+        .try_init()
+        .map_err(anyhow::Error::from_boxed)
+}
+
+fn dispatch(command: Command) -> anyhow::Result<ExitCode> {
+    use crate::commands::{compare, demo, fit, render, worker};
+    match command {
+        Command::Demo(args) => demo::run(args.into_settings()?),
+        Command::Fit(args) => fit::run(FitArgs::into_settings(*args)?),
+        Command::Render(args) => render::run(args.into_settings()?),
+        Command::Compare(args) => compare::run(args.into_settings()),
+        Command::Worker(args) => worker::run(args.into_settings()),
+        Command::Batch(_) => later("lookalike batch", "run `lookalike fit` once per photo"),
+        Command::Status(_) => {
+            later("lookalike status", "a fit tells its progress on stderr, its result in OUT/fit.json")
+        }
+        Command::Check(_) => later("lookalike check", "`lookalike fit` refuses inputs that it cannot use"),
+        Command::Export(_) => later("lookalike export", "the parameters are in OUT/fit.json"),
+        Command::Study(_) => later("lookalike study", "run `lookalike fit` once per photo"),
+        Command::Report(_) => later("lookalike report", "the numbers are in OUT/fit.json and OUT/candidates.csv"),
+        Command::Access(_) => later("lookalike access", "`lookalike fit` writes OUT/access.json when it starts"),
+    }
+}
+
+fn later(what: &'static str, instead: &'static str) -> anyhow::Result<ExitCode> {
+    Err(NotThereYet { what, instead }.into())
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,39 @@
+//! `--preset`: named bundles of flags.
+
+use crate::settings::{CompressAtZero, Preset, Start};
+use std::ffi::OsString;
+
+/// The flags a preset stands for. They precede all others, so that a flag given explicitly wins.
+pub(crate) fn flags(preset: Preset) -> Vec<OsString> {
+    match preset {
+        Preset::Paper => PAPER.iter().map(Into::into).collect(),
+    }
+}
+
+/// Where the searches of a preset start; without one they start from a scan.
+pub(crate) fn start(preset: Option<Preset>) -> Start {
+    match preset {
+        Some(Preset::Paper) => Start::Paper,
+        None => Start::Scan,
+    }
+}
+
+/// What compression does near zero under a preset.
+pub(crate) fn compress_at_zero(preset: Option<Preset>) -> CompressAtZero {
+    match preset {
+        Some(Preset::Paper) => CompressAtZero::Clamp,
+        None => CompressAtZero::Tangent,
+    }
+}
+
+/// \[BP20b\] section 3, with the start of design section 10 and one pixel subset.
+const PAPER: [&str; 8] = [
+    "--model=cook-torrance",
+    "--gammas=1:3:0.1",
+    "--samples=256",
+    "--sampling=importance",
+    "--subsets=1",
+    "--search=pattern",
+    "--polish=off",
+    "--judge=image",
+];

@@ -1,0 +1,8 @@
+//! The commands: what each does with its settings. They return the exit code of a run that was carried out; errors are
+//! reported by the command line.
+
+pub(crate) mod compare;
+pub(crate) mod demo;
+pub(crate) mod fit;
+pub(crate) mod render;
+pub(crate) mod worker;

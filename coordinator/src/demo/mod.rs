@@ -1,0 +1,8 @@
+//! The bundled scene: a light and a material, both closed formulas, so that the demo needs no files and every machine
+//! makes the same bits.
+//!
+//! Radiance is linear Rec. 709; directions are those of the conventions: +Y up, the camera on +Z.
+
+pub mod environment;
+pub mod material;
+mod pavilion;

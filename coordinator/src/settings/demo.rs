@@ -1,0 +1,15 @@
+//! The settings of `lookalike demo`.
+
+use super::{ProgressKind, Workers};
+use std::path::PathBuf;
+
+/// A fit of the bundled scene.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DemoSettings {
+    /// The folder of results, overwritten.
+    pub out: PathBuf,
+    /// Local worker processes; never 0.
+    pub workers: Workers,
+    /// How progress is shown.
+    pub progress: ProgressKind,
+}

@@ -1,0 +1,63 @@
+//! The settings of `lookalike fit`.
+
+use super::{
+    Circle, ClusterSettings, CompressAtZero, DisplayExposure, EnvironmentSettings, Gammas, Judge, ModelName, Preset,
+    ProgressKind, Samples, Sampling, SearchKind, Start, ViewSettings,
+};
+use std::{num::NonZeroUsize, path::PathBuf};
+
+/// One photo, its light, and how to fit it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FitSettings {
+    /// The photo.
+    pub photo: PathBuf,
+    /// Which pixels show the object; none means all that the silhouette covers.
+    pub mask: Option<PathBuf>,
+    /// The light.
+    pub environment: EnvironmentSettings,
+    /// Camera and shape.
+    pub view: ViewSettings,
+    /// Where the sphere lies; none means fitted to the mask, else the inscribed circle.
+    pub sphere: Option<Circle>,
+    /// How to fit.
+    pub method: MethodSettings,
+    /// Exposure before the metric.
+    pub display_exposure: DisplayExposure,
+    /// A final CSSIM above this makes the exit code 1; finite, at or above 0.
+    pub max_cssim: Option<f64>,
+    /// The folder of results.
+    pub out: PathBuf,
+    /// Who computes.
+    pub cluster: ClusterSettings,
+    /// How progress is shown.
+    pub progress: ProgressKind,
+}
+
+/// The method of design section 1 and its options.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MethodSettings {
+    /// The bundle that was asked for; its values are already in the other fields.
+    pub preset: Option<Preset>,
+    /// The BRDF model.
+    pub model: ModelName,
+    /// The exponents of stage one.
+    pub gammas: Gammas,
+    /// The pixels of stage one.
+    pub samples: Samples,
+    /// How these pixels are drawn.
+    pub sampling: Sampling,
+    /// How many independent pixel subsets are searched.
+    pub subsets: NonZeroUsize,
+    /// How the cost is minimised.
+    pub search: SearchKind,
+    /// Where the searches start.
+    pub start: Start,
+    /// What compression does near zero.
+    pub compress_at_zero: CompressAtZero,
+    /// Whether stage three runs.
+    pub polish: bool,
+    /// The score that selects and polishes.
+    pub judge: Judge,
+    /// The seed of every random choice.
+    pub seed: u64,
+}

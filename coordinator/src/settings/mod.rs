@@ -1,0 +1,37 @@
+//! Settings: what a command is to do, in types that cannot hold nonsense.
+//!
+//! Raw arguments (`cli::args`, clap) become these structs in one place, with every default and rule applied; nothing
+//! downstream validates again. One struct per command; the values they are made of each have a file with their
+//! grammar (`FromStr`), its inverse (`Display`) and their bounds.
+//!
+//! What is deliberately absent: files are not opened here, and nothing here depends on the command line's grammar.
+
+mod camera;
+mod choices;
+mod circle;
+mod cluster;
+mod compare;
+mod demo;
+mod exposure;
+mod fit;
+mod gammas;
+mod model;
+mod render;
+mod samples;
+mod scene;
+mod worker;
+
+pub use camera::CameraSpec;
+pub use choices::{CompressAtZero, EnvMapping, Judge, MetricKind, Preset, ProgressKind, Sampling, SearchKind, Start};
+pub use circle::Circle;
+pub use cluster::{Advertise, ClusterSettings, Workers};
+pub use compare::CompareSettings;
+pub use demo::DemoSettings;
+pub use exposure::{Anchor, DisplayExposure, GainKind};
+pub use fit::{FitSettings, MethodSettings};
+pub use gammas::Gammas;
+pub use model::{ModelName, ModelParams};
+pub use render::{Material, RenderSettings};
+pub use samples::Samples;
+pub use scene::{EnvironmentSettings, ViewSettings};
+pub use worker::WorkerSettings;

@@ -1,0 +1,37 @@
+//! The settings of `lookalike render`.
+
+use super::{EnvironmentSettings, ModelName, ModelParams, ViewSettings};
+use std::{num::NonZeroUsize, path::PathBuf};
+
+/// A sphere, or a map of normals, of one material under one light.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RenderSettings {
+    /// What it is made of.
+    pub material: Material,
+    /// The light.
+    pub environment: EnvironmentSettings,
+    /// Camera and shape.
+    pub view: ViewSettings,
+    /// Width and height of the image in pixels; a map of normals brings its own.
+    pub size_px: NonZeroUsize,
+    /// Directions per pixel.
+    pub samples: NonZeroUsize,
+    /// The seed of the directions.
+    pub seed: u64,
+    /// The image to write, OpenEXR.
+    pub out: PathBuf,
+}
+
+/// A material to render.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Material {
+    /// A table in MERL's file format.
+    Measured(PathBuf),
+    /// A model with parameters.
+    Analytic {
+        /// The model.
+        model: ModelName,
+        /// Its parameters; the model checks that they are complete.
+        params: ModelParams,
+    },
+}

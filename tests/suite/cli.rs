@@ -1,0 +1,144 @@
+//! The command line as scripts see it: the real binary, exact exit codes, what goes to stdout and what to stderr.
+
+use std::{
+    fs,
+    path::Path,
+    process::{Command, Output},
+};
+
+struct Answer {
+    code: Option<i32>,
+    stdout: String,
+    stderr: String,
+}
+
+fn lookalike_in(folder: &Path, arguments: &[&str]) -> Answer {
+    let Output { status, stdout, stderr } = Command::new(env!("CARGO_BIN_EXE_lookalike-under-test"))
+        .args(arguments)
+        .current_dir(folder)
+        .env_remove("RUST_LOG")
+        .output()
+        .expect("the binary under test starts");
+    let text = |bytes| String::from_utf8(bytes).expect("output is UTF-8");
+    Answer { code: status.code(), stdout: text(stdout), stderr: text(stderr) }
+}
+
+fn lookalike(arguments: &str) -> Answer {
+    lookalike_in(Path::new("."), &arguments.split_whitespace().collect::<Vec<_>>())
+}
+
+/// Asserts that the arguments are refused with code 2, nothing on stdout and each phrase on stderr.
+#[track_caller]
+fn refused(answer: &Answer, phrases: &[&str]) {
+    assert_eq!(answer.code, Some(2), "{}", answer.stderr);
+    assert_eq!(answer.stdout, "");
+    assert!(answer.stderr.starts_with("error: ") && !answer.stderr.contains('\x1b'), "{}", answer.stderr);
+    for phrase in phrases {
+        assert!(answer.stderr.contains(phrase), "expected {phrase:?} in: {}", answer.stderr);
+    }
+}
+
+#[test]
+fn help_and_version_go_to_stdout() {
+    for command in ["", "demo", "fit", "batch", "status", "render", "compare", "check", "export", "study", "report"] {
+        let answer = lookalike(&format!("{command} --help"));
+        assert_eq!((answer.code, answer.stderr.as_str()), (Some(0), ""), "{command}");
+        assert!(answer.stdout.contains("Usage: lookalike"), "{command}");
+    }
+    for command in ["worker --help", "access new --help", "help fit"] {
+        assert_eq!(lookalike(command).code, Some(0), "{command}");
+    }
+    let version = lookalike("--version");
+    assert_eq!(version.code, Some(0));
+    assert!(version.stdout.starts_with("lookalike 0.") && version.stdout.contains("\nconventions: right-handed world"));
+}
+
+#[test]
+fn without_arguments_the_short_help_is_an_error() {
+    let answer = lookalike("");
+    assert_eq!((answer.code, answer.stdout.as_str()), (Some(2), ""));
+    assert!(answer.stderr.contains("Usage: lookalike") && answer.stderr.contains("compare"));
+}
+
+#[test]
+fn every_default_of_a_fit_is_in_its_help() {
+    let help = lookalike("fit -h").stdout.split_whitespace().collect::<Vec<_>>().join(" ");
+    for default in [
+        "[default: ggx]",
+        "[default: 1:3:0.1]",
+        "[default: 256]",
+        "[default: importance]",
+        "[default: least-squares]",
+        "[default: on]",
+        "[default: orthographic]",
+        "[default: 127.0.0.1:0]",
+        "[default: 10min]",
+        "[default: 60s]",
+    ] {
+        assert!(help.contains(default), "{default}");
+    }
+    for heading in ["Input:", "Geometry:", "Method:", "Output:", "Workers:", "Diagnostics:"] {
+        assert!(help.contains(heading), "{heading}");
+    }
+}
+
+#[test]
+fn bad_usage_is_code_two_and_says_what_is_possible() {
+    let fit = "fit ball.exr --env garden.hdr --out run";
+    for (arguments, phrases) in [
+        ("fitt".to_owned(), &["unrecognized subcommand 'fitt'", "'fit'"][..]),
+        ("fit ball.exr".into(), &["required arguments", "--env <MAP>", "--out <DIR>"]),
+        (format!("{fit} --sampel 3"), &["unexpected argument '--sampel'", "'--samples'"]),
+        (format!("{fit} --model phong"), &["'phong'", "--model", "possible values: ggx, cook-torrance"]),
+        (format!("{fit} --search simplex"), &["'simplex'", "[possible values: least-squares, pattern]"]),
+        (format!("{fit} --polish maybe"), &["'maybe'", "[possible values: on, off]"]),
+        (format!("{fit} --gammas 3:1:0.1"), &["--gammas", "the last gamma must lie between"]),
+        (format!("{fit} --samples 0"), &["--samples", "whole number above 0, or full"]),
+        (format!("{fit} --sphere 1,2"), &["--sphere", "CX,CY,R"]),
+        (format!("{fit} --camera perspective:200"), &["--camera", "0 and 180 degrees"]),
+        (format!("{fit} --grace soon"), &["--grace", "expected number"]),
+        (format!("{fit} --listen localhost"), &["--listen", "invalid socket address"]),
+        (format!("{fit} --max-cssim -1"), &["--max-cssim"]),
+        (format!("{fit} --env-rotation east"), &["--env-rotation", "a finite number"]),
+        (format!("{fit} --log lookalike=loud"), &["--log"]),
+        ("compare a.exr".into(), &["required arguments", "<IMAGE>"]),
+        ("compare a.exr b.exr --metric psnr".into(), &["'psnr'", "[possible values: cssim, icid]"]),
+        ("render --env g.hdr -o a.exr".into(), &["no material"]),
+        ("render --env g.hdr -o a.exr --model ggx --params alpha=x".into(), &["alpha must be a number"]),
+        ("worker".into(), &["--access <FILE>"]),
+        ("demo --workers 0".into(), &["--workers 1 or more"]),
+    ] {
+        refused(&lookalike(&arguments), phrases);
+    }
+}
+
+#[test]
+fn what_is_not_there_yet_says_so_and_what_to_do() {
+    let fit = "fit ball.exr --env garden.hdr --out run";
+    for (arguments, phrases) in [
+        ("batch all.toml --out runs".to_owned(), &["lookalike batch is not there yet", "once per photo"][..]),
+        ("batch all.toml --out runs --slurm --metrics 127.0.0.1:9100 --keep-going".into(), &["not there yet"]),
+        ("status run --json".into(), &["lookalike status is not there yet", "fit.json"]),
+        ("check ball.exr --env garden.hdr".into(), &["lookalike check is not there yet"]),
+        ("export run --format materialx -o m.mtlx".into(), &["lookalike export is not there yet"]),
+        ("study study.toml --out study".into(), &["lookalike study is not there yet"]),
+        ("report run".into(), &["lookalike report is not there yet"]),
+        ("access new --address node7:4100 -o a.json".into(), &["lookalike access is not there yet"]),
+        (format!("{fit} --resume"), &["--resume is not there yet", "another --out"]),
+        (format!("{fit} --exposure-gain rgb"), &["degenerate", "--anchor"]),
+        (format!("{fit} --exposure-gain rgb --anchor f0=.04"), &["--anchor is not there yet"]),
+        (format!("{fit} --model disney"), &["the model disney is not there yet", "ggx and cook-torrance"]),
+    ] {
+        refused(&lookalike(&arguments), phrases);
+    }
+}
+
+#[test]
+fn a_settings_file_is_blamed_by_line() {
+    let folder = tempfile::tempdir().unwrap();
+    let toml = "photo = \"ball.exr\"\nenv = \"garden.hdr\"\n\n# a typing error\nsampels = 3\n";
+    fs::write(folder.path().join("fit.toml"), toml).unwrap();
+    let answer = lookalike_in(folder.path(), &["fit", "fit.toml", "--out", "run"]);
+    refused(&answer, &["error: fit.toml:5: unknown key \"sampels\"; the nearest one is \"samples\""]);
+    refused(&lookalike_in(folder.path(), &["fit", "other.toml"]), &["cannot read the settings file other.toml"]);
+}
