@@ -1,1 +1,22 @@
-//! The method of \[BP20b\]: pixel subset, one search per gamma, candidates, winner, polish.
+//! The method of \[BP20b\], as pure functions that read like its section 3:
+//!
+//! 1. a pixel subset ([`crate::render::subset`]) and its transport table,
+//! 2. stage one, [`search_gamma`]: for each gamma, minimise Eq. 1 over the parameters,
+//! 3. stage two, [`judge_candidates`]: render the candidates in full, keep the one of lowest CSSIM,
+//! 4. stage three, [`polish`]: a short pattern search on CSSIM itself from the winner.
+//!
+
+mod candidate;
+mod method;
+mod objective;
+mod polish;
+mod scan;
+mod stage_one;
+mod stage_two;
+
+pub use candidate::{Candidate, distinct, needed_span};
+pub use method::{AtZero, JudgedBy, Method, MethodError, SearchKind, Start, gamma_range};
+pub use objective::Objective;
+pub use polish::{Polished, polish};
+pub use stage_one::{SearchFailure, search_gamma};
+pub use stage_two::{FullView, Judged, judge_candidates, winner};

@@ -1,0 +1,93 @@
+//! Candidates of stage one, and what stage two needs to judge them.
+
+use crate::{
+    brdf::{Model, flat_bounds},
+    search::Termination,
+};
+
+/// The outcome of one search.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Candidate {
+    /// The exponent it was searched with.
+    pub gamma: f64,
+    /// Which pixel subset, from 0.
+    pub subset: u32,
+    /// Flat parameter vector.
+    pub parameters: Vec<f64>,
+    /// Eq. 1 there.
+    pub cost: f64,
+    /// Evaluations of Eq. 1, the scan included.
+    pub evaluations: usize,
+    /// Why the search ended.
+    pub termination: Termination,
+}
+
+/// Candidates nearer to each other than this share of every parameter's range get one rendering.
+pub const SAME: f64 = 1e-6;
+
+/// For every candidate the index of the first one that is the same within [`SAME`]: near-equal candidates are judged once.
+#[must_use]
+pub fn distinct(model: &dyn Model, candidates: &[Candidate]) -> Vec<usize> {
+    let (lower, upper) = flat_bounds(model.parameters());
+    let near = |a: &[f64], b: &[f64]| {
+        a.iter().zip(b).zip(lower.iter().zip(&upper)).all(|((a, b), (l, u))| (a - b).abs() <= SAME * (u - l))
+    };
+    let mut firsts: Vec<usize> = Vec::with_capacity(candidates.len());
+    for (i, candidate) in candidates.iter().enumerate() {
+        let same = (0..i).find(|&j| firsts[j] == j && near(&candidates[j].parameters, &candidate.parameters));
+        firsts.push(same.unwrap_or(i));
+    }
+    firsts
+}
+
+/// Margin around the candidates' widths that full-resolution tables cover (design section 7).
+const MARGIN: f64 = 1.25;
+
+/// The span of lobe widths that full-resolution tables need for these parameter vectors: 25 % beyond the outermost, within the
+/// model's bounds; at least a factor of 1.25^2 in all.
+///
+/// Returns `None` for a model without widths.
+#[must_use]
+pub fn needed_span<'a>(model: &dyn Model, points: impl Iterator<Item = &'a [f64]>) -> Option<(f64, f64)> {
+    let entry = model.lobes().iter().find_map(|b| b.width)?;
+    let (lower, upper) = flat_bounds(model.parameters());
+    let (mut low, mut high) = (f64::INFINITY, 0.0_f64);
+    for point in points {
+        low = low.min(point[entry]);
+        high = high.max(point[entry]);
+    }
+    let (low, high) = ((low / MARGIN).max(lower[entry]), (high * MARGIN).min(upper[entry]));
+    // At a bound the margin lies on one side only.
+    let (low, high) = (low.min(upper[entry] / (MARGIN * MARGIN)), high.max(lower[entry] * MARGIN * MARGIN));
+    Some((low, high))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::brdf::Ggx;
+
+    fn candidate(alpha: f64) -> Candidate {
+        let parameters = vec![0.1, 0.2, 0.3, 0.04, 0.04, 0.04, alpha];
+        let termination = Termination::GradientTolerance;
+        Candidate { gamma: 1.0, subset: 0, parameters, cost: 1.0, evaluations: 1, termination }
+    }
+
+    #[test]
+    fn near_equal_candidates_are_judged_once_and_chains_do_not_drift() {
+        let step = 0.9e-6;
+        let candidates: Vec<Candidate> = (0..4).map(|i| candidate(0.2 + step * f64::from(i))).collect();
+        assert_eq!(distinct(&Ggx, &candidates), [0, 0, 2, 2]);
+    }
+
+    #[test]
+    fn the_span_has_its_margin_and_stays_inside_the_bounds() {
+        let span = |alphas: &[f64]| {
+            let points: Vec<Candidate> = alphas.iter().map(|&a| candidate(a)).collect();
+            needed_span(&Ggx, points.iter().map(|c| &c.parameters[..])).unwrap()
+        };
+        assert_eq!(span(&[0.1, 0.2]), (0.1 / 1.25, 0.2 * 1.25));
+        assert_eq!(span(&[0.005]), (0.005, 0.005 * 1.25 * 1.25));
+        assert_eq!(span(&[1.0]), (1.0 / (1.25 * 1.25), 1.0));
+    }
+}

@@ -1,0 +1,133 @@
+//! The settings of the method, with their defaults (design sections 1, 2 and 10).
+
+use crate::{
+    brdf::{MODELS, Model},
+    render::subset::{SampleCount, Sampling},
+};
+use thiserror::Error;
+
+/// How Eq. 1 is minimised.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum SearchKind {
+    /// Generalised pattern search, the paper's.
+    Pattern,
+    /// Levenberg-Marquardt with bounds on analytic derivatives.
+    LeastSquares,
+}
+
+/// Where a search starts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Start {
+    /// The best points of a scan over widths (design section 2).
+    Scan,
+    /// The paper's one point, [`Parameter::start`](crate::brdf::Parameter::start).
+    Paper,
+}
+
+/// What the compression of Eq. 1 does at and below zero.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum AtZero {
+    /// Continues as its tangent line.
+    Tangent,
+    /// `max(x, 0)`, the paper's.
+    Clamp,
+}
+
+/// Which score selects and polishes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum JudgedBy {
+    /// CSSIM over the whole image, the paper's.
+    Image,
+    /// CSSIM over windows centred on the object.
+    Object,
+}
+
+/// How to fit.
+#[derive(Debug, Clone)]
+pub struct Method {
+    /// The BRDF model.
+    pub model: &'static dyn Model,
+    /// Exponents of stage one, ascending.
+    pub gammas: Vec<f64>,
+    /// Pixels of stage one.
+    pub samples: SampleCount,
+    /// How they are drawn.
+    pub sampling: Sampling,
+    /// Independent subsets, at least 1.
+    pub subsets: u32,
+    /// How Eq. 1 is minimised.
+    pub search: SearchKind,
+    /// Where searches start.
+    pub start: Start,
+    /// Compression at and below zero.
+    pub at_zero: AtZero,
+    /// Whether stage three runs.
+    pub polish: bool,
+    /// Which score selects and polishes.
+    pub judge: JudgedBy,
+    /// Seed of every random choice.
+    pub seed: u64,
+}
+
+impl Default for Method {
+    fn default() -> Self {
+        Self {
+            model: MODELS[0],
+            gammas: (10..=30).map(|tenth| f64::from(tenth) / 10.0).collect(),
+            samples: SampleCount::Draws(256),
+            sampling: Sampling::Importance,
+            subsets: 1,
+            search: SearchKind::LeastSquares,
+            start: Start::Scan,
+            at_zero: AtZero::Tangent,
+            polish: true,
+            judge: JudgedBy::Image,
+            seed: 0,
+        }
+    }
+}
+
+/// What is wrong with a method.
+#[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
+pub enum MethodError {
+    /// Gammas must be positive and ascending.
+    #[error("gammas must be positive, finite and ascending, found {found:?}")]
+    Gammas {
+        /// The values given.
+        found: Vec<f64>,
+    },
+    /// Nothing to draw.
+    #[error("the number of samples must be at least 1, found 0; the paper uses 256")]
+    NoSamples,
+    /// Nothing to search.
+    #[error("the number of subsets must be at least 1, found 0")]
+    NoSubsets,
+}
+
+impl Method {
+    /// Checks what types cannot.
+    ///
+    /// # Errors
+    /// Names the setting that is out of range.
+    pub fn check(&self) -> Result<(), MethodError> {
+        let ascending = self.gammas.windows(2).all(|w| w[0] < w[1]);
+        let positive = self.gammas.iter().all(|g| g.is_finite() && *g > 0.0);
+        if self.gammas.is_empty() || !ascending || !positive {
+            return Err(MethodError::Gammas { found: self.gammas.clone() });
+        }
+        if self.samples == SampleCount::Draws(0) {
+            return Err(MethodError::NoSamples);
+        }
+        if self.subsets == 0 {
+            return Err(MethodError::NoSubsets);
+        }
+        Ok(())
+    }
+}
+
+/// First and last gamma.
+#[must_use]
+pub fn gamma_range(gammas: &[f64]) -> Option<(f64, f64)> {
+    Some((*gammas.first()?, *gammas.last()?))
+}

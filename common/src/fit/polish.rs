@@ -1,0 +1,101 @@
+//! Stage three, always reported apart: a short pattern search on CSSIM itself from the winner of stage two, on the
+//! full-resolution table around the winner's width (design section 2).
+
+use super::{
+    method::{JudgedBy, SearchKind},
+    objective::flat_roles,
+    stage_one::search_bounds,
+    stage_two::FullView,
+};
+use crate::{
+    brdf::Role,
+    metric::Judge,
+    search::{
+        Bounds, Progress, Scale, SearchError, Termination,
+        pattern::{self, PatternOptions},
+    },
+};
+use std::ops::ControlFlow;
+
+/// Most evaluations of CSSIM.
+pub const MAX_EVALUATIONS: usize = 300;
+
+/// First mesh size, as a share of every parameter's range (widths: of the logarithmic range).
+pub const INITIAL_MESH: f64 = 0.02;
+
+/// The outcome of stage three.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Polished {
+    /// Flat parameter vector.
+    pub parameters: Vec<f64>,
+    /// CSSIM over the whole image.
+    pub cssim: f64,
+    /// CSSIM over windows centred on the object.
+    pub cssim_object: f64,
+    /// Evaluations of CSSIM.
+    pub evaluations: usize,
+    /// Why the search ended.
+    pub termination: Termination,
+    /// The width ended within a step of the table's edge that is not the model's bound: a wider table may find better.
+    pub at_table_edge: bool,
+}
+
+/// Polishes `start`; `observe` sees every evaluation and may end the search.
+///
+/// # Errors
+/// When the start cannot be rendered or scored.
+pub fn polish(
+    view: &FullView<'_>,
+    judge: &Judge,
+    by: JudgedBy,
+    start: &[f64],
+    max_evaluations: usize,
+    observe: &mut dyn FnMut(&Progress<'_>) -> ControlFlow<()>,
+) -> Result<Polished, SearchError> {
+    let (bounds, table_is_tighter) = polish_bounds(view)?;
+    let objective = |point: &[f64]| {
+        // A rendering that cannot be scored is a rejected point.
+        judge.score(&view.render(point)).map_or(f64::NAN, |s| by.pick(s.cssim, s.cssim_object))
+    };
+    let options =
+        PatternOptions { initial_mesh: INITIAL_MESH, max_evaluations, ..PatternOptions::matlab(bounds.dimension()) };
+    let mut inside = start.to_vec();
+    bounds.clamp(&mut inside);
+    let minimum = pattern::minimise_observed(objective, &inside, &bounds, &options, observe)?;
+    let score = judge.score(&view.render(&minimum.point)).map_err(|_| SearchError::NotFinite {
+        what: "the CSSIM",
+        point: minimum.point.clone(),
+    })?;
+    let at_table_edge = view.model.lobes().iter().filter_map(|b| b.width).any(|entry| {
+        let (x, step) = (bounds.to_scaled(entry, minimum.point[entry]), EDGE);
+        (table_is_tighter[0] && x < step) || (table_is_tighter[1] && x > 1.0 - step)
+    });
+    Ok(Polished {
+        parameters: minimum.point,
+        cssim: score.cssim,
+        cssim_object: score.cssim_object,
+        evaluations: minimum.evaluations,
+        termination: minimum.termination,
+        at_table_edge,
+    })
+}
+
+/// A width in this outermost share of the table's logarithmic span counts as at its edge.
+const EDGE: f64 = 0.02;
+
+/// The model's box with its widths cut to the table's span and moved by their logarithm; whether the span is tighter than the
+/// model's lower and upper bound.
+fn polish_bounds(view: &FullView<'_>) -> Result<(Bounds, [bool; 2]), SearchError> {
+    let model_bounds = search_bounds(view.model, SearchKind::LeastSquares)?;
+    let (mut lower, mut upper) = (model_bounds.lower().to_vec(), model_bounds.upper().to_vec());
+    let mut tighter = [false, false];
+    for (entry, role) in flat_roles(view.model).into_iter().enumerate() {
+        if let (Role::Width, Some((first, last))) = (role, view.table.span()) {
+            tighter = [first > lower[entry] * (1.0 + 1e-9), last < upper[entry] * (1.0 - 1e-9)];
+            lower[entry] = first.max(lower[entry]);
+            upper[entry] = last.min(upper[entry]);
+        }
+    }
+    let scales: Vec<Scale> = model_bounds.scales().to_vec();
+    Ok((Bounds::new(lower, upper, scales)?, tighter))
+}

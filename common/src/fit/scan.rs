@@ -1,0 +1,101 @@
+//! Starts for the least-squares search (design section 2).
+//!
+//! For every width of the table's grid, and every scanned value of the parameters that multiply others, the remaining
+//! parameters enter linearly: at gamma = 1 their best values are a small bounded linear least-squares problem per
+//! channel. Terms of fixed weight move to the right-hand side.
+
+use super::objective::flat_roles;
+use crate::{
+    brdf::{Channels, Model, Role, flat_bounds, flat_len, term_count},
+    math::Rgb,
+    render::table::{Planes, TransportTable},
+    search::{NormalEquations, bvls},
+};
+
+/// All points of the scan, in the order of widths, then scanned values.
+pub(super) fn scan(
+    model: &dyn Model,
+    table: &TransportTable,
+    weights: &[f64],
+    photo: &[[f32; 3]],
+) -> Vec<Vec<f64>> {
+    let grids = grids(model, table);
+    let mut terms: Vec<Planes> = (0..term_count(model)).map(|_| table.planes()).collect();
+    let mut points = Vec::new();
+    let mut index = vec![0; grids.len()];
+    loop {
+        let mut point = vec![0.0; flat_len(model.parameters())];
+        for (&i, (entry, values)) in index.iter().zip(&grids) {
+            point[*entry] = values[i];
+        }
+        table.terms(model, &point, false, &mut terms);
+        if solve_linear(model, &terms, weights, photo, &mut point) {
+            points.push(point);
+        }
+        // Odometer over the grids, the last running fastest.
+        let Some(digit) = (0..grids.len()).rev().find(|&d| index[d] + 1 < grids[d].1.len()) else { return points };
+        index[digit] += 1;
+        index[digit + 1..].fill(0);
+    }
+}
+
+/// Entries of the flat vector that are scanned, with their values.
+fn grids(model: &dyn Model, table: &TransportTable) -> Vec<(usize, Vec<f64>)> {
+    let (lower, upper) = flat_bounds(model.parameters());
+    let scanned = flat_roles(model).into_iter().enumerate().filter_map(|(entry, role)| match role {
+        Role::Linear => None,
+        Role::Scanned(values) => Some((entry, values.to_vec())),
+        Role::Width => {
+            let lobe = model.lobes().iter().position(|b| b.width == Some(entry))?;
+            let widths = table.lobes[lobe].knots?.widths();
+            // The outermost knots equal the bounds up to a rounding.
+            Some((entry, widths.into_iter().map(|w| w.clamp(lower[entry], upper[entry])).collect()))
+        }
+    });
+    scanned.collect()
+}
+
+/// Fills the linear entries of `point` with the bounded least-squares solution at gamma = 1; false when there is none.
+fn solve_linear(model: &dyn Model, terms: &[Planes], weights: &[f64], photo: &[[f32; 3]], point: &mut [f64]) -> bool {
+    let (lower, upper) = flat_bounds(model.parameters());
+    let at = |entry: Option<usize>, point: &[f64]| {
+        let mut probe = point.to_vec();
+        if let Some(entry) = entry {
+            probe[entry] = 1.0;
+        }
+        let mut w = vec![Rgb::ZERO; terms.len()];
+        model.weights(&probe, &mut w);
+        w
+    };
+    let fixed = at(None, point);
+    for channel in 0..3 {
+        let entries = linear_entries(model, channel);
+        let columns: Vec<Vec<Rgb>> = entries.iter().map(|&e| at(Some(e), point)).collect();
+        let mut normal = NormalEquations::new(entries.len());
+        let mut row = vec![0.0; entries.len()];
+        for (p, weight) in weights.iter().enumerate() {
+            let scale = weight.sqrt();
+            let sum = |w: &dyn Fn(usize) -> f64| (0..terms.len()).map(|t| w(t) * terms[t][channel][p]).sum::<f64>();
+            for (x, column) in row.iter_mut().zip(&columns) {
+                *x = scale * sum(&|t| column[t][channel] - fixed[t][channel]);
+            }
+            normal.add_row(&row, scale * (f64::from(photo[p][channel]) - sum(&|t| fixed[t][channel])));
+        }
+        let bound = |b: &[f64]| entries.iter().map(|&e| b[e]).collect::<Vec<f64>>();
+        let Ok(solution) = bvls::solve(&normal, &bound(&lower), &bound(&upper)) else { return false };
+        entries.iter().zip(&solution.point).for_each(|(&e, &x)| point[e] = x);
+    }
+    true
+}
+
+/// Entries of the linear colours that act on one channel. Every linear parameter is a colour.
+fn linear_entries(model: &dyn Model, channel: usize) -> Vec<usize> {
+    let (mut entries, mut first) = (Vec::new(), 0);
+    for parameter in model.parameters() {
+        if parameter.role == Role::Linear && parameter.channels == Channels::Rgb {
+            entries.push(first + channel);
+        }
+        first += parameter.channels.count();
+    }
+    entries
+}

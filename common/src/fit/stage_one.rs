@@ -1,0 +1,128 @@
+//! Stage one for one gamma: minimise Eq. 1 over the parameters of the model.
+
+use super::{
+    candidate::Candidate,
+    method::{AtZero, Method, SearchKind, Start},
+    objective::{Objective, flat_roles},
+    scan::scan,
+};
+use crate::{
+    brdf::{self, Model, Role, flat_bounds, flat_len},
+    metric::cost::Compression,
+    render::{subset::PixelSubset, table::TransportTable},
+    search::{
+        self, Bounds, SearchError,
+        least_squares::{self, LeastSquaresOptions},
+        multi_start::{self, MultiStartOptions, Refined},
+        pattern::{self, PatternOptions},
+    },
+};
+use thiserror::Error;
+
+/// Why a search gave no candidate.
+#[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
+pub enum SearchFailure {
+    /// The search itself failed.
+    #[error("gamma {gamma}: {source}")]
+    Search {
+        /// The exponent.
+        gamma: f64,
+        /// Why.
+        source: SearchError,
+    },
+    /// The scan found no start of finite cost.
+    #[error("gamma {gamma}: no start of the scan has a finite cost; the photo's values may be out of range")]
+    NoStart {
+        /// The exponent.
+        gamma: f64,
+    },
+}
+
+/// Minimises `C(A, B, gamma)` over the parameters. `photo` holds the subset's pixels, `mean_radiance` the photo's mean
+/// luminance over all usable pixels (it places the knee of the compression, the same for every gamma and subset).
+///
+/// # Errors
+/// When no search from any start succeeds.
+pub fn search_gamma(
+    method: &Method,
+    gamma: f64,
+    table: &TransportTable,
+    subset: &PixelSubset,
+    photo: &[[f32; 3]],
+    mean_radiance: f64,
+) -> Result<Candidate, SearchFailure> {
+    let compression = match method.at_zero {
+        AtZero::Tangent => Compression::new(gamma, mean_radiance),
+        AtZero::Clamp => Compression::clamped(gamma),
+    };
+    let fail = |source| SearchFailure::Search { gamma, source };
+    let bounds = search_bounds(method.model, method.search).map_err(fail)?;
+    let mut objective = Objective::new(method.model, table, subset, photo, compression);
+    let starts = match method.start {
+        Start::Paper => vec![paper_start(method.model)],
+        Start::Scan => scan(method.model, table, &subset.weights, photo),
+    };
+    let scanned = starts.len();
+    let starts: Vec<multi_start::Start> = starts
+        .into_iter()
+        .map(|point| multi_start::Start { cost: objective.cost(&point), point })
+        .collect();
+    let options = MultiStartOptions::default();
+    let mut evaluations = scanned;
+    let best = match method.search {
+        SearchKind::LeastSquares => multi_start::refine_best(&starts, &bounds, &options, |start| {
+            let m = least_squares::minimise(&mut objective, &start.point, &bounds, &LeastSquaresOptions::default())?;
+            evaluations += m.evaluations;
+            Ok(Found { point: m.point, value: m.value, termination: m.termination })
+        }),
+        SearchKind::Pattern => {
+            // Pattern search costs thousands of evaluations: one start.
+            let options = MultiStartOptions { refine: 1, ..options };
+            multi_start::refine_best(&starts, &bounds, &options, |start| {
+                let n = bounds.dimension();
+                let cost = |x: &[f64]| objective.cost(x);
+                let m = pattern::minimise(cost, &start.point, &bounds, &PatternOptions::matlab(n))?;
+                evaluations += m.evaluations;
+                Ok(Found { point: m.point, value: m.value, termination: m.termination })
+            })
+        }
+    };
+    let best = best.map_err(fail)?.into_iter().next().ok_or(SearchFailure::NoStart { gamma })?;
+    Ok(Candidate { gamma, subset: 0, parameters: best.point, cost: best.value, evaluations, termination: best.termination })
+}
+
+#[derive(Debug)]
+struct Found {
+    point: Vec<f64>,
+    value: f64,
+    termination: search::Termination,
+}
+
+impl Refined for Found {
+    fn point(&self) -> &[f64] {
+        &self.point
+    }
+    fn value(&self) -> f64 {
+        self.value
+    }
+}
+
+/// The paper's single start.
+pub(super) fn paper_start(model: &dyn Model) -> Vec<f64> {
+    model.parameters().iter().flat_map(|p| std::iter::repeat_n(p.start, p.channels.count())).collect()
+}
+
+/// The box of a model's parameters. Least squares moves widths by their logarithm, in which the table is gridded; pattern search
+/// moves as the model's parameters say.
+pub(super) fn search_bounds(model: &dyn Model, search: SearchKind) -> Result<Bounds, SearchError> {
+    let (lower, upper) = flat_bounds(model.parameters());
+    let declared = model.parameters().iter().flat_map(|p| std::iter::repeat_n(p.scale, p.channels.count()));
+    let scales = declared.zip(flat_roles(model)).map(|(scale, role)| match (search, role, scale) {
+        (SearchKind::LeastSquares, Role::Width, _) | (_, _, brdf::Scale::Logarithmic) => search::Scale::Logarithmic,
+        _ => search::Scale::Linear,
+    });
+    let scales: Vec<search::Scale> = scales.collect();
+    debug_assert_eq!(scales.len(), flat_len(model.parameters()));
+    Bounds::new(lower, upper, scales)
+}

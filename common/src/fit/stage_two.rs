@@ -1,0 +1,106 @@
+//! Stage two: render the candidates at full resolution, score each against the photo with CSSIM, keep the lowest.
+
+use super::{
+    candidate::{Candidate, distinct},
+    method::JudgedBy,
+};
+use crate::{
+    brdf::Model,
+    image::Image,
+    math::to_f32,
+    metric::{Judge, MetricError, Score},
+    render::{
+        table::{Planes, TransportTable},
+        transport::Pixel,
+    },
+};
+use rayon::prelude::*;
+
+/// Everything needed to turn parameters into a full image.
+#[derive(Debug)]
+pub struct FullView<'a> {
+    /// The model.
+    pub model: &'static dyn Model,
+    /// Full-resolution table of `pixels`.
+    pub table: &'a TransportTable,
+    /// The pixels that see the object.
+    pub pixels: &'a [Pixel],
+    /// Columns of the image.
+    pub width: usize,
+    /// Rows of the image.
+    pub height: usize,
+}
+
+impl FullView<'_> {
+    /// The image of a flat parameter vector: mean radiance over the covered part of each pixel, zero outside (not yet multiplied by
+    /// coverage).
+    #[must_use]
+    pub fn render(&self, parameters: &[f64]) -> Image {
+        let mut planes: Planes = self.table.planes();
+        self.table.radiance(self.model, parameters, &mut planes);
+        let mut image = Image::new(self.width, self.height);
+        let out = image.pixels_mut();
+        for (i, &[column, row]) in self.pixels.iter().enumerate() {
+            out[row as usize * self.width + column as usize] = std::array::from_fn(|c| to_f32(planes[c][i]));
+        }
+        image
+    }
+}
+
+/// A candidate with its scores.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Judged {
+    /// The candidate.
+    pub candidate: Candidate,
+    /// CSSIM over the whole image.
+    pub cssim: f64,
+    /// CSSIM over windows centred on the object.
+    pub cssim_object: f64,
+}
+
+impl JudgedBy {
+    /// The score that counts.
+    #[must_use]
+    pub fn pick(self, cssim: f64, cssim_object: f64) -> f64 {
+        match self {
+            Self::Image => cssim,
+            Self::Object => cssim_object,
+        }
+    }
+}
+
+/// Renders and scores every candidate; near-equal ones share a score.
+///
+/// # Errors
+/// When a rendering cannot be scored (not finite).
+pub fn judge_candidates(
+    view: &FullView<'_>,
+    judge: &Judge,
+    candidates: &[Candidate],
+) -> Result<Vec<Judged>, MetricError> {
+    let firsts = distinct(view.model, candidates);
+    let scores: Vec<Option<Score>> = candidates
+        .par_iter()
+        .enumerate()
+        .map(|(i, candidate)| {
+            let first = firsts[i] == i;
+            first.then(|| judge.score(&view.render(&candidate.parameters))).transpose()
+        })
+        .collect::<Result<_, _>>()?;
+    let judged = candidates.iter().zip(&firsts).filter_map(|(candidate, &first)| {
+        let score = scores[first].as_ref()?;
+        Some(Judged { candidate: candidate.clone(), cssim: score.cssim, cssim_object: score.cssim_object })
+    });
+    Ok(judged.collect())
+}
+
+/// Index of the winner: lowest score, ties to the lower gamma, then to the lower subset.
+#[must_use]
+pub fn winner(judged: &[Judged], by: JudgedBy) -> Option<usize> {
+    let score = |j: &Judged| by.pick(j.cssim, j.cssim_object);
+    let better = |a: &Judged, b: &Judged| {
+        let order = score(a).total_cmp(&score(b));
+        order.then(a.candidate.gamma.total_cmp(&b.candidate.gamma)).then(a.candidate.subset.cmp(&b.candidate.subset))
+    };
+    (0..judged.len()).min_by(|&a, &b| better(&judged[a], &judged[b]))
+}
