@@ -14,7 +14,7 @@
 use super::LightError;
 use crate::image::Image;
 use crate::math::elementary::sin_cos;
-use crate::math::{Rgb, Vec3, arctangent::angle, cell, to_f32, widen};
+use crate::math::{Rgb, Vec3, arctangent::angle, to_f32, widen};
 use std::f64::consts::{PI, TAU};
 
 /// An environment map: incident radiance (linear Rec. 709) from every direction, infinitely far away.
@@ -25,6 +25,10 @@ pub struct Environment {
     /// In [0, 360).
     rotation_deg: f64,
     rotation_turns: f64,
+    /// Columns of the bordered grid.
+    stride: usize,
+    /// Width and height, for the look-up.
+    size: [f64; 2],
     /// (height + 2) x (width + 2): red, green, blue, density node.
     nodes: Vec<[f32; 4]>,
 }
@@ -60,7 +64,9 @@ impl Environment {
         if image.pixels().iter().all(|texel| *texel == [0.0; 3]) {
             return Err(LightError::Black);
         }
-        Ok(Self { width, height, rotation_deg: 0.0, rotation_turns: 0.0, nodes: bordered_nodes(&image) })
+        let (stride, size) = (width + 2, [width as f64, height as f64]);
+        let nodes = bordered_nodes(&image);
+        Ok(Self { width, height, rotation_deg: 0.0, rotation_turns: 0.0, stride, size, nodes })
     }
 
     /// The same map turned about +Y by `degrees`, right-handed: positive is anticlockwise seen from above, and 90 brings
@@ -99,7 +105,7 @@ impl Environment {
     #[must_use]
     pub fn texel(&self, i: usize, j: usize) -> [f32; 3] {
         assert!(i < self.height && j < self.width, "texel ({i}, {j}) of a map of {} x {}", self.height, self.width);
-        let [r, g, b, _] = self.nodes[(i + 1) * self.stride() + j + 1];
+        let [r, g, b, _] = self.nodes[(i + 1) * self.stride + j + 1];
         [r, g, b]
     }
 
@@ -180,7 +186,7 @@ impl Environment {
 
     /// Columns of the bordered grid.
     pub(super) fn stride(&self) -> usize {
-        self.width + 2
+        self.stride
     }
 
     /// The bordered grid: red, green, blue and the node of the sampling density.
@@ -207,25 +213,35 @@ impl Environment {
     /// The four nodes around a map point.
     #[inline]
     pub(super) fn place(&self, [u, v]: [f64; 2]) -> Place {
-        let x = u * self.width as f64 + 0.5;
-        let y = v * self.height as f64 + 0.5;
-        let (column, row) = (cell(x, self.width + 1), cell(y, self.height + 1));
-        Place { node: row * self.stride() + column, s: x - column as f64, t: y - row as f64 }
+        let (column, s) = split(u * self.size[0] + 0.5);
+        let (row, t) = split(v * self.size[1] + 0.5);
+        Place { node: row * self.stride + column, s, t }
     }
 
     /// The bilinear value there: red, green, blue, density node.
     #[inline]
-    pub(super) fn bilinear(&self, place: Place) -> [f64; 4] {
-        let upper = &self.nodes[place.node..place.node + 2];
-        let lower = &self.nodes[place.node + self.stride()..place.node + self.stride() + 2];
-        let w11 = place.s * place.t;
-        let (w01, w10) = (place.s - w11, place.t - w11);
-        let w00 = 1.0 - place.s - w10;
-        std::array::from_fn(|k| {
-            (f64::from(upper[0][k]) * w00 + f64::from(upper[1][k]) * w01)
-                + (f64::from(lower[0][k]) * w10 + f64::from(lower[1][k]) * w11)
-        })
+    pub(super) fn bilinear(&self, Place { node, s, t }: Place) -> [f64; 4] {
+        let rows = &self.nodes[node..node + self.stride + 2];
+        let w11 = s * t;
+        let weights = [(1.0 - s) - (t - w11), s - w11, t - w11, w11];
+        let corners = [rows[0], rows[1], rows[self.stride], rows[self.stride + 1]];
+        let mut value = [0.0; 4];
+        for (corner, weight) in corners.iter().zip(weights) {
+            value[0] += f64::from(corner[0]) * weight;
+            value[1] += f64::from(corner[1]) * weight;
+            value[2] += f64::from(corner[2]) * weight;
+            value[3] += f64::from(corner[3]) * weight;
+        }
+        value
     }
+}
+
+/// Whole part and fraction of `x`, which is at least 0 and below 2^31 here (a NaN stays in the fraction).
+#[inline]
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "the whole part is what is asked for")]
+fn split(x: f64) -> (usize, f64) {
+    let whole = x as i32;
+    (whole as usize, x - f64::from(whole))
 }
 
 /// The texels with their border and the nodes of the sampling density.

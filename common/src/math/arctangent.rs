@@ -15,9 +15,10 @@ pub fn angle(y: f64, x: f64) -> f64 {
     let (ax, ay) = (x.abs(), y.abs());
     let (low, high) = if ay > ax { (ax, ay) } else { (ay, ax) };
     let folded = low > TAN_PI_8 * high;
-    let numerator = if folded { low - high } else { low };
-    let denominator = if folded { low + high } else { high };
-    let t = if denominator > 0.0 { numerator / denominator } else { 0.0 };
+    // Written so that each choice is a mask, not a branch: half of all directions fold, unpredictably.
+    let numerator = low - if folded { high } else { 0.0 };
+    let denominator = high + if folded { low } else { 0.0 };
+    let t = numerator / denominator.max(f64::MIN_POSITIVE);
     let octant = arctangent(t) + if folded { FRAC_PI_4 } else { 0.0 };
     let quadrant = if ay > ax { FRAC_PI_2 - octant } else { octant };
     let half_turn = if x < 0.0 { PI - quadrant } else { quadrant };

@@ -20,9 +20,9 @@ fn points(count: u64) -> impl Iterator<Item = [f64; 2]> {
     (0..count).map(|i| [uniform(key(&[i, 7])), uniform(key(&[i, 8]))])
 }
 
-/// The sun of the design's test: one texel of 1e5 in a sky of 1.
-fn one_texel_sun() -> LightDistribution {
-    distribution(64, 32, |k| if k == 9 * 64 + 20 { [1e5; 3] } else { [1.0; 3] })
+/// The sun of the design's test: one texel of 1e5 in a sky of 1, in a given row.
+fn one_texel_sun(row: usize) -> LightDistribution {
+    distribution(64, 32, |k| if k == row * 64 + 20 { [1e5; 3] } else { [1.0; 3] })
 }
 
 #[test]
@@ -33,9 +33,9 @@ fn samples_follow_the_density_and_the_density_integrates_to_one() {
         ("constant", distribution(8, 4, |_| [1.0; 3])),
         ("light at the pole only", distribution(16, 8, |k| if k == 3 { [1.0; 3] } else { [0.0; 3] })),
         ("one texel", distribution(16, 8, |k| if k == 60 { [0.0, 0.0, 1.0] } else { [0.0; 3] })),
-        ("sun", one_texel_sun()),
+        ("sun", one_texel_sun(9)),
     ] {
-        let bins = SphereBins { rows: 32, columns: 64, quadrature: 24 };
+        let bins = SphereBins { rows: 32, columns: 64, quadrature: 16 };
         let sample = |i: u32| light.sample([uniform(key(&[u64::from(i), 1])), uniform(key(&[u64::from(i), 2]))]);
         let (test, total) = bins.test(200_000, |i| sample(i).direction, |d| light.pdf(d));
         println!("{name}: integral {total:.6}, {test:?}");
@@ -47,7 +47,7 @@ fn samples_follow_the_density_and_the_density_integrates_to_one() {
 
 #[test]
 fn a_sample_carries_the_radiance_and_density_of_its_direction() {
-    for light in [speckled(16, 8), speckled(2, 1), one_texel_sun()] {
+    for light in [speckled(16, 8), speckled(2, 1), one_texel_sun(9)] {
         for u in points(20_000).chain([[0.0, 0.0], [1.0 - 1e-16, 1.0 - 1e-16], [0.5, 0.0], [0.0, 1.0 - 1e-16]]) {
             let sample = light.sample(u);
             assert!((sample.direction.length() - 1.0).abs() < 1e-14);
@@ -64,30 +64,34 @@ fn a_sample_carries_the_radiance_and_density_of_its_direction() {
 
 #[test]
 fn radiance_over_pdf_is_bounded_beside_a_one_texel_sun() {
-    let light = one_texel_sun();
-    let total = light.environment().total().x;
-    let mut worst = 0.0_f64;
-    let mut ratio = |d: Vec3| {
-        let (radiance, pdf) = light.radiance_and_pdf(d);
-        assert!(pdf > 0.0, "{d}");
-        worst = worst.max(radiance.max_element() / pdf / total);
-    };
-    for u in points(200_000) {
-        ratio(light.sample(u).direction);
-        // Uniform over the map, and dense around the sun.
-        ratio(light.environment().direction(u[0], u[1]));
-        ratio(light.environment().direction((19.0 + 3.0 * u[0]) / 64.0, (8.0 + 3.0 * u[1]) / 32.0));
+    // 1 would be perfect. The node value is exact at the texel centres, so between two rows the ratio is at most that of
+    // their sin(theta): 3 next to a pole, 1.1 in row 9.
+    for (row, bound) in [(9, 1.15), (1, 1.7), (0, 3.0)] {
+        let light = one_texel_sun(row);
+        let total = light.environment().total().x;
+        let mut worst = 0.0_f64;
+        let mut ratio = |d: Vec3| {
+            let (radiance, pdf) = light.radiance_and_pdf(d);
+            assert!(pdf > 0.0, "{d}");
+            worst = worst.max(radiance.max_element() / pdf / total);
+        };
+        for u in points(100_000) {
+            ratio(light.sample(u).direction);
+            // Uniform over the map, and dense around the sun.
+            ratio(light.environment().direction(u[0], u[1]));
+            let v = (row as f64 - 1.0 + 3.0 * u[1]) / 32.0;
+            ratio(light.environment().direction((19.0 + 3.0 * u[0]) / 64.0, v.max(0.0)));
+        }
+        println!("sun in row {row}: largest radiance / pdf is {worst:.3} of the map's total");
+        assert!(worst < bound, "row {row}: {worst}");
     }
-    println!("largest radiance / pdf: {worst:.3} of the map's total");
-    // 1 would be perfect; the kinks of sin(theta) in the first rows allow 3, plus the symmetric rows at the poles.
-    assert!(worst < 3.0, "{worst}");
 }
 
 #[test]
 fn colours_are_covered_by_their_largest_channel() {
     let light = distribution(32, 16, |k| [[5.0, 0.0, 0.0], [0.0, 0.0, 1e-3], [0.0; 3]][k % 3]);
     let mut worst = 0.0_f64;
-    for u in points(50_000) {
+    for u in points(20_000) {
         let (radiance, pdf) = light.radiance_and_pdf(light.environment().direction(u[0], u[1]));
         assert!(pdf > 0.0 || radiance == Rgb::ZERO);
         worst = worst.max(radiance.max_element() / pdf.max(1e-300));
