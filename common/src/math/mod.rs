@@ -1,6 +1,9 @@
 //! Vectors, elementary functions that give the same bits on every platform, shading frames, warps and low-discrepancy
 //! points. Everything is `f64`; pixels are narrowed to `f32` only where they are stored.
 
+pub mod arctangent;
+#[cfg(test)]
+pub(crate) mod chi_square;
 pub mod elementary;
 pub mod frame;
 pub mod sampling;
