@@ -139,6 +139,14 @@ impl Environment {
         Rgb::new(r, g, b)
     }
 
+    /// Radiance at a point of the map, u and v in [0, 1] as in [`Environment::direction`], bilinear.
+    #[must_use]
+    #[inline]
+    pub fn radiance_at(&self, u: f64, v: f64) -> Rgb {
+        let [r, g, b, _] = self.bilinear(self.place([u, v]));
+        Rgb::new(r, g, b)
+    }
+
     /// Solid angle in steradians of each texel of row `i`.
     #[must_use]
     pub fn texel_solid_angle(&self, i: usize) -> f64 {

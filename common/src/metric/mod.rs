@@ -1,3 +1,42 @@
 //! How far apart two images are: the per-pixel cost of stage one and the perceptual error CSSIM of stage two.
+//!
+//! [`Judge`] is what selection and polishing call: CSSIM against a prepared reference. [`cid`] is the same measure on two
+//! displayed images with the authors' variants, [`icid`] its successor. [`DisplayImage`] and [`auto_exposure`] are the display
+//! transform before them. The pipeline, in the order of the files: `display`, `colour` and `scielab` (or `icam`) under
+//! `working`, `lab2000hl`, `window`, `features`, then `cssim`, `cid` or `icid`, and `maps` for pictures.
+//!
+//! Scores depend on resolution, exposure and background far more than on details of the formulas: compare only scores made the
+//! same way.
 
+mod cid;
+mod colour;
 pub mod cost;
+mod cssim;
+mod dispatch;
+mod display;
+mod error;
+mod features;
+mod icam;
+mod icid;
+mod lab2000hl;
+mod maps;
+mod planes;
+mod region;
+mod row_math;
+mod scielab;
+mod window;
+mod working;
+
+pub use cid::{CidOptions, Scales, cid};
+pub use colour::{lab_from_linear, linear_from_lab};
+pub use cssim::{Judge, JudgeOptions, Score};
+pub use dispatch::Lanes;
+pub use display::{DisplayImage, auto_exposure, decode_srgb, encode_srgb};
+pub use error::MetricError;
+pub use icid::{IcidOptions, IcidScore, Intent, icid};
+pub use lab2000hl::Lab2000hl;
+pub use maps::{ErrorMap, Maps};
+pub use working::SpatialFilter;
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,248 @@
+//! CSSIM: the colour-image-difference measure CID of Lissner, Preiss, Urban, Scheller Lichtenauer & Zolliker,
+//! *Image-Difference Prediction: From Grayscale to Color* (IEEE TIP 22(2), 2013), with the authors' defaults.
+//!
+//! Both images are multiplied by the coverage, exposed and clipped to the display; filtered by S-CIELAB at 20 cycles per
+//! degree; taken to LAB2000HL; compared in 11 x 11 Gaussian windows by five features (lightness, contrast, structure, chroma,
+//! hue); each feature's map is averaged and
+//!
+//! CSSIM = 1 - mean(l_L) mean(c_L) mean(s_L) mean(l_C) mean(l_H): 0 for identical images, above 1 for inverted ones.
+//!
+//! [`Judge`] scores many images against one reference. Encoding to sRGB and decoding again would cancel and is left out
+//! (scores agree with [`super::cid`] to 1e-12). Sums run in a fixed order: the bits depend neither on the number of threads
+//! nor on the vector instructions, nor on how much black surrounds the object.
+
+use super::dispatch::Lanes;
+use super::display::{check_coverage, check_covered_finite, check_exposure, expose};
+use super::features::{FEATURES, deficit_rows, row_sum, weighted_row_sum};
+use super::maps::{ErrorMap, Maps};
+use super::planes::Planes;
+use super::region::Region;
+use super::window::{Prepared, RADIUS, RowStatistics, SIZE, Statistics, Window};
+use super::working::{Pipeline, SpatialFilter};
+use super::{Lab2000hl, MetricError};
+use crate::image::Image;
+use crate::math::widen;
+
+/// Settings of a [`Judge`].
+#[derive(Debug, Clone)]
+pub struct JudgeOptions {
+    /// Viewing distance: half the pixels per degree of visual angle, in [1, 500]. Default 20, the authors'.
+    pub cycles_per_degree: f64,
+    /// The working space. Default `fit00`.
+    pub space: Lab2000hl,
+    /// Vector instructions; they do not change the result.
+    pub lanes: Lanes,
+}
+
+impl Default for JudgeOptions {
+    fn default() -> Self {
+        Self { cycles_per_degree: 20.0, space: Lab2000hl::fit00(), lanes: Lanes::Detected }
+    }
+}
+
+/// How far an image is from the reference.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Score {
+    /// CSSIM over all windows of the image: the paper's. 0 for identical images; larger is worse.
+    pub cssim: f64,
+    /// CSSIM over the windows whose centre pixel has a coverage above 0.
+    pub cssim_object: f64,
+    /// Means over the image of the features l_L, c_L, s_L, l_C, l_H; 1 is equal.
+    pub features: [f64; 5],
+    /// Means over the object of the same features.
+    pub features_object: [f64; 5],
+}
+
+/// A reference, prepared to score many images against it.
+#[derive(Debug, Clone)]
+pub struct Judge {
+    region: Region,
+    coverage: Vec<f32>,
+    /// Exposure times coverage for every pixel of the region.
+    gain: Planes<1>,
+    /// 1 for windows of the region whose centre is covered, else 0.
+    object: Planes<1>,
+    object_windows: usize,
+    pipeline: Pipeline,
+    statistics: Statistics,
+    reference: Prepared,
+}
+
+impl Judge {
+    /// Prepares a reference.
+    ///
+    /// `reference`: linear Rec. 709. `coverage`: one value in [0, 1] per pixel, row-major; both images are multiplied by it
+    /// and pixels of coverage 0 are not looked at. `exposure`: factor of the display transform, the same for both images.
+    ///
+    /// # Errors
+    /// [`MetricError::TooSmall`] below 11 x 11 pixels; [`MetricError::Length`], [`MetricError::Coverage`],
+    /// [`MetricError::NotFinite`] and [`MetricError::Exposure`] for bad values; [`MetricError::NoObject`] if no window is
+    /// centred on a covered pixel; [`MetricError::CyclesPerDegree`].
+    pub fn new(
+        reference: &Image,
+        coverage: &[f32],
+        exposure: f64,
+        options: &JudgeOptions,
+    ) -> Result<Self, MetricError> {
+        Self::over(reference, coverage, exposure, options, Region::around)
+    }
+
+    /// As [`Judge::new`], over the region that `region` names from (coverage, width, height, reach of the filter).
+    fn over(
+        reference: &Image,
+        coverage: &[f32],
+        exposure: f64,
+        options: &JudgeOptions,
+        region: impl Fn(&[f32], usize, usize, usize) -> Option<Region>,
+    ) -> Result<Self, MetricError> {
+        let (width, height) = (reference.width(), reference.height());
+        check_size(width, height)?;
+        check_exposure(exposure)?;
+        check_coverage(coverage, width, height)?;
+        check_covered_finite("reference", reference, coverage)?;
+        let space = options.space.clone();
+        let pipeline = Pipeline::new(SpatialFilter::Scielab, options.cycles_per_degree, space, options.lanes)?;
+        let reach = pipeline.reach().unwrap_or(width.max(height));
+        let region = region(coverage, width, height, reach).ok_or(MetricError::NoObject)?;
+        let (object, object_windows) = object_windows(coverage, &region);
+        if object_windows == 0 {
+            return Err(MetricError::NoObject);
+        }
+        let gain = gains(coverage, &region, exposure);
+        let statistics = Statistics { window: Window::new(SIGMA), chroma: false, lanes: options.lanes };
+        let reference = statistics.prepare(convert(&pipeline, &region, &gain, reference));
+        let coverage = coverage.to_vec();
+        Ok(Self { region, coverage, gain, object, object_windows, pipeline, statistics, reference })
+    }
+
+    /// Scores an image, which is not yet multiplied by the coverage.
+    ///
+    /// # Errors
+    /// [`MetricError::SizeMismatch`]; [`MetricError::NotFinite`] if a covered pixel is NaN or infinite.
+    pub fn score(&self, image: &Image) -> Result<Score, MetricError> {
+        let stride = self.object.stride();
+        let working = self.convert(image)?;
+        let (windows, _) = self.region.windows();
+        let rows = self.statistics.compare(&self.reference, &working, |y, statistics| {
+            let mut deficits = std::array::from_fn(|_| vec![0.0; stride]);
+            let object = &self.object.row_of(0, y)[..windows];
+            self.statistics.lanes.run(
+                #[inline(always)]
+                || {
+                    deficit_rows(statistics, &mut deficits);
+                    let all = deficits.each_ref().map(|row| row_sum(&row[..windows]));
+                    (all, deficits.each_ref().map(|row| weighted_row_sum(&row[..windows], object)))
+                },
+            )
+        });
+        let sum = |rows: &mut dyn Iterator<Item = [f64; FEATURES]>| {
+            rows.fold([0.0; FEATURES], |sum, row| std::array::from_fn(|i| sum[i] + row[i]))
+        };
+        let all = sum(&mut rows.iter().map(|row| row.0));
+        let object = sum(&mut rows.iter().map(|row| row.1));
+        Ok(self.combine(all, object))
+    }
+
+    /// The features and the error of every window, for a picture.
+    ///
+    /// # Errors
+    /// As [`Judge::score`].
+    pub fn maps(&self, image: &Image) -> Result<Maps, MetricError> {
+        let working = self.convert(image)?;
+        let (columns, stride) = (self.region.windows().0, self.object.stride());
+        let rows = self.statistics.compare(&self.reference, &working, |_, statistics: &RowStatistics<'_>| {
+            let mut deficits = std::array::from_fn(|_| vec![0.0; stride]);
+            deficit_rows(statistics, &mut deficits);
+            deficits.map(|mut row| {
+                row.truncate(columns);
+                row
+            })
+        });
+        let (width, height) = (self.region.image_width, self.region.image_height);
+        let mut maps = Maps::equal(width, height);
+        for (y, row) in rows.iter().enumerate() {
+            let start = (self.region.y0 + y) * (width - 2 * RADIUS) + self.region.x0;
+            for (map, deficits) in maps.features.iter_mut().zip(row) {
+                map[start..start + columns].iter_mut().zip(deficits).for_each(|(feature, d)| *feature = 1.0 - d);
+            }
+        }
+        Ok(maps)
+    }
+
+    /// The error of every window, for a picture.
+    ///
+    /// # Errors
+    /// As [`Judge::score`].
+    pub fn error_map(&self, image: &Image) -> Result<ErrorMap, MetricError> {
+        Ok(self.maps(image)?.error())
+    }
+
+    fn convert(&self, image: &Image) -> Result<Planes<4>, MetricError> {
+        let (expected, found) =
+            ((self.region.image_width, self.region.image_height), (image.width(), image.height()));
+        if expected != found {
+            return Err(MetricError::SizeMismatch { expected, found });
+        }
+        check_covered_finite("image", image, &self.coverage)?;
+        Ok(convert(&self.pipeline, &self.region, &self.gain, image))
+    }
+
+    fn combine(&self, all: [f64; FEATURES], object: [f64; FEATURES]) -> Score {
+        let windows = (self.region.image_width - 2 * RADIUS) * (self.region.image_height - 2 * RADIUS);
+        let features = all.map(|sum| 1.0 - sum / windows as f64);
+        let features_object = object.map(|sum| 1.0 - sum / self.object_windows as f64);
+        let score = |features: [f64; FEATURES]| 1.0 - features.iter().product::<f64>();
+        Score { cssim: score(features), cssim_object: score(features_object), features, features_object }
+    }
+}
+
+/// Standard deviation of CID's window in pixels.
+pub(super) const SIGMA: f64 = 1.5;
+
+pub(super) fn check_size(width: usize, height: usize) -> Result<(), MetricError> {
+    if width.min(height) < SIZE { Err(MetricError::TooSmall { width, height, needed: SIZE }) } else { Ok(()) }
+}
+
+fn convert(pipeline: &Pipeline, region: &Region, gain: &Planes<1>, image: &Image) -> Planes<4> {
+    pipeline.convert(region, |y, [r, g, b]| {
+        let start = (region.y0 + y) * region.image_width + region.x0;
+        let pixels = &image.pixels()[start..start + region.width];
+        let gains = gain.row_of(0, y);
+        for (i, (&pixel, &gain)) in pixels.iter().zip(gains).enumerate() {
+            [r[i], g[i], b[i]] = widen(pixel).to_array().map(|x| expose(x, gain));
+        }
+    })
+}
+
+fn gains(coverage: &[f32], region: &Region, exposure: f64) -> Planes<1> {
+    let mut gain = Planes::new(region.width, region.height);
+    gain.fill_rows(
+        || (),
+        |(), y, [row]| {
+            let start = (region.y0 + y) * region.image_width + region.x0;
+            let covered = &coverage[start..start + region.width];
+            row.iter_mut().zip(covered).for_each(|(gain, &c)| *gain = f64::from(c) * exposure);
+        },
+    );
+    gain
+}
+
+/// The windows of the region that are centred on a covered pixel, and their number.
+fn object_windows(coverage: &[f32], region: &Region) -> (Planes<1>, usize) {
+    let (columns, rows) = region.windows();
+    let mut object = Planes::<1>::new(columns, rows);
+    let centre = |x: usize, y: usize| {
+        (region.y0 + y + RADIUS) * region.image_width + region.x0 + x + RADIUS
+    };
+    object.fill_rows(
+        || (),
+        |(), y, [row]| {
+            (0..columns).for_each(|x| row[x] = f64::from(u8::from(coverage[centre(x, y)] > 0.0)));
+        },
+    );
+    let count = (0..rows).map(|y| object.row_of(0, y).iter().filter(|&&x| x > 0.0).count()).sum();
+    (object, count)
+}
+
+#[cfg(test)]
+mod tests;

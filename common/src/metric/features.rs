@@ -1,0 +1,97 @@
+//! The image-difference features of CID, as deficits: 1 minus the feature, 0 where two windows look alike.
+//!
+//! With dL, dC, dH the differences of window means, s1, s2 the standard deviations and s12 the covariance of lightness:
+//! l_L = 1/(1 + .002 dL^2); c_L = (.1 + 2 s1 s2)/(.1 + s1^2 + s2^2); s_L = (.1 + s12)/(.1 + s1 s2), signed;
+//! l_C = 1/(1 + .002 dC^2); l_H = 1/(1 + .008 dH^2); and, optionally, c_C as c_L with the chroma's deviations.
+//! Source: Lissner et al. 2013; the constants are those of the authors' program (`CID.m`).
+//!
+//! Deficits instead of features keep small differences exact, make identical images score exactly 0, and let windows
+//! without any difference drop out of a sum without changing its bits. By Cauchy and Schwarz |s12| <= s1 s2; enforcing it
+//! removes rounding errors and nothing else.
+
+use super::planes::LANES;
+use super::window::{MEAN_CHROMA, MEAN_LIGHTNESS, RowStatistics, VARIANCE_CHROMA, VARIANCE_LIGHTNESS};
+
+/// Features of a window: l_L, c_L, s_L, l_C, l_H.
+pub(super) const FEATURES: usize = 5;
+
+const LIGHTNESS_WEIGHT: f64 = 0.002;
+const CHROMA_WEIGHT: f64 = 0.002;
+const HUE_WEIGHT: f64 = 0.008;
+const CONTRAST_CONSTANT: f64 = 0.1;
+const STRUCTURE_CONSTANT: f64 = 0.1;
+
+/// Fills rows with the deficits of the five features.
+#[inline(always)]
+pub(super) fn deficit_rows(statistics: &RowStatistics<'_>, out: &mut [Vec<f64>; FEATURES]) {
+    let n = out[0].len();
+    let [l_l, c_l, s_l, l_c, l_h] = out.each_mut().map(|row| &mut row[..n]);
+    let first = statistics.reference.map(|row| &row[..n]);
+    let second = statistics.image.map(|row| &row[..n]);
+    let (covariance, hue) = (&statistics.covariance_lightness[..n], &statistics.hue_difference[..n]);
+    for x in 0..n {
+        l_l[x] = mean_deficit(LIGHTNESS_WEIGHT, first[MEAN_LIGHTNESS][x] - second[MEAN_LIGHTNESS][x]);
+        l_c[x] = mean_deficit(CHROMA_WEIGHT, first[MEAN_CHROMA][x] - second[MEAN_CHROMA][x]);
+        l_h[x] = mean_deficit(HUE_WEIGHT, hue[x]);
+        let (v1, v2) = (first[VARIANCE_LIGHTNESS][x], second[VARIANCE_LIGHTNESS][x]);
+        let product = (v1 * v2).sqrt();
+        c_l[x] = contrast_deficit(CONTRAST_CONSTANT, v1 + v2, product);
+        s_l[x] = structure_deficit(STRUCTURE_CONSTANT, covariance[x], product);
+    }
+}
+
+/// Fills a row with the deficit of the chroma contrast c_C.
+#[inline(always)]
+pub(super) fn chroma_contrast_row(statistics: &RowStatistics<'_>, out: &mut [f64]) {
+    let n = out.len();
+    let (v1, v2) = (&statistics.reference[VARIANCE_CHROMA][..n], &statistics.image[VARIANCE_CHROMA][..n]);
+    for x in 0..n {
+        out[x] = contrast_deficit(CONTRAST_CONSTANT, v1[x] + v2[x], (v1[x] * v2[x]).sqrt());
+    }
+}
+
+/// 1 - 1/(1 + k d^2).
+#[inline(always)]
+pub(super) fn mean_deficit(k: f64, difference: f64) -> f64 {
+    let t = k * (difference * difference);
+    t / (1.0 + t)
+}
+
+/// 1 - (k + 2 s1 s2)/(k + s1^2 + s2^2), not below 0.
+#[inline(always)]
+pub(super) fn contrast_deficit(k: f64, sum_of_variances: f64, product: f64) -> f64 {
+    (sum_of_variances - 2.0 * product).max(0.0) / (k + sum_of_variances)
+}
+
+/// 1 - (k + s12)/(k + s1 s2).
+#[inline(always)]
+pub(super) fn structure_deficit(k: f64, covariance: f64, product: f64) -> f64 {
+    (product - covariance.max(-product).min(product)) / (k + product)
+}
+
+/// Sum of a row in a fixed order: one partial sum per lane, then the lanes from left to right.
+///
+/// Windows of error 0 before, between or after the others change nothing, as long as the row begins at a multiple of the
+/// lanes.
+#[inline(always)]
+pub(super) fn row_sum(row: &[f64]) -> f64 {
+    let mut sums = [0.0; LANES];
+    let (chunks, rest) = row.as_chunks::<LANES>();
+    for chunk in chunks {
+        (0..LANES).for_each(|i| sums[i] += chunk[i]);
+    }
+    sums.iter_mut().zip(rest).for_each(|(sum, x)| *sum += x);
+    sums.iter().sum()
+}
+
+/// As [`row_sum`], of the products of two rows.
+#[inline(always)]
+pub(super) fn weighted_row_sum(row: &[f64], weights: &[f64]) -> f64 {
+    let mut sums = [0.0; LANES];
+    let ((chunks, rest), (weight_chunks, weight_rest)) = (row.as_chunks::<LANES>(), weights.as_chunks::<LANES>());
+    for (chunk, weight) in chunks.iter().zip(weight_chunks) {
+        (0..LANES).for_each(|i| sums[i] += weight[i] * chunk[i]);
+    }
+    sums.iter_mut().zip(rest.iter().zip(weight_rest)).for_each(|(sum, (x, w))| *sum += w * x);
+    sums.iter().sum()
+}

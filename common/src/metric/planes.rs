@@ -1,0 +1,70 @@
+//! Working buffers of the metric: `N` planes of `f64`, interleaved by row.
+
+/// Values that the row loops handle together. Row lengths are padded to a multiple of it.
+pub(super) const LANES: usize = 8;
+
+/// `N` planes of `height x width` values. The rows of all planes with the same index lie together, so that one parallel
+/// task can write to all planes of its row. Each row is followed by padding up to a multiple of [`LANES`].
+#[derive(Debug, Clone)]
+pub(super) struct Planes<const N: usize> {
+    width: usize,
+    height: usize,
+    stride: usize,
+    values: Vec<f64>,
+}
+
+impl<const N: usize> Planes<N> {
+    /// Planes of zeros.
+    pub(super) fn new(width: usize, height: usize) -> Self {
+        let stride = width.next_multiple_of(LANES);
+        Self { width, height, stride, values: vec![0.0; N * stride * height] }
+    }
+
+    pub(super) fn width(&self) -> usize {
+        self.width
+    }
+
+    pub(super) fn height(&self) -> usize {
+        self.height
+    }
+
+    /// Length of a row with its padding.
+    pub(super) fn stride(&self) -> usize {
+        self.stride
+    }
+
+    /// Row `y` of each plane, with its padding.
+    pub(super) fn row(&self, y: usize) -> [&[f64]; N] {
+        let row = &self.values[y * N * self.stride..(y + 1) * N * self.stride];
+        std::array::from_fn(|plane| &row[plane * self.stride..(plane + 1) * self.stride])
+    }
+
+    /// Row `y` of one plane, with its padding.
+    pub(super) fn row_of(&self, plane: usize, y: usize) -> &[f64] {
+        &self.values[(y * N + plane) * self.stride..(y * N + plane + 1) * self.stride]
+    }
+
+    /// Runs `fill` for every row, in parallel, with buffers made by `scratch` once per task.
+    pub(super) fn fill_rows<S: Send>(
+        &mut self,
+        scratch: impl Fn() -> S + Sync + Send,
+        fill: impl Fn(&mut S, usize, [&mut [f64]; N]) + Sync + Send,
+    ) {
+        use rayon::prelude::*;
+        let stride = self.stride;
+        self.values
+            .par_chunks_exact_mut(N * stride)
+            .enumerate()
+            .with_min_len(ROWS_PER_TASK)
+            .for_each_init(scratch, |scratch, (y, row)| fill(scratch, y, split(row, stride)));
+    }
+}
+
+/// Rows a parallel task takes at least: enough to pay for its scratch buffers.
+pub(super) const ROWS_PER_TASK: usize = 8;
+
+/// The `N` rows of length `stride` in a row of planes.
+fn split<const N: usize>(row: &mut [f64], stride: usize) -> [&mut [f64]; N] {
+    let mut rows = row.chunks_exact_mut(stride);
+    std::array::from_fn(|_| rows.next().unwrap_or_default())
+}
