@@ -53,7 +53,7 @@ impl Environment {
     #[allow(clippy::needless_pass_by_value, reason = "the map replaces the image: callers should not keep both")]
     pub fn new(image: Image) -> Result<Self, LightError> {
         let (width, height) = (image.width(), image.height());
-        if width < 2 || height < 1 || width % 2 == 1 {
+        if width < 2 || height < 1 || !width.is_multiple_of(2) {
             return Err(LightError::Size { width, height });
         }
         let is_bad = |texel: &[f32; 3]| texel.iter().any(|x| !x.is_finite() || *x < 0.0);
