@@ -71,10 +71,11 @@ impl Environment {
 
     /// The same map turned about +Y by `degrees`, right-handed: positive is anticlockwise seen from above, and 90 brings
     /// the light at +Z to +X. Turns add up; the texels stay as they are.
+    /// `degrees` must be finite: any other value gives a rotation of 0.
     #[must_use]
     pub fn rotated(mut self, degrees: f64) -> Self {
         let sum = (self.rotation_deg + degrees).rem_euclid(360.0);
-        // A tiny negative angle rounds up to a whole turn.
+        // A tiny negative angle rounds up to a whole turn; a NaN fails the comparison too.
         self.rotation_deg = if sum < 360.0 { sum } else { 0.0 };
         self.rotation_turns = self.rotation_deg / 360.0;
         self
