@@ -53,7 +53,7 @@ impl Environment {
     #[allow(clippy::needless_pass_by_value, reason = "the map replaces the image: callers should not keep both")]
     pub fn new(image: Image) -> Result<Self, LightError> {
         let (width, height) = (image.width(), image.height());
-        if width < 2 || height < 1 || width % 2 == 1 {
+        if width < 2 || height < 1 || !width.is_multiple_of(2) {
             return Err(LightError::Size { width, height });
         }
         let is_bad = |texel: &[f32; 3]| texel.iter().any(|x| !x.is_finite() || *x < 0.0);
@@ -71,10 +71,11 @@ impl Environment {
 
     /// The same map turned about +Y by `degrees`, right-handed: positive is anticlockwise seen from above, and 90 brings
     /// the light at +Z to +X. Turns add up; the texels stay as they are.
+    /// `degrees` must be finite: any other value gives a rotation of 0.
     #[must_use]
     pub fn rotated(mut self, degrees: f64) -> Self {
         let sum = (self.rotation_deg + degrees).rem_euclid(360.0);
-        // A tiny negative angle rounds up to a whole turn.
+        // A tiny negative angle rounds up to a whole turn; a NaN fails the comparison too.
         self.rotation_deg = if sum < 360.0 { sum } else { 0.0 };
         self.rotation_turns = self.rotation_deg / 360.0;
         self

@@ -64,8 +64,10 @@ impl Mapping {
     /// [`LightError::Shape`], which says the shape expected.
     pub fn check_shape(self, width: usize, height: usize) -> Result<(), LightError> {
         let (fits, expected) = match self {
-            Self::LatLong => (width >= 2 && height >= 1 && width % 2 == 0, "of even width"),
-            Self::Cross => (width > 0 && width % 3 == 0 && 4 * width == 3 * height, "3:4, made of 3 x 4 square faces"),
+            Self::LatLong => (width >= 2 && height >= 1 && width.is_multiple_of(2), "of even width"),
+            Self::Cross => {
+                (width > 0 && width.is_multiple_of(3) && 4 * width == 3 * height, "3:4, made of 3 x 4 square faces")
+            }
             Self::Angular | Self::MirrorBall => (width >= 2 && width == height, "square, cropped to the ball"),
         };
         if fits { Ok(()) } else { Err(LightError::Shape { mapping: self, expected, width, height }) }

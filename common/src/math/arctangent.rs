@@ -7,8 +7,8 @@
 
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI};
 
-/// Angle in [-pi, pi] of the point (x, y), within a few units in the last place of pi. The origin gives 0 or pi, by the sign of
-/// nothing but `x`; the arguments must be finite.
+/// Angle in \[-pi, pi\] of the point (x, y), within a few units in the last place of pi. The origin gives 0. The
+/// arguments must be finite; a NaN comes out as NaN.
 #[must_use]
 #[inline]
 pub fn angle(y: f64, x: f64) -> f64 {
@@ -81,5 +81,6 @@ mod tests {
         assert_eq!(angle(-3.0, 0.0), -FRAC_PI_2);
         assert_eq!(angle(0.0, -1.0), PI);
         assert_eq!(angle(1.0, 1.0), FRAC_PI_4);
+        assert!(angle(f64::NAN, 1.0).is_nan() && angle(1.0, f64::NAN).is_nan());
     }
 }

@@ -1,1 +1,33 @@
 //! The photographed object: its shape, the camera, and where both lie in the photo.
+//!
+//! [`Geometry`] answers, for a point of the photo, which way the surface faces and where the camera is; [`Capture`] joins
+//! it with the photo and the light and says which pixels can be used and why the others cannot.
+//!
+//! Conventions (design section 3): the world is right-handed with +Y up; the camera sits on +Z and looks along -Z; pixel
+//! (column, row), top left first, covers \[column, column + 1\] x \[row, row + 1\], so x grows to the right with +X and y
+//! grows downwards, against +Y.
+
+mod camera;
+mod capture;
+mod circle;
+mod coverage;
+mod error;
+mod fit;
+mod geometry;
+mod mask;
+mod normals;
+mod placement;
+mod spec;
+mod sphere;
+
+pub use camera::Camera;
+pub use capture::{Capture, CaptureInput, PixelCounts, PixelStatus};
+pub use circle::Circle;
+pub use error::SceneError;
+pub use fit::{CircleFit, fit_circle};
+pub use geometry::{Geometry, SurfacePoint};
+pub use mask::Mask;
+pub use normals::NormalMap;
+pub use placement::{CircleSource, Placement};
+pub use spec::{CameraSpec, GeometrySpec, SurfaceSpec};
+pub use sphere::Sphere;

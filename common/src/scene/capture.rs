@@ -1,0 +1,353 @@
+//! The photo with everything known about it: which pixels show the object, which can be fitted to, and the light.
+
+use super::{Geometry, Mask, SceneError};
+use crate::image::Image;
+use crate::light::Environment;
+use crate::math::{luminance, widen};
+use rayon::prelude::*;
+use std::sync::Arc;
+
+/// A photo, its geometry and its light, checked against each other.
+#[derive(Debug, Clone)]
+pub struct Capture {
+    photo: Image,
+    geometry: Geometry,
+    environment: Arc<Environment>,
+    coverage: Vec<f32>,
+    status: Vec<PixelStatus>,
+    counts: PixelCounts,
+    has_background: bool,
+    warnings: Vec<String>,
+}
+
+/// What a [`Capture`] is made of.
+#[derive(Debug, Clone)]
+pub struct CaptureInput {
+    /// The photo: linear Rec. 709.
+    pub photo: Image,
+    /// For each pixel whether it is clipped, where the file format has such a thing.
+    pub clipped: Option<Vec<bool>>,
+    /// Which part of the photo is the object; given for photos with a real background.
+    pub mask: Option<Mask>,
+    /// The object's shape and place.
+    pub geometry: Geometry,
+    /// The light.
+    pub environment: Arc<Environment>,
+}
+
+/// Whether a pixel can be fitted to, and if not, the first reason that applies, in this order.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum PixelStatus {
+    /// Shows nothing but the object, with a known value.
+    Usable,
+    /// The geometry leaves it free.
+    Outside,
+    /// The mask says background, or, inside the object, not wholly object.
+    Masked,
+    /// The photo's value is infinite or not a number.
+    NotFinite,
+    /// The object's edge runs through it.
+    Silhouette,
+    /// The photo's value is at the limit of what its file could hold.
+    Clipped,
+}
+
+/// How many pixels have each [`PixelStatus`].
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct PixelCounts {
+    /// [`PixelStatus::Usable`]
+    pub usable: usize,
+    /// [`PixelStatus::Outside`]
+    pub outside: usize,
+    /// [`PixelStatus::Masked`]
+    pub masked: usize,
+    /// [`PixelStatus::NotFinite`]
+    pub not_finite: usize,
+    /// [`PixelStatus::Silhouette`]
+    pub silhouette: usize,
+    /// [`PixelStatus::Clipped`]
+    pub clipped: usize,
+}
+
+impl Capture {
+    /// Checks the parts against each other and classifies every pixel.
+    ///
+    /// Pixels of the photo that are not finite are left out everywhere (coverage 0) and stored as black, so that no
+    /// product with their coverage can bring them back.
+    ///
+    /// # Errors
+    /// [`SceneError::TooSmall`], [`SceneError::Size`] when mask or geometry have another size than the photo,
+    /// [`SceneError::NotFinite`] when more than half of the object's pixels are not finite,
+    /// [`SceneError::NothingUsable`] and [`SceneError::Black`].
+    ///
+    /// # Panics
+    /// If `clipped` has another length than the photo has pixels.
+    pub fn new(input: CaptureInput) -> Result<Self, SceneError> {
+        let CaptureInput { mut photo, clipped, mask, geometry, environment } = input;
+        let (width, height) = (photo.width(), photo.height());
+        if width < super::geometry::LEAST_SIDE || height < super::geometry::LEAST_SIDE {
+            return Err(SceneError::TooSmall { width, height });
+        }
+        check_size("geometry", &photo, [geometry.width(), geometry.height()])?;
+        if let Some(mask) = &mask {
+            check_size("mask", &photo, [mask.width(), mask.height()])?;
+        }
+        if let Some(clipped) = &clipped {
+            assert_eq!(clipped.len(), width * height, "clipping flags of a {width} x {height} photo");
+        }
+        let (mut coverage, status) = classify(&photo, clipped.as_deref(), mask.as_ref(), &geometry);
+        check_finite(&photo, &coverage, &status)?;
+        for (index, pixel) in photo.pixels_mut().iter_mut().enumerate() {
+            if !is_finite(*pixel) {
+                *pixel = [0.0; 3];
+                coverage[index] = 0.0;
+            }
+        }
+        let counts = PixelCounts::of(&status);
+        if counts.usable == 0 {
+            return Err(SceneError::NothingUsable(counts));
+        }
+        let means = Means::of(&photo, &status);
+        if means.is_black {
+            return Err(SceneError::Black { count: counts.usable });
+        }
+        let spills = mask.is_none() && means.outside > BACKGROUND * means.usable;
+        let has_background = mask.is_some() || spills;
+        let mut capture =
+            Self { photo, geometry, environment, coverage, status, counts, has_background, warnings: Vec::new() };
+        capture.warnings = capture.worth_knowing(spills);
+        Ok(capture)
+    }
+
+    /// The photo: linear Rec. 709, with black where it was not finite.
+    #[must_use]
+    pub fn photo(&self) -> &Image {
+        &self.photo
+    }
+
+    /// The object's shape and place.
+    #[must_use]
+    pub fn geometry(&self) -> &Geometry {
+        &self.geometry
+    }
+
+    /// The light.
+    #[must_use]
+    pub fn environment(&self) -> &Arc<Environment> {
+        &self.environment
+    }
+
+    /// How much of each pixel is the object, in \[0, 1\]: geometric coverage times mask, 0 where the photo is not
+    /// finite; `height x width`, row-major.
+    #[must_use]
+    pub fn coverage(&self) -> &[f32] {
+        &self.coverage
+    }
+
+    /// Whether each pixel can be fitted to; `height x width`, row-major.
+    #[must_use]
+    pub fn status(&self) -> &[PixelStatus] {
+        &self.status
+    }
+
+    /// How many pixels have each status.
+    #[must_use]
+    pub fn counts(&self) -> PixelCounts {
+        self.counts
+    }
+
+    /// The row-major indices of the usable pixels, ascending.
+    pub fn usable(&self) -> impl Iterator<Item = usize> + '_ {
+        self.status.iter().enumerate().filter(|(_, status)| **status == PixelStatus::Usable).map(|(index, _)| index)
+    }
+
+    /// Whether something else than black surrounds the object: a mask was given, or the photo is not black outside.
+    #[must_use]
+    pub fn has_background(&self) -> bool {
+        self.has_background
+    }
+
+    /// What photo and rendering are multiplied by before they are scored (design section 6): the coverage, or, for a photo
+    /// with a background, 1 where the coverage is full and 0 elsewhere, as an edge pixel shows the background too.
+    #[must_use]
+    pub fn scoring_coverage(&self) -> Vec<f32> {
+        let kept = |&coverage: &f32| if !self.has_background || coverage == 1.0 { coverage } else { 0.0 };
+        self.coverage.iter().map(kept).collect()
+    }
+
+    /// What the user should know before trusting a fit.
+    #[must_use]
+    pub fn warnings(&self) -> &[String] {
+        &self.warnings
+    }
+
+    fn worth_knowing(&self, spills: bool) -> Vec<String> {
+        let counts = self.counts;
+        let mut warnings = self.geometry.normal_map().map_or_else(Vec::new, |map| map.warnings().to_vec());
+        let mut warn = |applies: bool, text: String| {
+            if applies {
+                warnings.push(text);
+            }
+        };
+        let cut = self.geometry.circle().is_some_and(|circle| !circle.fits(self.photo.width(), self.photo.height()));
+        warn(cut, "a part of the sphere lies outside the photo: only what is seen is fitted".to_owned());
+        warn(
+            spills,
+            "the photo is not black around the object: its edge pixels are left out of the score; give --mask to say \
+             which pixels are the object"
+                .to_owned(),
+        );
+        warn(
+            counts.not_finite > 0,
+            format!("{} pixels of the object are not finite: left out of everything", counts.not_finite),
+        );
+        warn(
+            counts.clipped > 0,
+            format!("{} pixels of the object are clipped: left out of the fit, kept in the score", counts.clipped),
+        );
+        warn(
+            counts.usable < FEW_PIXELS,
+            format!("only {} pixels are usable: expected at least {FEW_PIXELS} for a reliable fit", counts.usable),
+        );
+        let too_bright = self.brighter_than_the_light();
+        warn(
+            1000 * too_bright > counts.usable,
+            format!(
+                "{too_bright} pixels of the object are brighter than the brightest light of the map, which no material \
+                 can be: photo and map may have different exposures (see --exposure-gain)"
+            ),
+        );
+        warnings
+    }
+
+    /// Usable pixels that reflect more than a perfect mirror could, in any channel.
+    fn brighter_than_the_light(&self) -> usize {
+        let limit = self.environment.max_radiance() * 1.01;
+        self.usable().filter(|&index| widen(self.photo.pixels()[index]).cmpgt(limit).any()).count()
+    }
+}
+
+impl PixelCounts {
+    fn of(status: &[PixelStatus]) -> Self {
+        status.iter().fold(Self::default(), |mut counts, status| {
+            *match status {
+                PixelStatus::Usable => &mut counts.usable,
+                PixelStatus::Outside => &mut counts.outside,
+                PixelStatus::Masked => &mut counts.masked,
+                PixelStatus::NotFinite => &mut counts.not_finite,
+                PixelStatus::Silhouette => &mut counts.silhouette,
+                PixelStatus::Clipped => &mut counts.clipped,
+            } += 1;
+            counts
+        })
+    }
+}
+
+impl std::fmt::Display for PixelCounts {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self { usable, outside, masked, not_finite, silhouette, clipped } = self;
+        write!(
+            f,
+            "{usable} usable, {outside} outside the object, {masked} masked, {not_finite} not finite, {silhouette} on \
+             the silhouette, {clipped} clipped"
+        )
+    }
+}
+
+/// Coverage and status of every pixel; the coverage still counts pixels that are not finite.
+fn classify(
+    photo: &Image,
+    clipped: Option<&[bool]>,
+    mask: Option<&Mask>,
+    geometry: &Geometry,
+) -> (Vec<f32>, Vec<PixelStatus>) {
+    let width = photo.width();
+    let one = |index: usize| {
+        let (column, row) = (index % width, index / width);
+        let shape = geometry.coverage(column, row);
+        let mask = mask.map_or(1.0, |mask| mask.coverage()[index]);
+        let status = if shape == 0.0 {
+            PixelStatus::Outside
+        } else if mask == 0.0 {
+            PixelStatus::Masked
+        } else if !is_finite(photo.pixels()[index]) {
+            PixelStatus::NotFinite
+        } else if shape < 1.0 || geometry.normal_map().is_some_and(|map| !map.is_interior(column, row)) {
+            PixelStatus::Silhouette
+        } else if mask < 1.0 {
+            PixelStatus::Masked
+        } else if clipped.is_some_and(|clipped| clipped[index]) {
+            PixelStatus::Clipped
+        } else {
+            PixelStatus::Usable
+        };
+        (shape * mask, status)
+    };
+    (0..photo.pixels().len()).into_par_iter().with_min_len(width).map(one).unzip()
+}
+
+fn is_finite(pixel: [f32; 3]) -> bool {
+    pixel.iter().all(|x| x.is_finite())
+}
+
+fn check_size(what: &'static str, photo: &Image, [found_width, found_height]: [usize; 2]) -> Result<(), SceneError> {
+    let (width, height) = (photo.width(), photo.height());
+    if (found_width, found_height) == (width, height) {
+        Ok(())
+    } else {
+        Err(SceneError::Size { what, width, height, found_width, found_height })
+    }
+}
+
+fn check_finite(photo: &Image, coverage: &[f32], status: &[PixelStatus]) -> Result<(), SceneError> {
+    let total = coverage.iter().filter(|&&coverage| coverage > 0.0).count();
+    let is_bad = |status: &&PixelStatus| **status == PixelStatus::NotFinite;
+    let count = status.iter().filter(is_bad).count();
+    match status.iter().position(|status| is_bad(&status)) {
+        Some(first) if 2 * count > total => {
+            let (column, row) = (first % photo.width(), first / photo.width());
+            Err(SceneError::NotFinite { count, total, column, row })
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Mean luminances of parts of the photo.
+struct Means {
+    usable: f64,
+    outside: f64,
+    /// No channel of a usable pixel is above 0.
+    is_black: bool,
+}
+
+impl Means {
+    fn of(photo: &Image, status: &[PixelStatus]) -> Self {
+        let mean = |wanted: PixelStatus| {
+            let (mut sum, mut count) = (0.0, 0.0);
+            for (pixel, status) in photo.pixels().iter().zip(status) {
+                if *status == wanted {
+                    sum += luminance(widen(*pixel));
+                    count += 1.0;
+                }
+            }
+            sum / f64::max(count, 1.0)
+        };
+        let is_lit = |(pixel, status): (&[f32; 3], &PixelStatus)| {
+            *status == PixelStatus::Usable && pixel.iter().any(|&x| x > 0.0)
+        };
+        Self {
+            usable: mean(PixelStatus::Usable),
+            outside: mean(PixelStatus::Outside),
+            is_black: !photo.pixels().iter().zip(status).any(is_lit),
+        }
+    }
+}
+
+/// Brightness around the object, relative to the object, above which the photo has a background.
+const BACKGROUND: f64 = 0.01;
+
+/// The paper's number of samples: fewer pixels than that cannot even be drawn once each.
+const FEW_PIXELS: usize = 256;
+
+#[cfg(test)]
+mod tests;

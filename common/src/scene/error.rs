@@ -1,0 +1,155 @@
+//! What can be wrong with a photo, its mask and its geometry.
+
+use super::PixelCounts;
+
+/// A fault in the description of a scene.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum SceneError {
+    /// The photo is too small to show anything.
+    #[error("the photo is {width} x {height}: expected at least {least} x {least} pixels", least = super::geometry::LEAST_SIDE)]
+    TooSmall {
+        /// Columns found.
+        width: usize,
+        /// Rows found.
+        height: usize,
+    },
+    /// Something that belongs to the photo has another size.
+    #[error(
+        "the {what} is {found_width} x {found_height}, the photo is {width} x {height}: expected the same size; \
+         resample the {what} to the photo"
+    )]
+    Size {
+        /// What was compared: "mask", "normal map".
+        what: &'static str,
+        /// Columns expected.
+        width: usize,
+        /// Rows expected.
+        height: usize,
+        /// Columns found.
+        found_width: usize,
+        /// Rows found.
+        found_height: usize,
+    },
+    /// A circle that cannot be one.
+    #[error("`{found}` is not a circle: expected CX,CY,R in pixels with R above 0, for example --sphere 128,128,120")]
+    Circle {
+        /// What was given.
+        found: String,
+    },
+    /// A camera that cannot be one.
+    #[error("`{found}` is not a camera: expected orthographic, or perspective:FOV_DEG with a vertical field of view between {least} and {most} degrees",
+        least = super::camera::LEAST_FOV_DEG, most = super::camera::MOST_FOV_DEG)]
+    Camera {
+        /// What was given.
+        found: String,
+    },
+    /// The sphere is nowhere in the photo.
+    #[error(
+        "the circle at ({x}, {y}) with radius {radius} does not meet the photo of {width} x {height} pixels: check \
+         --sphere CX,CY,R (pixels, from the top left corner)"
+    )]
+    CircleOutside {
+        /// Centre, pixels from the left.
+        x: f64,
+        /// Centre, pixels from the top.
+        y: f64,
+        /// Radius in pixels.
+        radius: f64,
+        /// Columns of the photo.
+        width: usize,
+        /// Rows of the photo.
+        height: usize,
+    },
+    /// A mask value is not a coverage.
+    #[error("the mask has the value {found} at column {column}, row {row}: expected 0 (background) to 1 (object)")]
+    MaskValue {
+        /// Column from 0.
+        column: usize,
+        /// Row from 0.
+        row: usize,
+        /// What was found.
+        found: f32,
+    },
+    /// The mask leaves nothing to fit a circle to.
+    #[error(
+        "the mask covers {covered:.1} pixels: expected at least {least}; white is the object and black the background",
+        least = super::fit::LEAST_AREA
+    )]
+    EmptyMask {
+        /// Sum of the mask.
+        covered: f64,
+    },
+    /// A normal is not finite.
+    #[error("the normal map has ({}, {}, {}) at column {column}, row {row}: expected finite unit vectors, or 0 for the background",
+        found[0], found[1], found[2])]
+    Normal {
+        /// Column from 0.
+        column: usize,
+        /// Row from 0.
+        row: usize,
+        /// What was found.
+        found: [f32; 3],
+    },
+    /// The vectors of a normal map are mostly not unit vectors.
+    #[error(
+        "{count} of {total} vectors of the normal map are neither 0 nor of length 1, the first at column {column}, row \
+         {row} with length {length:.3}: expected world-space unit normals in [-1, 1]; if the file holds colours, decode \
+         them by 2 c - 1"
+    )]
+    NormalLength {
+        /// How many.
+        count: usize,
+        /// Of how many that are not 0.
+        total: usize,
+        /// Column of the first.
+        column: usize,
+        /// Row of the first.
+        row: usize,
+        /// Its length.
+        length: f64,
+    },
+    /// The normal map shows no surface.
+    #[error(
+        "the normal map has no normal that faces the camera: expected world-space normals with the camera on +Z, so that \
+         visible ones have z above 0"
+    )]
+    NoSurface,
+    /// The description of a normal-map geometry came without its map.
+    #[error(
+        "the geometry is a normal map of {width} x {height} pixels, but no map was given: expected its pixels beside the description"
+    )]
+    MissingNormals {
+        /// Columns expected.
+        width: usize,
+        /// Rows expected.
+        height: usize,
+    },
+    /// Too much of the photo is not a number.
+    #[error(
+        "{count} of the {total} object pixels of the photo are not finite, the first at column {column}, row {row}: \
+         expected at most half; check how the photo was written"
+    )]
+    NotFinite {
+        /// How many.
+        count: usize,
+        /// Of how many.
+        total: usize,
+        /// Column of the first.
+        column: usize,
+        /// Row of the first.
+        row: usize,
+    },
+    /// No pixel is left to fit to.
+    #[error("the photo has no usable pixel: {0}; check --sphere, the mask and the exposure")]
+    NothingUsable(PixelCounts),
+    /// The object is black.
+    #[error(
+        "the photo is black over the whole object ({count} pixels): expected some light; check that the right file and \
+         the right --sphere were given"
+    )]
+    Black {
+        /// Usable pixels.
+        count: usize,
+    },
+}

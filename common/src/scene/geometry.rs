@@ -1,0 +1,152 @@
+//! The surface in the photo, whatever its kind: what rendering asks for.
+
+use super::coverage::pixel_coverage;
+use super::{Camera, Circle, NormalMap, SceneError, Sphere};
+use crate::image::Image;
+use crate::math::Vec3;
+use crate::math::arctangent::angle;
+
+/// A point of the surface as the camera sees it. The normal faces the camera: `normal . view > 0`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SurfacePoint {
+    /// Unit normal, world.
+    pub normal: Vec3,
+    /// Unit vector towards the camera, world.
+    pub view: Vec3,
+}
+
+/// An object as it lies in a photo of a given size.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Geometry {
+    width: usize,
+    height: usize,
+    camera: Camera,
+    surface: Surface,
+}
+
+/// The kinds of surface.
+#[derive(Debug, Clone, PartialEq)]
+enum Surface {
+    Sphere(Sphere),
+    Normals(NormalMap),
+}
+
+impl Geometry {
+    /// The unit sphere that fills `circle` in a photo of `width` x `height` pixels; see [`Sphere`].
+    ///
+    /// # Errors
+    /// [`SceneError::TooSmall`] below 2 x 2 pixels, [`SceneError::Circle`] and [`SceneError::Camera`] for values out of range,
+    /// [`SceneError::CircleOutside`] when the circle does not meet the photo.
+    pub fn sphere(width: usize, height: usize, circle: Circle, camera: Camera) -> Result<Self, SceneError> {
+        check_size(width, height)?;
+        let surface = Surface::Sphere(Sphere::new(width, height, circle, camera)?);
+        Ok(Self { width, height, camera, surface })
+    }
+
+    /// The surface of a normal map (world-space unit normals, length 0 is background) for a photo of the map's size; see
+    /// [`NormalMap`].
+    ///
+    /// # Errors
+    /// [`SceneError::TooSmall`] below 2 x 2 pixels, and those of [`NormalMap::new`].
+    pub fn normals(map: &Image, camera: Camera) -> Result<Self, SceneError> {
+        let (width, height) = (map.width(), map.height());
+        check_size(width, height)?;
+        let surface = Surface::Normals(NormalMap::new(map, camera)?);
+        Ok(Self { width, height, camera, surface })
+    }
+
+    /// Columns of the photo.
+    #[must_use]
+    pub fn width(&self) -> usize {
+        self.width
+    }
+
+    /// Rows of the photo.
+    #[must_use]
+    pub fn height(&self) -> usize {
+        self.height
+    }
+
+    /// How the photo was taken.
+    #[must_use]
+    pub fn camera(&self) -> Camera {
+        self.camera
+    }
+
+    /// The circle the sphere fills; none for a normal map.
+    #[must_use]
+    pub fn circle(&self) -> Option<Circle> {
+        match &self.surface {
+            Surface::Sphere(sphere) => Some(sphere.circle()),
+            Surface::Normals(_) => None,
+        }
+    }
+
+    /// The normal map; none for a sphere.
+    #[must_use]
+    pub fn normal_map(&self) -> Option<&NormalMap> {
+        match &self.surface {
+            Surface::Sphere(_) => None,
+            Surface::Normals(map) => Some(map),
+        }
+    }
+
+    /// The surface seen through the point (x, y) of the photo: pixels from the top left corner, y down, so that pixel
+    /// (c, r) covers \[c, c + 1\] x \[r, r + 1\]. None beside the object.
+    #[must_use]
+    #[inline]
+    pub fn point(&self, x: f64, y: f64) -> Option<SurfacePoint> {
+        match &self.surface {
+            Surface::Sphere(sphere) => sphere.point(x, y),
+            Surface::Normals(map) => map.point(x, y),
+        }
+    }
+
+    /// The fraction of a pixel that the object covers, in \[0, 1\]: 1 exactly if no part of it misses the object, else
+    /// by 256 points and at most 255/256.
+    #[must_use]
+    pub fn coverage(&self, column: usize, row: usize) -> f32 {
+        if let Some(circle) = self.circle() {
+            // Half a diagonal beyond the circle, which holds the silhouette.
+            if circle.distance(column as f64 + 0.5, row as f64 + 0.5) > circle.radius + 0.708 {
+                return 0.0;
+            }
+        }
+        pixel_coverage(column, row, |x, y| self.point(x, y).is_some())
+    }
+
+    /// Whether a pixel is known to show nothing but the object: full coverage, and away from the edge of a normal map,
+    /// which is only known to a pixel.
+    #[must_use]
+    pub fn is_interior(&self, column: usize, row: usize) -> bool {
+        self.coverage(column, row) == 1.0 && self.normal_map().is_none_or(|map| map.is_interior(column, row))
+    }
+
+    /// How far the normal turns over a pixel, in radians: the largest angle between its normals at the centre and the
+    /// corners, as far as they lie on the object. 0 where fewer than two of them do.
+    #[must_use]
+    pub fn normal_spread(&self, column: usize, row: usize) -> f64 {
+        let (x, y) = (column as f64, row as f64);
+        let normals = [(0.5, 0.5), (0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)]
+            .map(|(dx, dy)| self.point(x + dx, y + dy).map(|point| point.normal));
+        let mut widest = 0.0_f64;
+        for (k, first) in normals.iter().enumerate() {
+            for second in &normals[..k] {
+                if let (Some(a), Some(b)) = (first, second) {
+                    widest = widest.max(angle(a.cross(*b).length(), a.dot(*b)));
+                }
+            }
+        }
+        widest
+    }
+}
+
+fn check_size(width: usize, height: usize) -> Result<(), SceneError> {
+    if width < LEAST_SIDE || height < LEAST_SIDE { Err(SceneError::TooSmall { width, height }) } else { Ok(()) }
+}
+
+/// Pixels along the shorter side of the smallest photo.
+pub(super) const LEAST_SIDE: usize = 2;
+
+#[cfg(test)]
+mod tests;
