@@ -14,9 +14,9 @@ mod scan;
 mod stage_one;
 mod stage_two;
 
-pub use candidate::{Candidate, distinct, needed_span};
+pub use candidate::{Candidate, SAME, distinct, needed_span};
 pub use method::{AtZero, JudgedBy, Method, MethodError, SearchKind, Start, gamma_range};
 pub use objective::Objective;
-pub use polish::{Polished, polish};
+pub use polish::{INITIAL_MESH, MAX_EVALUATIONS, Polished, polish};
 pub use stage_one::{SearchFailure, search_gamma};
 pub use stage_two::{FullView, Judged, judge_candidates, winner};
