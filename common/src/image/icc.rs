@@ -101,7 +101,7 @@ mod tests {
 
     /// A minimal matrix profile with one tone curve.
     fn profile(colorants: [[f64; 3]; 3], curve: &[u8]) -> Vec<u8> {
-        let fixed = |x: &f64| crate::math::cell(x * 65536.0 + 0.5, usize::MAX) as u32;
+        let fixed = |x: &f64| u32::try_from(crate::math::cell(x * 65536.0 + 0.5, usize::MAX)).unwrap();
         let mut tags: Vec<(&[u8; 4], Vec<u8>)> = Vec::new();
         for (name, colorant) in [b"rXYZ", b"gXYZ", b"bXYZ"].into_iter().zip(&colorants) {
             let numbers = colorant.iter().flat_map(|x| fixed(x).to_be_bytes());
@@ -114,8 +114,8 @@ mod tests {
         let mut start = 132 + 12 * 4;
         for (name, data) in &tags {
             bytes.extend(name.iter());
-            bytes.extend((start as u32).to_be_bytes());
-            bytes.extend((data.len() as u32).to_be_bytes());
+            bytes.extend(u32::try_from(start).unwrap().to_be_bytes());
+            bytes.extend(u32::try_from(data.len()).unwrap().to_be_bytes());
             start += data.len();
         }
         bytes.extend(tags.into_iter().flat_map(|(_, data)| data));

@@ -52,7 +52,8 @@ pub(super) fn select(parts: &[Vec<String>], wanted: Wanted) -> Result<Layer, &'s
         });
         let Some((mut layer, prefix)) = found.next() else { continue };
         let others: Vec<String> = found.map(|(other, prefix)| title(other.part, prefix)).collect();
-        if !others.is_empty() && !(layer.part == 0 && prefix.is_empty()) {
+        let is_main = layer.part == 0 && prefix.is_empty();
+        if !is_main && !others.is_empty() {
             let title = title(layer.part, prefix);
             layer.warning = Some(format!("of several layers {title} is read, not {}", others.join(", ")));
         }

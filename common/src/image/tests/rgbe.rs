@@ -73,17 +73,17 @@ fn all_orientations_come_out_upright() {
     // Stored 1 2 3 / 4 5 6 in red.
     let pixels: Vec<[u8; 4]> = (1..=6).map(|n| [n, 0, 0, 136]).collect();
     for (resolution, upright) in [
-        ("-Y 2 +X 3", vec![1, 2, 3, 4, 5, 6]),
-        ("-Y 2 -X 3", vec![3, 2, 1, 6, 5, 4]),
-        ("+Y 2 +X 3", vec![4, 5, 6, 1, 2, 3]),
-        ("+Y 2 -X 3", vec![6, 5, 4, 3, 2, 1]),
-        ("+X 2 -Y 3", vec![1, 4, 2, 5, 3, 6]),
-        ("-X 2 -Y 3", vec![4, 1, 5, 2, 6, 3]),
-        ("+X 2 +Y 3", vec![3, 6, 2, 5, 1, 4]),
-        ("-X 2 +Y 3", vec![6, 3, 5, 2, 4, 1]),
+        ("-Y 2 +X 3", [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]),
+        ("-Y 2 -X 3", [3.0, 2.0, 1.0, 6.0, 5.0, 4.0]),
+        ("+Y 2 +X 3", [4.0, 5.0, 6.0, 1.0, 2.0, 3.0]),
+        ("+Y 2 -X 3", [6.0, 5.0, 4.0, 3.0, 2.0, 1.0]),
+        ("+X 2 -Y 3", [1.0, 4.0, 2.0, 5.0, 3.0, 6.0]),
+        ("-X 2 -Y 3", [4.0, 1.0, 5.0, 2.0, 6.0, 3.0]),
+        ("+X 2 +Y 3", [3.0, 6.0, 2.0, 5.0, 1.0, 4.0]),
+        ("-X 2 +Y 3", [6.0, 3.0, 5.0, 2.0, 4.0, 1.0]),
     ] {
         let image = decode("a.hdr", &picture("", resolution, &pixels)).unwrap().image;
-        let red: Vec<u8> = image.pixels().iter().map(|pixel| pixel[0] as u8).collect();
+        let red: Vec<f32> = image.pixels().iter().map(|pixel| pixel[0]).collect();
         assert_eq!(red, upright, "{resolution}");
     }
 }
