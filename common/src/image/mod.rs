@@ -1,4 +1,38 @@
-//! Pixel buffers and the file formats they come from and go to. Readers take bytes, never paths.
+//! Pixel buffers and the file formats they come from and go to. Readers take bytes, never paths; writers give bytes.
+//!
+//! - [`decode`] reads a photograph or a light probe: OpenEXR, Radiance HDR, PFM, PNG or JPEG, told apart by content;
+//! - [`decode_mask`] reads a coverage mask, [`decode_normals`] a normal map;
+//! - [`openexr::write`] and [`png::write`] write results; [`metadata`] names what is written beside the pixels;
+//! - [`content_hash`] names an image by its decoded pixels.
+//!
+//! Whatever the file holds becomes linear Rec. 709, top left first. What could not be taken over exactly is said in
+//! [`Decoded::warnings`]; what cannot be taken over at all is an [`ImageError`]. Nothing is guessed in silence.
+
+mod decoded;
+mod error;
+mod hash;
+mod icc;
+mod jpeg;
+mod ldr;
+mod mask;
+pub mod metadata;
+mod normals;
+pub mod openexr;
+mod pfm;
+mod plane;
+pub mod png;
+mod primaries;
+mod rgbe;
+mod source;
+pub mod srgb;
+#[cfg(test)]
+mod tests;
+
+pub use decoded::{Decoded, Encoding, Format};
+pub use error::ImageError;
+pub use hash::content_hash;
+pub use plane::Plane;
+pub use source::{Limits, Source, decode, decode_mask, decode_normals};
 
 /// A colour image: `height x width x 3`, row-major, top left first, linear Rec. 709.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,0 +1,27 @@
+//! Keys of the text that is written beside the pixels, as OpenEXR string attributes and PNG text chunks. A reader of
+//! `match.exr` needs nothing else to know what it looks at.
+
+/// The program that wrote the file. OpenEXR's standard `software`, PNG's registered `Software`.
+pub const SOFTWARE: &str = "software";
+/// Free text. OpenEXR's standard `comments`, PNG's registered `Comment`.
+pub const COMMENTS: &str = "comments";
+/// The version of Lookalike.
+pub const VERSION: &str = "lookalike.version";
+/// Axes, units, colour space and camera, in words.
+pub const CONVENTIONS: &str = "lookalike.conventions";
+/// The factor that brings radiance to the display range before sRGB encoding, a decimal number.
+pub const DISPLAY_EXPOSURE: &str = "lookalike.displayExposure";
+/// The BRDF model.
+pub const MODEL: &str = "lookalike.model";
+/// The model's parameters, as `name=value` pairs.
+pub const PARAMETERS: &str = "lookalike.parameters";
+/// The gamma of the winning candidate.
+pub const GAMMA: &str = "lookalike.gamma";
+/// The gain between photo and map.
+pub const EXPOSURE_GAIN: &str = "lookalike.exposureGain";
+/// The environment map: its name and the hash of its content.
+pub const ENVIRONMENT: &str = "lookalike.environment";
+/// The camera.
+pub const CAMERA: &str = "lookalike.camera";
+/// The seed of all randomness.
+pub const SEED: &str = "lookalike.seed";

@@ -1,0 +1,105 @@
+//! Portable float maps (Debevec 2001; Netpbm's `pfm(5)`): `PF` (colour) or `Pf` (grey), width and height, then a scale
+//! whose sign gives the byte order (negative: little-endian), then raw 32-bit floats, bottom row first.
+//!
+//! The scale's magnitude is the unit of the samples; they are multiplied by it, with a warning where it is not 1, as some
+//! writers put a number there that means nothing.
+
+use super::Image;
+use super::decoded::{Decoded, Encoding, Format};
+use super::error::ImageError;
+use super::source::Source;
+use crate::math::to_f32;
+
+/// Decodes a portable float map. Linear Rec. 709 is assumed, as the format cannot say.
+pub(super) fn decode(source: &Source<'_>) -> Result<Decoded, ImageError> {
+    let header = Header::read(source)?;
+    let mut warnings = Vec::new();
+    if header.scale != 1.0 {
+        warnings.push(format!("samples multiplied by the file's scale of {}", header.scale));
+    }
+    let row_bytes = header.width * header.channels * 4;
+    let mut pixels = Vec::with_capacity(header.width * header.height);
+    for row in header.raster.chunks_exact(row_bytes).rev() {
+        for pixel in row.chunks_exact(header.channels * 4) {
+            let first = header.sample(pixel, 0);
+            let grey = header.channels == 1;
+            pixels.push(if grey { [first; 3] } else { [first, header.sample(pixel, 1), header.sample(pixel, 2)] });
+        }
+    }
+    Ok(Decoded {
+        image: Image::from_pixels(header.width, header.height, pixels),
+        alpha: None,
+        clipped: None,
+        encoding: Encoding::Linear,
+        format: FORMAT,
+        metadata: Vec::new(),
+        warnings,
+    })
+}
+
+#[derive(Debug)]
+struct Header<'a> {
+    channels: usize,
+    width: usize,
+    height: usize,
+    scale: f64,
+    little_endian: bool,
+    raster: &'a [u8],
+}
+
+impl<'a> Header<'a> {
+    fn read(source: &Source<'a>) -> Result<Self, ImageError> {
+        let fault = |detail: String| source.malformed(FORMAT, detail);
+        let mut rest = source.bytes;
+        let mut word = |what: &str| {
+            let (word, tail) = next_word(rest).ok_or_else(|| fault(format!("expected {what} in the header")))?;
+            rest = tail;
+            Ok(word)
+        };
+        let channels = if word("`PF` or `Pf`")? == "PF" { 3 } else { 1 };
+        let (width, height) = (word("the width")?, word("the height")?);
+        let scale_word = word("the scale")?;
+        let side = |word: &str| word.parse::<u64>().map_err(|_| fault(format!("expected a size, found `{word}`")));
+        let (width, height) = source.check_size(side(width)?, side(height)?, FORMAT)?;
+        let scale: f64 =
+            scale_word.parse().ok().filter(|s: &f64| s.is_normal()).ok_or_else(|| {
+                fault(format!("expected a scale such as -1.0, found `{}`", scale_word.escape_debug()))
+            })?;
+        let expected = width * height * channels * 4;
+        // One white-space character ends the header; a writer in text mode makes it two.
+        let raster = match rest {
+            [b'\n', tail @ ..] if scale_ended_with_return(source.bytes, rest) && tail.len() >= expected => tail,
+            _ => rest,
+        };
+        let found = raster.len();
+        let raster = raster
+            .get(..expected)
+            .ok_or_else(|| fault(format!("expected {expected} bytes of samples, found {found}")))?;
+        Ok(Self { channels, width, height, scale: scale.abs(), little_endian: scale < 0.0, raster })
+    }
+
+    /// Sample `channel` of a pixel's bytes, scaled.
+    fn sample(&self, pixel: &[u8], channel: usize) -> f32 {
+        let mut bytes = [0; 4];
+        bytes.copy_from_slice(&pixel[channel * 4..channel * 4 + 4]);
+        let value = if self.little_endian { f32::from_le_bytes(bytes) } else { f32::from_be_bytes(bytes) };
+        if self.scale == 1.0 { value } else { to_f32(f64::from(value) * self.scale) }
+    }
+}
+
+/// The next word of the header and what follows the one white-space character after it.
+fn next_word(bytes: &[u8]) -> Option<(&str, &[u8])> {
+    let start = bytes.iter().take(MAX_WORD).position(|byte| !byte.is_ascii_whitespace())?;
+    let length = bytes[start..].iter().take(MAX_WORD).position(u8::is_ascii_whitespace)?;
+    let word = std::str::from_utf8(&bytes[start..start + length]).ok()?;
+    Some((word, &bytes[start + length + 1..]))
+}
+
+fn scale_ended_with_return(bytes: &[u8], rest: &[u8]) -> bool {
+    bytes[..bytes.len() - rest.len()].last() == Some(&b'\r')
+}
+
+const FORMAT: Format = Format::Pfm;
+
+/// Longer than any number in a header.
+const MAX_WORD: usize = 64;

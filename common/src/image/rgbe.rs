@@ -1,0 +1,306 @@
+//! Radiance pictures (RGBE): Ward, *Real Pixels*, Graphics Gems II (1991), and Radiance's *File Formats*, section
+//! "Picture File Format (.hdr)".
+//!
+//! - A component is `mantissa * 2^(exponent - 136)`, exponent 0 is black. Radiance's own tools add half a mantissa step,
+//!   as they truncate when writing; nearly all other readers (Debevec's, HDR Shop, OpenCV, `image`) do not, and the
+//!   published maxima of the usual probes are without it. Nor does this reader: at most 0.4 % of the brightest component.
+//! - `EXPOSURE` and `COLORCORR` say by what the pixels have been multiplied; several multiply up. Radiance is recovered
+//!   by dividing, which is done here.
+//! - `PRIMARIES` other than Rec. 709 are converted; all zero (Photoshop) means unknown and is taken as Rec. 709, and so is
+//!   a file without them (Radiance's documented default is near Rec. 709 but for an equal-energy white).
+//! - All eight orientations of the resolution line are turned upright.
+
+use super::Image;
+use super::decoded::{Decoded, Encoding, Format};
+use super::error::ImageError;
+use super::primaries::{Primaries, convert};
+use super::source::Source;
+use crate::math::{Mat3, to_f32};
+
+/// Decodes a Radiance picture.
+pub(super) fn decode(source: &Source<'_>) -> Result<Decoded, ImageError> {
+    let mut reader = Reader { source, rest: source.bytes };
+    let header = Header::read(&mut reader)?;
+    let layout = Layout::read(&mut reader)?;
+    let mut pixels = vec![[0.0f32; 3]; layout.width * layout.height];
+    let scales: Vec<f64> = (0..=255u64).map(power_of_two).collect();
+    let divisor = header.divisor;
+    let mut line = Vec::with_capacity(layout.line_length);
+    for index in 0..layout.line_count {
+        reader.read_line(&mut line, &layout, index)?;
+        for (position, &[r, g, b, e]) in line.iter().enumerate() {
+            let scale = scales[usize::from(e)];
+            let value = |mantissa: u8, channel: usize| to_f32(f64::from(mantissa) * scale / divisor[channel]);
+            pixels[layout.target(index, position)] = [value(r, 0), value(g, 1), value(b, 2)];
+        }
+    }
+    if let Some(matrix) = header.to_rec709 {
+        convert(&mut pixels, matrix);
+    }
+    Ok(Decoded {
+        image: Image::from_pixels(layout.width, layout.height, pixels),
+        alpha: None,
+        clipped: None,
+        encoding: Encoding::Linear,
+        format: FORMAT,
+        metadata: header.metadata,
+        warnings: header.warnings,
+    })
+}
+
+/// What the header says about the values.
+#[derive(Debug)]
+struct Header {
+    divisor: [f64; 3],
+    to_rec709: Option<Mat3>,
+    metadata: Vec<(String, String)>,
+    warnings: Vec<String>,
+}
+
+impl Header {
+    fn read(reader: &mut Reader<'_>) -> Result<Self, ImageError> {
+        let mut header = Self { divisor: [1.0; 3], to_rec709: None, metadata: Vec::new(), warnings: Vec::new() };
+        reader.text_line()?;
+        loop {
+            let line = reader.text_line()?;
+            if line.is_empty() {
+                return Ok(header);
+            }
+            // Comments and the commands that made the picture have no `=`, or one inside a command.
+            if let Some((key, value)) = line.split_once('=').filter(|_| !line.starts_with(['#', ' ', '\t'])) {
+                header.apply(key.trim(), value.trim(), reader.source)?;
+            }
+        }
+    }
+
+    fn apply(&mut self, key: &str, value: &str, source: &Source<'_>) -> Result<(), ImageError> {
+        match key {
+            "FORMAT" if value == "32-bit_rle_rgbe" => return Ok(()),
+            "FORMAT" => {
+                return Err(source.unsupported(
+                    FORMAT,
+                    format!("pixel format {value}"),
+                    "convert it with Radiance's `ra_xyze -r`, or to OpenEXR",
+                ));
+            }
+            "EXPOSURE" => {
+                let [exposure] = factors(key, value, source)?;
+                self.divisor = self.divisor.map(|d| d * exposure);
+            }
+            "COLORCORR" => {
+                let correction: [f64; 3] = factors(key, value, source)?;
+                self.divisor = [0, 1, 2].map(|channel| self.divisor[channel] * correction[channel]);
+            }
+            "PRIMARIES" => self.set_primaries(value, source)?,
+            "GAMMA" if number(value) != Some(1.0) => {
+                self.warnings.push(format!("GAMMA={value} in the header is ignored: RGBE pixels are linear"));
+            }
+            _ => {}
+        }
+        if !self.divisor.iter().all(|&d| d.is_normal()) {
+            return Err(source.malformed(FORMAT, format!("{key}={value} takes the exposure out of range")));
+        }
+        self.metadata.push((key.to_owned(), value.to_owned()));
+        Ok(())
+    }
+
+    fn set_primaries(&mut self, value: &str, source: &Source<'_>) -> Result<(), ImageError> {
+        let numbers: Option<[f64; 8]> = numbers(value);
+        let Some(numbers) = numbers else {
+            return Err(source.malformed(FORMAT, format!("expected eight numbers in PRIMARIES, found `{value}`")));
+        };
+        if numbers == [0.0; 8] {
+            return Ok(());
+        }
+        self.to_rec709 = Primaries::from_array(numbers)
+            .to_rec709()
+            .map_err(|_| source.malformed(FORMAT, format!("PRIMARIES={value} are no colour primaries")))?;
+        if self.to_rec709.is_some() {
+            self.warnings.push(format!("colours converted from the file's primaries ({value}) to Rec. 709"));
+        }
+        Ok(())
+    }
+}
+
+/// Size and orientation of the stored scan lines.
+#[derive(Debug)]
+struct Layout {
+    width: usize,
+    height: usize,
+    line_count: usize,
+    line_length: usize,
+    /// Scan lines are columns of the image.
+    transposed: bool,
+    /// Stored from right to left.
+    flip_x: bool,
+    /// Stored from bottom to top.
+    flip_y: bool,
+}
+
+impl Layout {
+    /// Parses `-Y 1024 +X 768`: the first axis counts scan lines, the second the pixels of each; `-Y` is top to bottom.
+    fn read(reader: &mut Reader<'_>) -> Result<Self, ImageError> {
+        let line = reader.text_line()?;
+        let fault = || {
+            let detail = format!("expected a resolution such as `-Y 512 +X 1024`, found `{}`", line.escape_debug());
+            reader.source.malformed(FORMAT, detail)
+        };
+        let words: Vec<&str> = line.split_ascii_whitespace().collect();
+        let &[first, lines, second, length] = words.as_slice() else { return Err(fault()) };
+        let count = |word: &str| word.parse::<u64>().map_err(|_| fault());
+        let (lines, length) = (count(lines)?, count(length)?);
+        let (transposed, y, x) = match (first, second) {
+            ("+Y" | "-Y", "+X" | "-X") => (false, first, second),
+            ("+X" | "-X", "+Y" | "-Y") => (true, second, first),
+            _ => return Err(fault()),
+        };
+        let (width, height) = if transposed { (lines, length) } else { (length, lines) };
+        let (width, height) = reader.source.check_size(width, height, FORMAT)?;
+        let (line_count, line_length) = if transposed { (width, height) } else { (height, width) };
+        Ok(Self { width, height, line_count, line_length, transposed, flip_x: x == "-X", flip_y: y == "+Y" })
+    }
+
+    /// Where the pixel at `position` of scan line `line` goes.
+    fn target(&self, line: usize, position: usize) -> usize {
+        let (x, y) = if self.transposed { (line, position) } else { (position, line) };
+        let column = if self.flip_x { self.width - 1 - x } else { x };
+        let row = if self.flip_y { self.height - 1 - y } else { y };
+        row * self.width + column
+    }
+}
+
+/// The bytes that are still to be read.
+#[derive(Debug)]
+struct Reader<'a> {
+    source: &'a Source<'a>,
+    rest: &'a [u8],
+}
+
+impl Reader<'_> {
+    /// The next header line, without its end.
+    fn text_line(&mut self) -> Result<String, ImageError> {
+        let Some(end) = self.rest.iter().take(MAX_HEADER_LINE).position(|&byte| byte == b'\n') else {
+            return Err(self.source.malformed(FORMAT, "the header has no end"));
+        };
+        let line = String::from_utf8_lossy(&self.rest[..end]).trim_end_matches('\r').to_owned();
+        self.rest = &self.rest[end + 1..];
+        Ok(line)
+    }
+
+    fn take<const N: usize>(&mut self, layout: &Layout, index: usize) -> Result<[u8; N], ImageError> {
+        let Some((head, tail)) = self.rest.split_first_chunk::<N>() else {
+            let detail = format!("expected {} scan lines, found the end in scan line {index}", layout.line_count);
+            return Err(self.source.malformed(FORMAT, detail));
+        };
+        self.rest = tail;
+        Ok(*head)
+    }
+
+    /// One scan line of `[red, green, blue, exponent]`, in either run-length encoding or none.
+    fn read_line(&mut self, line: &mut Vec<[u8; 4]>, layout: &Layout, index: usize) -> Result<(), ImageError> {
+        line.clear();
+        let first = self.take::<4>(layout, index)?;
+        let new_style = (8..0x8000).contains(&layout.line_length) && first[0] == 2 && first[1] == 2 && first[2] < 128;
+        if !new_style {
+            return self.read_old_line(first, line, layout, index);
+        }
+        let stored = usize::from(first[2]) << 8 | usize::from(first[3]);
+        if stored != layout.line_length {
+            let detail = format!("expected {} pixels in scan line {index}, found {stored}", layout.line_length);
+            return Err(self.source.malformed(FORMAT, detail));
+        }
+        line.resize(layout.line_length, [0; 4]);
+        (0..4).try_for_each(|channel| self.read_runs(channel, line, layout, index))
+    }
+
+    /// One component of a scan line: a count above 128 repeats one byte, others copy.
+    fn read_runs(
+        &mut self,
+        channel: usize,
+        line: &mut [[u8; 4]],
+        layout: &Layout,
+        index: usize,
+    ) -> Result<(), ImageError> {
+        let mut at = 0;
+        while at < line.len() {
+            let [count] = self.take::<1>(layout, index)?;
+            let (length, repeated) = match count {
+                129.. => (usize::from(count - 128), Some(self.take::<1>(layout, index)?[0])),
+                _ => (usize::from(count), None),
+            };
+            if length == 0 || at + length > line.len() {
+                return Err(self.bad_run(index));
+            }
+            for pixel in &mut line[at..at + length] {
+                pixel[channel] = match repeated {
+                    Some(byte) => byte,
+                    None => self.take::<1>(layout, index)?[0],
+                };
+            }
+            at += length;
+        }
+        Ok(())
+    }
+
+    /// Flat pixels; `[1, 1, 1, n]` repeats the last one n times, a further one 256 n times, and so on.
+    fn read_old_line(
+        &mut self,
+        first: [u8; 4],
+        line: &mut Vec<[u8; 4]>,
+        layout: &Layout,
+        index: usize,
+    ) -> Result<(), ImageError> {
+        let mut pixel = first;
+        let mut shift = 0u32;
+        loop {
+            if let [1, 1, 1, count] = pixel {
+                let length = if shift > 24 { usize::MAX } else { usize::from(count) << shift };
+                let previous = line.last().copied();
+                match previous {
+                    Some(previous) if length <= layout.line_length - line.len() => {
+                        line.resize(line.len() + length, previous);
+                    }
+                    _ => return Err(self.bad_run(index)),
+                }
+                shift += 8;
+            } else {
+                line.push(pixel);
+                shift = 0;
+            }
+            if line.len() == layout.line_length {
+                return Ok(());
+            }
+            pixel = self.take::<4>(layout, index)?;
+        }
+    }
+
+    fn bad_run(&self, index: usize) -> ImageError {
+        self.source.malformed(FORMAT, format!("a run does not fit into scan line {index}"))
+    }
+}
+
+/// The weight of a mantissa step, exact; 0 for exponent 0.
+fn power_of_two(exponent: u64) -> f64 {
+    if exponent == 0 { 0.0 } else { f64::from_bits((exponent + 1023 - 136) << 52) }
+}
+
+/// `N` positive finite numbers.
+fn factors<const N: usize>(key: &str, value: &str, source: &Source<'_>) -> Result<[f64; N], ImageError> {
+    numbers(value).filter(|v: &[f64; N]| v.iter().all(|&x| x > 0.0 && x.is_finite())).ok_or_else(|| {
+        source.malformed(FORMAT, format!("expected {N} positive number(s) in {key}, found `{}`", value.escape_debug()))
+    })
+}
+
+fn numbers<const N: usize>(value: &str) -> Option<[f64; N]> {
+    let numbers: Option<Vec<f64>> = value.split_ascii_whitespace().map(number).collect();
+    numbers?.try_into().ok()
+}
+
+fn number(word: &str) -> Option<f64> {
+    word.parse().ok()
+}
+
+const FORMAT: Format = Format::RadianceHdr;
+
+/// Longer header lines than any command that made a picture.
+const MAX_HEADER_LINE: usize = 1 << 16;

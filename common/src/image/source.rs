@@ -1,0 +1,161 @@
+//! The bytes of one file on their way to pixels: entry points, limits, and the errors every reader raises.
+
+use super::decoded::{Decoded, Format};
+use super::error::ImageError;
+use super::{Plane, jpeg, mask, normals, openexr, pfm, png, rgbe};
+use crate::math::Vec3;
+
+/// Decodes a colour image of any format that is read. `name` only appears in errors; the format is told by content.
+///
+/// - OpenEXR: the first part with `R G B` (the unnamed layer before named ones), else `Y` as grey; placed in the display
+///   window, black where the data window leaves it, cropped where it exceeds it; `chromaticities` converted to Rec. 709.
+/// - Radiance HDR: divided by `EXPOSURE` and `COLORCORR`, `PRIMARIES` converted to Rec. 709.
+/// - PFM: multiplied by the magnitude of the scale.
+/// - PNG, JPEG: decoded from sRGB, whatever the file says of its colours (a contradiction is a warning); Exif orientation
+///   is applied.
+///
+/// # Errors
+/// If the file is of no known format, broken, unsupported, without colours, or larger than [`Limits::default`].
+pub fn decode(name: &str, bytes: &[u8]) -> Result<Decoded, ImageError> {
+    Source::new(name, bytes).decode()
+}
+
+/// Decodes a coverage mask, linear in [0, 1] (no sRGB decoding), from any format that is read: the alpha channel where
+/// there is one that is not 1 everywhere, else the only channel, else equal red, green and blue.
+///
+/// # Errors
+/// As [`decode`], and if the colours differ or a value lies outside [0, 1].
+pub fn decode_mask(name: &str, bytes: &[u8]) -> Result<Plane<f32>, ImageError> {
+    Source::new(name, bytes).mask()
+}
+
+/// Decodes a normal map: world-space unit normals, exactly zero on the background. OpenEXR (channels `X Y Z` or
+/// `R G B`, also of a named layer) or PFM. Normals within [`normals::LENGTH_TOLERANCE`] of unit length are renormalised.
+///
+/// # Errors
+/// As [`decode`], and with the pixel's coordinates if a normal is neither zero nor of unit length.
+pub fn decode_normals(name: &str, bytes: &[u8]) -> Result<Plane<Vec3>, ImageError> {
+    Source::new(name, bytes).normals()
+}
+
+/// The bytes of one file, its name for errors, and the limits it has to keep.
+#[derive(Debug, Clone, Copy)]
+pub struct Source<'a> {
+    pub(super) name: &'a str,
+    pub(super) bytes: &'a [u8],
+    pub(super) limits: Limits,
+}
+
+/// Bounds that are checked before anything is allocated.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Limits {
+    /// Pixels per side.
+    pub max_side: usize,
+    /// Pixels in all.
+    pub max_pixels: usize,
+}
+
+impl Default for Limits {
+    /// 32768 pixels per side, 2^28 in all (3 GB as an [`super::Image`]).
+    fn default() -> Self {
+        Self { max_side: 1 << 15, max_pixels: 1 << 28 }
+    }
+}
+
+impl<'a> Source<'a> {
+    /// The file `name` with content `bytes`, under the default limits.
+    #[must_use]
+    pub fn new(name: &'a str, bytes: &'a [u8]) -> Self {
+        Self { name, bytes, limits: Limits::default() }
+    }
+
+    /// The same under other limits.
+    #[must_use]
+    pub fn with_limits(self, limits: Limits) -> Self {
+        Self { limits, ..self }
+    }
+
+    /// See [`decode`].
+    ///
+    /// # Errors
+    /// See [`decode`].
+    pub fn decode(&self) -> Result<Decoded, ImageError> {
+        match self.format()? {
+            Format::OpenExr => openexr::decode(self),
+            Format::RadianceHdr => rgbe::decode(self),
+            Format::Pfm => pfm::decode(self),
+            Format::Png => png::decode(self),
+            Format::Jpeg => jpeg::decode(self),
+        }
+    }
+
+    /// See [`decode_mask`].
+    ///
+    /// # Errors
+    /// See [`decode_mask`].
+    pub fn mask(&self) -> Result<Plane<f32>, ImageError> {
+        mask::decode(self)
+    }
+
+    /// See [`decode_normals`].
+    ///
+    /// # Errors
+    /// See [`decode_normals`].
+    pub fn normals(&self) -> Result<Plane<Vec3>, ImageError> {
+        normals::decode(self)
+    }
+
+    /// The format by content.
+    pub(super) fn format(&self) -> Result<Format, ImageError> {
+        Format::sniff(self.bytes)
+            .ok_or_else(|| ImageError::UnknownFormat { name: self.name.to_owned(), found: describe(self.bytes) })
+    }
+
+    /// Checks the size that a header claims and returns it.
+    pub(super) fn check_size(&self, width: u64, height: u64, format: Format) -> Result<(usize, usize), ImageError> {
+        if width == 0 || height == 0 {
+            return Err(self.malformed(format, format!("expected at least one pixel, found {width} x {height}")));
+        }
+        let Limits { max_side, max_pixels } = self.limits;
+        let too_large = || ImageError::TooLarge { name: self.name.to_owned(), width, height, max_side, max_pixels };
+        let side = |n: u64| usize::try_from(n).ok().filter(|&n| n <= max_side).ok_or_else(too_large);
+        let (columns, rows) = (side(width)?, side(height)?);
+        if columns.checked_mul(rows).is_none_or(|pixels| pixels > max_pixels) {
+            return Err(too_large());
+        }
+        Ok((columns, rows))
+    }
+
+    /// The file breaks the rules of `format`.
+    pub(super) fn malformed(&self, format: Format, detail: impl Into<String>) -> ImageError {
+        ImageError::Malformed { name: self.name.to_owned(), format, detail: detail.into() }
+    }
+
+    /// The file uses `feature`, which is not read.
+    pub(super) fn unsupported(&self, format: Format, feature: impl Into<String>, advice: &str) -> ImageError {
+        ImageError::Unsupported {
+            name: self.name.to_owned(),
+            format,
+            feature: feature.into(),
+            advice: advice.to_owned(),
+        }
+    }
+}
+
+/// What a file of an unknown format looks like.
+fn describe(bytes: &[u8]) -> String {
+    match bytes {
+        [] => "an empty file".to_owned(),
+        [b'I', b'I', 0x2a | 0x2b, 0, ..] | [b'M', b'M', 0, 0x2a | 0x2b, ..] => "TIFF or a camera's raw file".to_owned(),
+        [b'G', b'I', b'F', b'8', ..] => "GIF".to_owned(),
+        [b'B', b'M', ..] => "BMP".to_owned(),
+        [b'R', b'I', b'F', b'F', _, _, _, _, b'W', b'E', b'B', b'P', ..] => "WebP".to_owned(),
+        [_, _, _, _, b'f', b't', b'y', b'p', ..] => "HEIF or AVIF".to_owned(),
+        [b'P', b'F', b'4', ..] => "PFM with an alpha channel (PF4)".to_owned(),
+        [b'P', b'1'..=b'7', b' ' | b'\t' | b'\r' | b'\n', ..] => "a Netpbm file with integer samples".to_owned(),
+        _ => {
+            let start: Vec<String> = bytes.iter().take(8).map(|byte| format!("{byte:02x}")).collect();
+            format!("a file that starts with the bytes {}", start.join(" "))
+        }
+    }
+}
