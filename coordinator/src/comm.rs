@@ -113,6 +113,15 @@ pub enum Site {
     Coordinator,
 }
 
+impl fmt::Display for Site {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Worker(worker) => worker.fmt(formatter),
+            Self::Coordinator => formatter.write_str("the coordinator"),
+        }
+    }
+}
+
 /// A node, as the user knows it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct NodeName {

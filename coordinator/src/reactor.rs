@@ -93,12 +93,7 @@ pub enum Event {
 ///
 /// # Errors
 /// Those of the planner.
-pub fn start(
-    core: &mut Core,
-    planner: &mut impl Planner,
-    now: Duration,
-    outbox: &mut Outbox,
-) -> Result<(), RunError> {
+pub fn start(core: &mut Core, planner: &mut impl Planner, now: Duration, outbox: &mut Outbox) -> Result<(), RunError> {
     planner.start(&mut GraphEdit::new(&mut core.graph))?;
     settle(core, planner, now, outbox)
 }
@@ -263,13 +258,7 @@ fn started(core: &mut Core, worker: WorkerId, node: NodeId, attempt: u32, now: D
 /// An answer: (where from, for which node, for which attempt).
 type Answer = (Site, NodeId, u32);
 
-fn finished(
-    core: &mut Core,
-    answer: Answer,
-    output: Blob,
-    now: Duration,
-    outbox: &mut Outbox,
-) -> Result<(), RunError> {
+fn finished(core: &mut Core, answer: Answer, output: Blob, now: Duration, outbox: &mut Outbox) -> Result<(), RunError> {
     let (site, node, _) = answer;
     if !answered(core, answer, now, outbox) {
         return Ok(());
@@ -290,7 +279,7 @@ fn finished(
         // The node has failed before; the planner knows it, and nothing can be taken back.
         Completion::Refused => {}
         Completion::Different { first } => {
-            return Err(RunError::ResultsDiffer { name: core.name(node), site, first, second: hash });
+            return Err(RunError::ResultsDiffer { name: Box::new(core.name(node)), site, first, second: hash });
         }
     }
     Ok(())
@@ -422,3 +411,8 @@ fn watch_starvation(core: &mut Core, now: Duration, outbox: &mut Outbox) -> Resu
     }
     Ok(())
 }
+
+#[cfg(test)]
+mod property_tests;
+#[cfg(test)]
+mod tests;

@@ -15,7 +15,9 @@ use crate::comm::{NodeName, Site};
 #[non_exhaustive]
 pub enum RunError {
     /// Neither local workers nor an address where others could join.
-    #[error("no worker can ever join: expected at least one local worker, or an address to listen on for others, found neither; use --workers N or --listen ADDR")]
+    #[error(
+        "no worker can ever join: expected at least one local worker, or an address to listen on for others, found neither; use --workers N or --listen ADDR"
+    )]
     NoWorkersPossible,
     /// The address to listen on is every address of the machine, and nobody knows what the others call it.
     #[error("listening on {listen} tells workers no host name to connect to; add --advertise HOST[:PORT]")]
@@ -72,10 +74,12 @@ pub enum RunError {
         last_status: String,
     },
     /// Two computations of one node gave different outputs.
-    #[error("two results of {name} differ ({first:?} and {second:?}, the second one from {site:?}), so neither can be trusted; use the same build everywhere, check the memory of that machine, and report this")]
+    #[error(
+        "two results of {name} differ ({first:?} and {second:?}, the second one from {site}), so neither can be trusted; use the same build everywhere, check the memory of that machine, and report this"
+    )]
     ResultsDiffer {
         /// The node.
-        name: NodeName,
+        name: Box<NodeName>,
         /// Where the second result came from.
         site: Site,
         /// The first output.
