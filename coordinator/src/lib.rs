@@ -3,10 +3,17 @@
 
 use std::process::ExitCode;
 
+pub mod access;
 mod cli;
+pub mod comm;
 mod commands;
+pub mod core;
 pub mod demo;
+pub mod reactor;
+mod rpc;
+pub mod runner;
 pub mod settings;
+pub mod spawn;
 
 pub use cli::Exit;
 

@@ -1,1 +1,95 @@
 //! The worker: connects to a coordinator over TCP, runs nodes of the job graph on its rayon pool, returns results.
+//!
+//! Threads: the main thread talks to the coordinator and never computes; the pool computes and never talks; one thread
+//! sends heartbeats; with `--leash` one more watches stdin, whose end ends the process. A worker keeps computing while its
+//! connection is broken, and sends again what was not acknowledged.
+//!
+//! Which nodes it can run is the [`Registry`] that it is given: this crate knows nothing of rendering.
+
+mod cache;
+pub mod ending;
+mod error;
+mod execute;
+mod options;
+mod session;
+mod tasks;
+pub mod wire;
+
+#[cfg(test)]
+mod tests;
+
+use std::process::ExitCode;
+
+use clap::Parser;
+use lookalike::graph::Registry;
+use tracing_subscriber::EnvFilter;
+
+pub use error::WorkerError;
+pub use options::{Arguments, WorkerOptions};
+
+/// Work for one coordinator until it ends the run, or the worker is asked to end (SIGTERM, Ctrl-C, the end of stdin with
+/// [`WorkerOptions::leash`]).
+///
+/// # Errors
+/// When the access file is unusable, the coordinator refuses this worker (never tried again), or it cannot be reached for
+/// [`WorkerOptions::reconnect_for`].
+pub fn run(options: &WorkerOptions, registry: Registry) -> Result<(), WorkerError> {
+    // One thread is enough to talk; the cores belong to the pool.
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(WorkerError::Runtime)?;
+    runtime.block_on(session::run(options, registry))
+}
+
+/// The program `lookalike-worker`, with these node types: parses the command line, runs, and tells errors on stderr.
+#[must_use]
+pub fn main_with(registry: Registry) -> ExitCode {
+    let program = match Program::try_parse() {
+        Ok(program) => program,
+        Err(error) => {
+            let is_error = error.use_stderr();
+            // If even stderr is gone, there is nobody to tell.
+            let _ = error.print();
+            return ExitCode::from(if is_error { 2 } else { 0 });
+        }
+    };
+    init_tracing(program.log.as_deref());
+    run_and_report(&program.arguments.into_options(), registry)
+}
+
+/// Run a worker and tell its error on stderr: 0 done, 2 bad input or refused, 3 the coordinator was lost.
+#[must_use]
+pub fn run_and_report(options: &WorkerOptions, registry: Registry) -> ExitCode {
+    match run(options, registry) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {}", error.with_causes());
+            ExitCode::from(error.exit_code())
+        }
+    }
+}
+
+/// `lookalike-worker` on its command line.
+#[derive(Debug, Parser)]
+#[command(
+    name = "lookalike-worker",
+    version,
+    about = "Run nodes of a fit for the coordinator that wrote the access file",
+    after_help = "The same as `lookalike worker`. The worker ends when the run ends. Exit codes: 0 the run ended, \
+                  2 bad usage or refused, 3 the coordinator was lost."
+)]
+struct Program {
+    #[command(flatten)]
+    arguments: Arguments,
+
+    /// What to log to stderr: error, warn, info, debug, trace, or a filter such as `lookalike_worker=debug` [default: RUST_LOG, else warn]
+    #[arg(long, value_name = "LEVEL")]
+    log: Option<String>,
+}
+
+fn init_tracing(level: Option<&str>) {
+    let filter = level.map_or_else(
+        || EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new("warn")),
+        |level| EnvFilter::try_new(level).unwrap_or_else(|_| EnvFilter::new("warn")),
+    );
+    // A second subscriber in one process (tests) is not wanted, and no reason to fail.
+    let _ = tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).try_init();
+}

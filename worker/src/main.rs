@@ -1,3 +1,9 @@
 //! `lookalike-worker`: argument parsing only; everything else is in the library.
 
-fn main() {}
+use std::process::ExitCode;
+
+use lookalike::graph::Registry;
+
+fn main() -> ExitCode {
+    lookalike_worker::main_with(Registry::default())
+}

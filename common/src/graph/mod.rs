@@ -1,1 +1,40 @@
-//! The job graph: typed nodes, content-addressed blobs, and the coordinator's state machine as a plain function.
+//! The job graph: typed nodes, the blobs they read and write, and who depends on whom.
+//!
+//! A run is a [`Graph`] of nodes. A node is a pure function of its parameters and its input blobs; what it is called on
+//! the wire (`kind`) picks the one [`NodeType`] of the [`Registry`] that knows how to run it. Its output becomes a blob
+//! named by its BLAKE3 hash, so the same bytes are stored and sent once, and any two computations of a node can be
+//! compared bit for bit. A [`Planner`] decides which nodes there are: it is told of each finished node and may add more.
+//!
+//! ```text
+//!   Planner --add_node--> Waiting --inputs there--> Ready --output--> Completed --> Planner::completed
+//!                            |                        |
+//!                            +---an input failed------+--failure--> Failed -------> Planner::failed
+//! ```
+//!
+//! What it is not: payloads are opaque here (no rendering, no parameters of a BRDF), and nothing knows of workers,
+//! leases, sockets or time. [`run_in_process`] runs a graph without any of these: it gives the result that every
+//! distributed run must reproduce bit for bit.
+
+mod blob;
+mod context;
+mod decoded;
+mod in_process;
+mod node;
+mod planner;
+mod registry;
+mod state;
+
+pub use blob::{Blob, BlobHash, HashMismatch, MAX_BLOB_BYTES};
+pub use context::RunContext;
+pub use decoded::DecodedCache;
+pub use in_process::{Execution, run_in_process};
+pub use node::{
+    FailureReason, Input, MAX_INPUTS, MAX_NAME_BYTES, MAX_PARAMETER_BYTES, NodeFailure, NodeId, NodeSpec, Placement,
+    WorkerId,
+};
+pub use planner::{GraphEdit, PlanError, Planner};
+pub use registry::{NodeType, Registry};
+pub use state::{Change, Completion, Graph, NodeState};
+
+#[cfg(test)]
+mod tests;

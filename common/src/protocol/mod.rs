@@ -1,1 +1,36 @@
-//! The wire: messages, framing limits, handshake and versions between coordinator and worker.
+//! The wire between coordinator and workers: handshake, frames, messages, transfers of blobs. Bytes in, bytes out: nothing
+//! here opens a socket or waits for one.
+//!
+//! A connection is one TCP stream (inside TLS, once there is TLS). In order:
+//! 1. a fixed-byte preamble ([`Challenge`], [`Response`], [`Verdict`]): magic, version, mutual proof of the shared
+//!    secret; parsed by hand, so that a stranger reaches no decoder;
+//! 2. frames ([`FrameReader`]): a length, checked against [`MAX_FRAME_BYTES`] before anything is allocated, a tag, a body;
+//! 3. in message frames [`ToCoordinator`] or [`ToWorker`], the first ones being `Hello` and `Welcome`;
+//! 4. in part frames the raw bytes of the blob that the last message announced ([`IncomingBlob`]).
+//!
+//! What it is not: these types are the wire's own. The job graph's types are converted at the edge, and nothing else is
+//! ever serialised because it happens to be convenient.
+
+mod access;
+mod codec;
+mod frame;
+mod handshake;
+mod message;
+mod transfer;
+mod version;
+
+pub use access::{Access, AccessError, Secret};
+pub use codec::{CodecError, decode, decode_message, encode, encode_message};
+pub use frame::{Frame, FrameError, FrameReader, FrameTag, MAX_FRAME_BYTES, frame_header};
+pub use handshake::{
+    CHALLENGE_BYTES, Challenge, HandshakeError, Nonce, RESPONSE_BYTES, Refusal, Response, VERDICT_BYTES, Verdict,
+};
+pub use message::{
+    Assignment, Executing, Hello, LeaseName, MAX_MESSAGE_TEXT_BYTES, RunName, ToCoordinator, ToWorker, Welcome,
+    bounded_text,
+};
+pub use transfer::{IncomingBlob, PART_BYTES, TransferError, parts};
+pub use version::{MAGIC, PROTOCOL_VERSION};
+
+#[cfg(test)]
+mod tests;

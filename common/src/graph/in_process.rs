@@ -1,0 +1,89 @@
+//! A whole run in this process, without workers: the reference that every distributed run must equal bit for bit.
+
+use std::collections::BTreeSet;
+use std::sync::Arc;
+
+use rayon::prelude::*;
+
+use super::{
+    Blob, Change, DecodedCache, FailureReason, Graph, GraphEdit, NodeFailure, NodeId, NodeState, PlanError, Planner,
+    Registry, RunContext,
+};
+
+/// How many encoded bytes of inputs are kept decoded in one process (128 MiB).
+const DECODED_BOUND_BYTES: usize = 128 << 20;
+
+/// In which order ready nodes run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Execution {
+    /// One after the other, the earliest ready node first.
+    Sequential,
+    /// All ready nodes together on the current rayon pool, then the nodes that follow from them.
+    Parallel,
+}
+
+/// Run the planner's graph to its end in this process, whatever the placement of its nodes says.
+///
+/// # Errors
+/// Those of the planner, which by default ends the run when a node fails.
+pub fn run_in_process<P: Planner>(mut planner: P, registry: &Registry, execution: Execution) -> Result<P, PlanError> {
+    let mut graph = Graph::new();
+    let decoded = Arc::new(DecodedCache::new(DECODED_BOUND_BYTES));
+    let mut ready = BTreeSet::new();
+    planner.start(&mut GraphEdit::new(&mut graph))?;
+    loop {
+        notify(&mut planner, &mut graph, &mut ready)?;
+        let chosen: Vec<NodeId> = match execution {
+            Execution::Sequential => ready.pop_first().into_iter().collect(),
+            Execution::Parallel => std::mem::take(&mut ready).into_iter().collect(),
+        };
+        if chosen.is_empty() {
+            return Ok(planner);
+        }
+        let run_one = |node: &NodeId| run_node(&graph, *node, registry, &decoded);
+        let results: Vec<_> = match execution {
+            Execution::Sequential => chosen.iter().map(run_one).collect(),
+            Execution::Parallel => chosen.par_iter().map(run_one).collect(),
+        };
+        for (node, result) in chosen.into_iter().zip(results) {
+            match result {
+                // Each node runs once, so it is open here and the output cannot be refused.
+                Ok(output) => _ = graph.complete(node, output),
+                Err(failure) => graph.fail(node, FailureReason::Application(failure)),
+            }
+        }
+    }
+}
+
+/// Tell the planner of all that happened, which may make more happen, and collect what became ready.
+fn notify<P: Planner>(planner: &mut P, graph: &mut Graph, ready: &mut BTreeSet<NodeId>) -> Result<(), PlanError> {
+    while let Some(change) = graph.next_change() {
+        match change {
+            Change::Added(_) => {}
+            Change::Ready(node) => _ = ready.insert(node),
+            Change::Completed(node) => {
+                if let Some(output) = graph.output(node).cloned() {
+                    planner.completed(node, &output, &mut GraphEdit::new(graph))?;
+                }
+            }
+            Change::Failed(node) => {
+                if let Some(NodeState::Failed(reason)) = graph.state(node).cloned() {
+                    planner.failed(node, &reason, &mut GraphEdit::new(graph))?;
+                }
+            }
+        }
+    }
+    Ok(())
+}
+
+fn run_node(
+    graph: &Graph,
+    node: NodeId,
+    registry: &Registry,
+    decoded: &Arc<DecodedCache>,
+) -> Result<Blob, NodeFailure> {
+    let missing = || NodeFailure::new("its inputs are not there, though it was ready: a mistake in the job graph");
+    let spec = graph.spec(node).ok_or_else(missing)?;
+    let inputs = graph.input_blobs(node).ok_or_else(missing)?;
+    registry.run(&spec.kind, &spec.parameters, &inputs, &RunContext::new(Arc::clone(decoded)))
+}

@@ -1,0 +1,89 @@
+//! Node types by name: a new kind of node is one implementation and one `with`.
+
+use std::any::Any;
+use std::collections::BTreeMap;
+use std::fmt;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Arc;
+
+use super::{Blob, MAX_BLOB_BYTES, NodeFailure, RunContext};
+
+/// One kind of node: a pure function from parameters and input blobs to output bytes.
+///
+/// Pure means bit for bit: the same parameters and inputs give the same bytes on any machine, with any number of
+/// threads, in any order. Results of two workers are compared, and a difference ends the run.
+pub trait NodeType: Send + Sync {
+    /// The name by which specifications pick this type; at most [`MAX_NAME_BYTES`](super::MAX_NAME_BYTES).
+    fn kind(&self) -> &'static str;
+
+    /// Compute the output, at most [`MAX_BLOB_BYTES`] long. Runs on a rayon pool, so parallel iterators use its threads.
+    ///
+    /// # Errors
+    /// What makes an output impossible. It is shown to the user and never retried.
+    fn run(&self, parameters: &[u8], inputs: &[Blob], context: &RunContext) -> Result<Vec<u8>, NodeFailure>;
+}
+
+/// The node types that a process can run. Coordinator and workers of a run hold the same ones.
+#[derive(Clone, Default)]
+pub struct Registry {
+    types: BTreeMap<&'static str, Arc<dyn NodeType>>,
+}
+
+impl Registry {
+    /// This registry with one more node type.
+    ///
+    /// # Panics
+    /// When its kind is taken: two meanings of one name are a mistake in the program, not in its input.
+    #[must_use]
+    pub fn with(mut self, node_type: impl NodeType + 'static) -> Self {
+        let kind = node_type.kind();
+        let replaced = self.types.insert(kind, Arc::new(node_type));
+        assert!(replaced.is_none(), "two node types are named {kind:?}");
+        self
+    }
+
+    /// The known kinds, in alphabetical order.
+    pub fn kinds(&self) -> impl Iterator<Item = &'static str> {
+        self.types.keys().copied()
+    }
+
+    /// Run one node and hash its output. A panic of the node becomes a failure: the process goes on.
+    ///
+    /// # Errors
+    /// What the node says; an unknown kind; a panic; an output beyond [`MAX_BLOB_BYTES`].
+    pub fn run(
+        &self,
+        kind: &str,
+        parameters: &[u8],
+        inputs: &[Blob],
+        context: &RunContext,
+    ) -> Result<Blob, NodeFailure> {
+        let Some(node_type) = self.types.get(kind) else {
+            let known: Vec<_> = self.kinds().collect();
+            return Err(NodeFailure::new(format!(
+                "unknown node kind {kind:?}, this process knows {known:?}; use the same build everywhere"
+            )));
+        };
+        // Unwind safety: a node only reads its arguments, and the context holds atomics and a cache that survives panics.
+        let output = catch_unwind(AssertUnwindSafe(|| node_type.run(parameters, inputs, context)))
+            .unwrap_or_else(|panic| Err(NodeFailure::new(format!("panicked: {}", panic_text(&*panic)))))?;
+        if output.len() > MAX_BLOB_BYTES {
+            let found = output.len();
+            return Err(NodeFailure::new(format!(
+                "expected an output of at most {MAX_BLOB_BYTES} bytes, found {found}; split the node into shards"
+            )));
+        }
+        Ok(Blob::new(output))
+    }
+}
+
+impl fmt::Debug for Registry {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.debug_set().entries(self.kinds()).finish()
+    }
+}
+
+fn panic_text(panic: &(dyn Any + Send)) -> &str {
+    let literal = panic.downcast_ref::<&str>().copied();
+    literal.or_else(|| panic.downcast_ref::<String>().map(String::as_str)).unwrap_or("no message")
+}

@@ -1,0 +1,142 @@
+//! The access file: what a worker has to know to join a run. Only who can read it can join.
+//!
+//! ```json
+//! { "address": "127.0.0.1:45123", "certificate": null, "secret": "64 hexadecimal digits" }
+//! ```
+
+use std::fmt;
+
+use serde::{Deserialize, Serialize};
+use subtle::ConstantTimeEq;
+use thiserror::Error;
+
+/// The secret of a run: 32 random bytes. Compared in constant time, never printed.
+#[derive(Clone)]
+pub struct Secret([u8; 32]);
+
+impl Secret {
+    /// A secret of these bytes, which must come from the operating system's random source.
+    #[must_use]
+    pub fn from_bytes(bytes: [u8; 32]) -> Self {
+        Self(bytes)
+    }
+
+    /// The BLAKE3 keyed hash of `message` under this secret.
+    pub(super) fn keyed_hash(&self, message: &[u8]) -> [u8; 32] {
+        *blake3::keyed_hash(&self.0, message).as_bytes()
+    }
+
+    fn from_hex(digits: &str) -> Option<Self> {
+        let mut bytes = [0; 32];
+        let pairs = digits.as_bytes().chunks_exact(2);
+        if digits.len() != 64 {
+            return None;
+        }
+        for (byte, pair) in bytes.iter_mut().zip(pairs) {
+            let [high, low] = [pair[0], pair[1]].map(|digit| char::from(digit).to_digit(16));
+            *byte = u8::try_from(high? * 16 + low?).ok()?;
+        }
+        Some(Self(bytes))
+    }
+
+    fn to_hex(&self) -> String {
+        self.0.iter().map(|byte| format!("{byte:02x}")).collect()
+    }
+}
+
+/// Does not show the secret.
+impl fmt::Debug for Secret {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str("Secret(..)")
+    }
+}
+
+impl PartialEq for Secret {
+    fn eq(&self, other: &Self) -> bool {
+        self.0.ct_eq(&other.0).into()
+    }
+}
+
+impl Eq for Secret {}
+
+/// What an access file says.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Access {
+    /// Where the coordinator listens, as `HOST:PORT`.
+    pub address: String,
+    /// The coordinator's certificate (PEM), to be pinned; `None` without TLS.
+    pub certificate: Option<String>,
+    /// The secret.
+    pub secret: Secret,
+}
+
+/// Text that is no access file.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[non_exhaustive]
+pub enum AccessError {
+    /// The text is not the expected JSON.
+    #[error("expected JSON with \"address\", \"certificate\" and \"secret\": {0}")]
+    Json(String),
+    /// The secret is not 32 bytes in hexadecimal. It is not repeated here.
+    #[error(
+        "expected a \"secret\" of 64 hexadecimal digits, found {found} characters or other signs; copy the file again"
+    )]
+    Secret {
+        /// How many characters there are.
+        found: usize,
+    },
+    /// The address has no port.
+    #[error("expected an \"address\" of the form HOST:PORT, found {found:?}")]
+    Address {
+        /// What there is.
+        found: String,
+    },
+    /// The file asks for TLS.
+    #[error("the file names a certificate, but this version does not speak TLS; use the coordinator's own version")]
+    CertificateNotSupported,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct AccessFile {
+    address: String,
+    certificate: Option<String>,
+    secret: String,
+}
+
+impl Access {
+    /// Parse the text of an access file.
+    ///
+    /// # Errors
+    /// When it is not one, or names a certificate: to ignore that would be to trust a connection that should be verified.
+    pub fn parse(text: &str) -> Result<Self, AccessError> {
+        let file: AccessFile = serde_json::from_str(text).map_err(|error| AccessError::Json(without_values(&error)))?;
+        let secret =
+            Secret::from_hex(&file.secret).ok_or(AccessError::Secret { found: file.secret.chars().count() })?;
+        let port = file.address.rsplit_once(':').and_then(|(_, port)| port.parse::<u16>().ok());
+        if port.is_none() {
+            return Err(AccessError::Address { found: file.address });
+        }
+        if file.certificate.is_some() {
+            return Err(AccessError::CertificateNotSupported);
+        }
+        Ok(Self { address: file.address, certificate: file.certificate, secret })
+    }
+
+    /// The text of the access file.
+    #[must_use]
+    pub fn to_json(&self) -> String {
+        let file = AccessFile {
+            address: self.address.clone(),
+            certificate: self.certificate.clone(),
+            secret: self.secret.to_hex(),
+        };
+        // Three strings always have a JSON form.
+        serde_json::to_string_pretty(&file).unwrap_or_default() + "\n"
+    }
+}
+
+/// Where and of what kind an error is, without serde's quotation of the text: that might be the secret.
+fn without_values(error: &serde_json::Error) -> String {
+    format!("{:?} error in line {}, column {}", error.classify(), error.line(), error.column()).to_lowercase()
+}

@@ -1,0 +1,115 @@
+//! Frames: how a stream of bytes is cut into messages and parts of blobs.
+//!
+//! ```text
+//!   length: u32, little-endian, of what follows    tag: u8    body: length - 1 bytes
+//! ```
+
+use thiserror::Error;
+
+/// The largest `length` of a frame, tag included (2 MiB): a node's parameters (1 MiB) with 4096 inputs, or a part of a
+/// blob (1 MiB). Large blobs travel in many parts, so that no frame is large, a heartbeat never waits long behind one,
+/// and a stranger can make nobody allocate more than this.
+pub const MAX_FRAME_BYTES: usize = 2 << 20;
+
+/// Length and tag.
+const HEADER_BYTES: usize = 5;
+
+/// What a frame holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FrameTag {
+    /// An encoded message.
+    Message = 0,
+    /// Raw bytes of the blob that the last message announced.
+    Part = 1,
+}
+
+/// One frame.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Frame {
+    /// What the body is.
+    pub tag: FrameTag,
+    /// The body: at most [`MAX_FRAME_BYTES`] - 1 bytes.
+    pub body: Vec<u8>,
+}
+
+/// Bytes that are no frame. The stream cannot be read on from there.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[non_exhaustive]
+pub enum FrameError {
+    /// The announced length is out of range.
+    #[error("expected a frame of 1 to {MAX_FRAME_BYTES} bytes, found {found}")]
+    Length {
+        /// The announced length.
+        found: usize,
+    },
+    /// The tag is none of ours.
+    #[error("expected frame tag 0 or 1, found {found}")]
+    Tag {
+        /// The tag.
+        found: u8,
+    },
+}
+
+/// The bytes that go before a body of this length.
+///
+/// # Errors
+/// When the body does not fit into a frame.
+pub fn frame_header(tag: FrameTag, body_bytes: usize) -> Result<[u8; HEADER_BYTES], FrameError> {
+    let too_long = FrameError::Length { found: body_bytes.saturating_add(1) };
+    if body_bytes >= MAX_FRAME_BYTES {
+        return Err(too_long);
+    }
+    let [a, b, c, d] = u32::try_from(body_bytes + 1).map_err(|_| too_long)?.to_le_bytes();
+    Ok([a, b, c, d, tag as u8])
+}
+
+/// Cuts a stream of bytes into frames; holds at most one incomplete frame and what was pushed last.
+#[derive(Debug, Default)]
+pub struct FrameReader {
+    buffer: Vec<u8>,
+    /// How much of the buffer has been given out.
+    consumed: usize,
+}
+
+impl FrameReader {
+    /// Take more bytes of the stream.
+    pub fn push(&mut self, bytes: &[u8]) {
+        self.buffer.drain(..self.consumed);
+        self.consumed = 0;
+        self.buffer.extend_from_slice(bytes);
+    }
+
+    /// The next complete frame; `None` when more bytes are needed. Call it until `None` before the next [`push`](Self::push).
+    ///
+    /// # Errors
+    /// When the header is not valid, as soon as it is there and before the body is waited for. The same error comes again
+    /// on every further call.
+    pub fn next_frame(&mut self) -> Result<Option<Frame>, FrameError> {
+        let unread = &self.buffer[self.consumed..];
+        let Some((header, rest)) = unread.split_first_chunk::<HEADER_BYTES>() else {
+            return Ok(None);
+        };
+        let [a, b, c, d, tag] = *header;
+        let length = usize::try_from(u32::from_le_bytes([a, b, c, d])).unwrap_or(usize::MAX);
+        if !(1..=MAX_FRAME_BYTES).contains(&length) {
+            return Err(FrameError::Length { found: length });
+        }
+        let tag = match tag {
+            0 => FrameTag::Message,
+            1 => FrameTag::Part,
+            found => return Err(FrameError::Tag { found }),
+        };
+        let Some(body) = rest.get(..length - 1) else {
+            return Ok(None);
+        };
+        let body = body.to_vec();
+        self.consumed += HEADER_BYTES + body.len();
+        Ok(Some(Frame { tag, body }))
+    }
+
+    /// Whether the stream may end here: no frame is half read.
+    #[must_use]
+    pub fn is_between_frames(&self) -> bool {
+        self.consumed == self.buffer.len()
+    }
+}

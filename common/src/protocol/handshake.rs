@@ -1,0 +1,239 @@
+//! The preamble: who speaks what, and whether both know the secret.
+//!
+//! ```text
+//!   coordinator -> worker   Challenge   magic 8, version 2, zero 2, nonce 32                       44 bytes
+//!   worker -> coordinator   Response    magic 8, version 2, zero 2, nonce 32, proof 32             76 bytes
+//!   coordinator -> worker   Verdict     magic 8, version 2, refusal 1, zero 1, proof 32            44 bytes
+//! ```
+//! Integers are little-endian. A proof is BLAKE3 keyed with the secret, over the role's label and both nonces: neither side
+//! shows the secret, neither can replay a proof or send the other's back, and a worker takes no orders from an impostor.
+//! Proofs are compared in constant time. Fixed lengths, parsed by hand: nothing here allocates.
+
+use subtle::ConstantTimeEq;
+use thiserror::Error;
+
+use super::access::Secret;
+use super::version::{MAGIC, PROTOCOL_VERSION};
+
+/// The length of a [`Challenge`].
+pub const CHALLENGE_BYTES: usize = 44;
+/// The length of a [`Response`].
+pub const RESPONSE_BYTES: usize = 76;
+/// The length of a [`Verdict`].
+pub const VERDICT_BYTES: usize = 44;
+
+/// 32 bytes from the operating system's random source, used once.
+pub type Nonce = [u8; 32];
+
+const WORKER_LABEL: &[u8] = b"lookalike worker proof";
+const COORDINATOR_LABEL: &[u8] = b"lookalike coordinator proof";
+
+/// A handshake that failed. Trying again does not help.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[non_exhaustive]
+pub enum HandshakeError {
+    /// The other side is no Lookalike.
+    #[error("expected the greeting of a lookalike coordinator or worker, found something else; is the address right?")]
+    Magic,
+    /// The other side speaks another version.
+    #[error("expected protocol version {expected}, found {found}; use the same build of coordinator and worker")]
+    Version {
+        /// Our version.
+        expected: u16,
+        /// Theirs.
+        found: u16,
+    },
+    /// The coordinator refuses this worker.
+    #[error("the coordinator refuses this worker: {0}")]
+    Refused(Refusal),
+    /// The coordinator does not know the secret: it is not the one that wrote the access file.
+    #[error("the coordinator does not know the secret of the access file; is the file from an older run?")]
+    Impostor,
+    /// A refusal of unknown meaning.
+    #[error("expected a verdict of 0 to 2, found {found}")]
+    Verdict {
+        /// The byte that came.
+        found: u8,
+    },
+}
+
+/// Why a coordinator refuses a worker.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
+pub enum Refusal {
+    /// The worker's proof is wrong.
+    #[error("wrong secret; is the access file from an older run?")]
+    WrongSecret,
+    /// The worker speaks another version.
+    #[error("it speaks another protocol version; use the same build of coordinator and worker")]
+    WrongVersion,
+}
+
+/// The coordinator's first bytes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Challenge {
+    /// What the coordinator speaks.
+    pub version: u16,
+    /// To be proved upon.
+    pub nonce: Nonce,
+}
+
+/// The worker's answer to a [`Challenge`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Response {
+    /// What the worker speaks.
+    pub version: u16,
+    /// To be proved upon by the coordinator.
+    pub nonce: Nonce,
+    /// Shows that the worker knows the secret.
+    pub proof: [u8; 32],
+}
+
+/// The coordinator's answer to a [`Response`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Verdict {
+    /// What the coordinator speaks.
+    pub version: u16,
+    /// `None`: welcome.
+    pub refusal: Option<Refusal>,
+    /// Shows that the coordinator knows the secret; all zero in a refusal, so that a stranger gets nothing to compare.
+    pub proof: [u8; 32],
+}
+
+impl Challenge {
+    /// The challenge of this build.
+    #[must_use]
+    pub fn new(nonce: Nonce) -> Self {
+        Self { version: PROTOCOL_VERSION, nonce }
+    }
+
+    /// As bytes.
+    #[must_use]
+    pub fn to_bytes(&self) -> [u8; CHALLENGE_BYTES] {
+        let mut bytes = [0; CHALLENGE_BYTES];
+        put(&mut bytes, &[&MAGIC, &self.version.to_le_bytes(), &[0; 2], &self.nonce]);
+        bytes
+    }
+
+    /// From bytes.
+    ///
+    /// # Errors
+    /// When they are not a Lookalike's. A strange version is not an error here.
+    pub fn from_bytes(bytes: &[u8; CHALLENGE_BYTES]) -> Result<Self, HandshakeError> {
+        Ok(Self { version: version_of(bytes)?, nonce: take(bytes, 12) })
+    }
+
+    /// The worker's answer.
+    ///
+    /// # Errors
+    /// When the coordinator speaks another version.
+    pub fn answer(&self, secret: &Secret, nonce: Nonce) -> Result<Response, HandshakeError> {
+        check_version(self.version)?;
+        Ok(Response { version: PROTOCOL_VERSION, nonce, proof: proof(secret, WORKER_LABEL, &self.nonce, &nonce) })
+    }
+}
+
+impl Response {
+    /// As bytes.
+    #[must_use]
+    pub fn to_bytes(&self) -> [u8; RESPONSE_BYTES] {
+        let mut bytes = [0; RESPONSE_BYTES];
+        put(&mut bytes, &[&MAGIC, &self.version.to_le_bytes(), &[0; 2], &self.nonce, &self.proof]);
+        bytes
+    }
+
+    /// From bytes.
+    ///
+    /// # Errors
+    /// When they are not a Lookalike's. A strange version is not an error here.
+    pub fn from_bytes(bytes: &[u8; RESPONSE_BYTES]) -> Result<Self, HandshakeError> {
+        Ok(Self { version: version_of(bytes)?, nonce: take(bytes, 12), proof: take(bytes, 44) })
+    }
+
+    /// The coordinator's verdict on this answer to `challenge`.
+    #[must_use]
+    pub fn judge(&self, challenge: &Challenge, secret: &Secret) -> Verdict {
+        let expected = proof(secret, WORKER_LABEL, &challenge.nonce, &self.nonce);
+        let refusal = if self.version != PROTOCOL_VERSION {
+            Some(Refusal::WrongVersion)
+        } else if !bool::from(self.proof.ct_eq(&expected)) {
+            Some(Refusal::WrongSecret)
+        } else {
+            None
+        };
+        let own_proof = proof(secret, COORDINATOR_LABEL, &challenge.nonce, &self.nonce);
+        let proof = if refusal.is_none() { own_proof } else { [0; 32] };
+        Verdict { version: PROTOCOL_VERSION, refusal, proof }
+    }
+}
+
+impl Verdict {
+    /// As bytes.
+    #[must_use]
+    pub fn to_bytes(&self) -> [u8; VERDICT_BYTES] {
+        let refusal = match self.refusal {
+            None => 0,
+            Some(Refusal::WrongSecret) => 1,
+            Some(Refusal::WrongVersion) => 2,
+        };
+        let mut bytes = [0; VERDICT_BYTES];
+        put(&mut bytes, &[&MAGIC, &self.version.to_le_bytes(), &[refusal, 0], &self.proof]);
+        bytes
+    }
+
+    /// From bytes.
+    ///
+    /// # Errors
+    /// When they are not a Lookalike's.
+    pub fn from_bytes(bytes: &[u8; VERDICT_BYTES]) -> Result<Self, HandshakeError> {
+        let version = version_of(bytes)?;
+        let refusal = match bytes[10] {
+            0 => None,
+            1 => Some(Refusal::WrongSecret),
+            2 => Some(Refusal::WrongVersion),
+            found => return Err(HandshakeError::Verdict { found }),
+        };
+        Ok(Self { version, refusal, proof: take(bytes, 12) })
+    }
+
+    /// Whether the worker may go on: it is welcome, and the coordinator is the one that wrote the access file.
+    ///
+    /// # Errors
+    /// When it may not.
+    pub fn check(&self, challenge: &Challenge, response: &Response, secret: &Secret) -> Result<(), HandshakeError> {
+        check_version(self.version)?;
+        if let Some(refusal) = self.refusal {
+            return Err(HandshakeError::Refused(refusal));
+        }
+        let expected = proof(secret, COORDINATOR_LABEL, &challenge.nonce, &response.nonce);
+        if bool::from(self.proof.ct_eq(&expected)) { Ok(()) } else { Err(HandshakeError::Impostor) }
+    }
+}
+
+fn proof(secret: &Secret, label: &[u8], challenge: &Nonce, response: &Nonce) -> [u8; 32] {
+    // Unambiguous without separators: the label is one of two constants, the nonces have fixed lengths.
+    secret.keyed_hash(&[label, challenge, response].concat())
+}
+
+fn check_version(found: u16) -> Result<(), HandshakeError> {
+    let expected = PROTOCOL_VERSION;
+    if found == expected { Ok(()) } else { Err(HandshakeError::Version { expected, found }) }
+}
+
+fn version_of(bytes: &[u8]) -> Result<u16, HandshakeError> {
+    if bytes.starts_with(&MAGIC) { Ok(u16::from_le_bytes(take(bytes, 8))) } else { Err(HandshakeError::Magic) }
+}
+
+/// Fill `bytes` with the fields one after the other; the callers' lengths add up.
+fn put(bytes: &mut [u8], fields: &[&[u8]]) {
+    let mut rest = bytes;
+    for field in fields {
+        let (place, behind) = rest.split_at_mut(field.len());
+        place.copy_from_slice(field);
+        rest = behind;
+    }
+}
+
+/// The field of `N` bytes at `offset`, which the callers keep inside.
+fn take<const N: usize>(bytes: &[u8], offset: usize) -> [u8; N] {
+    std::array::from_fn(|index| bytes[offset + index])
+}

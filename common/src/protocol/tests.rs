@@ -1,0 +1,259 @@
+use serde::{Deserialize, Serialize};
+
+use super::*;
+use crate::graph::{BlobHash, MAX_BLOB_BYTES};
+
+const LEASE: LeaseName = LeaseName { node: 300, attempt: 2, epoch: 1 };
+
+fn to_worker() -> Vec<ToWorker> {
+    let welcome = Welcome { worker: 7, run: RunName([9; 16]), epoch: 1, heartbeat_ms: 1000 };
+    let assignment = Assignment {
+        lease: LEASE,
+        kind: "search".into(),
+        label: "search gamma 1.3".into(),
+        parameters: vec![1, 2, 255],
+        inputs: vec![[5; 32]],
+    };
+    vec![
+        ToWorker::Welcome(welcome),
+        ToWorker::Assign(assignment),
+        ToWorker::Cancel(LEASE),
+        ToWorker::Blob { hash: [5; 32], length: 70_000 },
+        ToWorker::Acknowledge(LEASE),
+        ToWorker::Stop { reason: "the run is over".into() },
+    ]
+}
+
+fn to_coordinator() -> Vec<ToCoordinator> {
+    vec![
+        ToCoordinator::Hello(Hello { build: "0.1.0".into(), threads: 4, process: 4711 }),
+        ToCoordinator::Heartbeat { executing: vec![Executing { lease: LEASE, permille: 500 }] },
+        ToCoordinator::Started(LEASE),
+        ToCoordinator::Fetch { hash: [5; 32] },
+        ToCoordinator::Finished { lease: LEASE, hash: [6; 32], length: 8 },
+        ToCoordinator::Failed { lease: LEASE, message: "no".into() },
+        ToCoordinator::Goodbye,
+    ]
+}
+
+fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+fn secret(byte: u8) -> Secret {
+    Secret::from_bytes([byte; 32])
+}
+
+#[test]
+fn message_bytes_belong_to_this_protocol_version() {
+    let encoded: Vec<u8> = to_worker()
+        .iter()
+        .map(|message| encode_message(message).unwrap())
+        .chain(to_coordinator().iter().map(|message| encode_message(message).unwrap()))
+        .flat_map(|bytes| [vec![u8::try_from(bytes.len()).unwrap()], bytes].concat())
+        .collect();
+    // When this fails the wire has changed: count PROTOCOL_VERSION up and write the new hash here.
+    let golden = (1, "358ab3808e1efd4f52ab34e7fdfb46eed2570b95311cad14c75073673fe2c919");
+    assert_eq!((PROTOCOL_VERSION, BlobHash::of(&encoded).to_string().as_str()), golden);
+}
+
+#[test]
+fn lease_and_hello_have_their_golden_bytes() {
+    let hello = ToCoordinator::Hello(Hello { build: "0.1.0".into(), threads: 4, process: 4711 });
+    // Variant 0; five characters; 4; 251 announces two bytes of 4711.
+    assert_eq!(hex(&encode_message(&hello).unwrap()), "0005302e312e3004fb6712");
+    assert_eq!(hex(&encode_message(&ToWorker::Cancel(LEASE)).unwrap()), "02fb2c010201");
+    assert_eq!(hex(&frame_header(FrameTag::Part, 259).unwrap()), "0401000001");
+}
+
+#[test]
+fn every_message_survives_the_wire_and_no_cut_one_is_accepted() {
+    fn check<T: Serialize + for<'de> Deserialize<'de> + PartialEq + std::fmt::Debug>(messages: Vec<T>) {
+        for message in messages {
+            let bytes = encode_message(&message).unwrap();
+            assert_eq!(decode_message::<T>(&bytes).unwrap(), message);
+            for cut in 0..bytes.len() {
+                assert!(decode_message::<T>(&bytes[..cut]).is_err(), "{message:?} cut to {cut} bytes");
+            }
+            let longer = [bytes.as_slice(), &[0]].concat();
+            assert!(matches!(decode_message::<T>(&longer), Err(CodecError::Trailing { .. })));
+        }
+    }
+    check(to_worker());
+    check(to_coordinator());
+}
+
+#[test]
+fn hostile_lengths_inside_a_message_are_refused_before_allocation() {
+    // `Stop` with a text of 2^64 - 1 bytes, `Assign` with as many parameters, an unknown variant.
+    for hostile in
+        [[vec![5, 253], vec![255; 8]].concat(), [vec![1, 1, 1, 1, 0, 0, 253], vec![255; 8]].concat(), vec![99], vec![]]
+    {
+        assert!(matches!(decode_message::<ToWorker>(&hostile), Err(CodecError::Decode { .. })), "{hostile:?}");
+    }
+    let long = ToWorker::Stop { reason: "x".repeat(MAX_FRAME_BYTES) };
+    assert!(matches!(encode_message(&long), Err(CodecError::TooLong { .. })));
+}
+
+#[test]
+fn payload_floats_keep_their_bits() {
+    let values = vec![0.1_f64, -0.0, f64::MIN_POSITIVE / 3.0, f64::INFINITY, f64::from_bits(0x7ff8_0000_dead_beef)];
+    let decoded: Vec<f64> = decode(&encode(&values).unwrap()).unwrap();
+    let bits = |values: &[f64]| values.iter().map(|value| value.to_bits()).collect::<Vec<_>>();
+    assert_eq!(bits(&decoded), bits(&values));
+}
+
+#[test]
+fn frames_are_found_however_the_stream_is_cut() {
+    let large = vec![3; MAX_FRAME_BYTES - 1];
+    let bodies: [(FrameTag, &[u8]); 4] =
+        [(FrameTag::Message, b"first"), (FrameTag::Part, b""), (FrameTag::Part, &large), (FrameTag::Message, b"last")];
+    let stream: Vec<u8> = bodies
+        .iter()
+        .flat_map(|(tag, body)| [frame_header(*tag, body.len()).unwrap().as_slice(), body].concat())
+        .collect();
+    for step in [1009, 65536, stream.len()] {
+        let mut reader = FrameReader::default();
+        let mut frames = Vec::new();
+        for piece in stream.chunks(step) {
+            reader.push(piece);
+            while let Some(frame) = reader.next_frame().unwrap() {
+                frames.push(frame);
+            }
+        }
+        let found: Vec<_> = frames.iter().map(|frame| (frame.tag, frame.body.as_slice())).collect();
+        assert!(found == bodies, "{} frames in steps of {step}", found.len());
+        assert!(reader.is_between_frames());
+    }
+}
+
+#[test]
+fn frame_of_bad_length_or_tag_is_refused_from_its_header_alone() {
+    let first = |bytes: &[u8]| {
+        let mut reader = FrameReader::default();
+        reader.push(bytes);
+        reader.next_frame()
+    };
+    assert_eq!(first(&[0, 0, 0, 0, 0]), Err(FrameError::Length { found: 0 }));
+    assert_eq!(first(&[1, 0, 0x20, 0, 0]), Err(FrameError::Length { found: MAX_FRAME_BYTES + 1 }));
+    assert_eq!(first(&[255; 5]), Err(FrameError::Length { found: u32::MAX as usize }));
+    assert_eq!(first(b"GET / HTTP/1.1"), Err(FrameError::Length { found: 0x2054_4547 }));
+    assert_eq!(first(&[1, 0, 0, 0, 2]), Err(FrameError::Tag { found: 2 }));
+    assert_eq!(first(&[0, 0, 0x20, 0]), Ok(None));
+    assert!(frame_header(FrameTag::Part, MAX_FRAME_BYTES).is_err());
+}
+
+#[test]
+fn both_sides_prove_the_secret_to_each_other() {
+    let challenge = Challenge::from_bytes(&Challenge::new([1; 32]).to_bytes()).unwrap();
+    let answer = challenge.answer(&secret(7), [2; 32]).unwrap();
+    let response = Response::from_bytes(&answer.to_bytes()).unwrap();
+    let verdict = Verdict::from_bytes(&response.judge(&challenge, &secret(7)).to_bytes()).unwrap();
+    assert_eq!(verdict.check(&challenge, &response, &secret(7)), Ok(()));
+    assert_ne!(verdict.proof, response.proof);
+    // An impostor accepts anyone, but cannot prove that it knows the secret.
+    assert_eq!(verdict.check(&challenge, &response, &secret(8)), Err(HandshakeError::Impostor));
+}
+
+#[test]
+fn wrong_secret_is_refused_without_a_proof() {
+    let challenge = Challenge::new([1; 32]);
+    let response = challenge.answer(&secret(8), [2; 32]).unwrap();
+    let verdict = response.judge(&challenge, &secret(7));
+    assert_eq!(verdict.proof, [0; 32]);
+    let verdict = Verdict::from_bytes(&verdict.to_bytes()).unwrap();
+    let refused = HandshakeError::Refused(Refusal::WrongSecret);
+    assert_eq!(verdict.check(&challenge, &response, &secret(8)), Err(refused));
+    // A proof for another challenge is worth nothing.
+    let replayed = Challenge::new([3; 32]).answer(&secret(7), [2; 32]).unwrap();
+    assert_eq!(replayed.judge(&challenge, &secret(7)).refusal, Some(Refusal::WrongSecret));
+}
+
+#[test]
+fn unknown_version_is_named_on_both_sides() {
+    let strange = Challenge { version: 9, nonce: [1; 32] };
+    let error = strange.answer(&secret(7), [2; 32]).unwrap_err();
+    assert_eq!(error, HandshakeError::Version { expected: PROTOCOL_VERSION, found: 9 });
+    let challenge = Challenge::new([1; 32]);
+    let mut response = challenge.answer(&secret(7), [2; 32]).unwrap();
+    response.version = 9;
+    assert_eq!(response.judge(&challenge, &secret(7)).refusal, Some(Refusal::WrongVersion));
+}
+
+#[test]
+fn preamble_has_its_golden_bytes_and_knows_strangers() {
+    let challenge = Challenge::new([1; 32]);
+    let ones = "01".repeat(32);
+    assert_eq!(hex(&challenge.to_bytes()), format!("4c4f4f4b4c494b4501000000{ones}"));
+    let response = challenge.answer(&secret(7), [2; 32]).unwrap();
+    let twos = "02".repeat(32);
+    let proof = "026986a53a89f7db2d00e0f9e731d1dffbb340e30c2ff1e74e03d5a6c17b3fa9";
+    assert_eq!(hex(&response.to_bytes()), format!("4c4f4f4b4c494b4501000000{twos}{proof}"));
+    assert_eq!(Challenge::from_bytes(&[b'H'; CHALLENGE_BYTES]), Err(HandshakeError::Magic));
+    assert_eq!(Response::from_bytes(&[0; RESPONSE_BYTES]), Err(HandshakeError::Magic));
+    let mut verdict = response.judge(&challenge, &secret(7)).to_bytes();
+    verdict[10] = 77;
+    assert_eq!(Verdict::from_bytes(&verdict), Err(HandshakeError::Verdict { found: 77 }));
+}
+
+#[test]
+fn blob_arrives_in_parts_and_is_verified() {
+    let bytes: Vec<u8> = (0..=250_u8).cycle().take(2 * PART_BYTES + 5).collect();
+    let mut incoming = IncomingBlob::begin(BlobHash::of(&bytes), bytes.len() as u64).unwrap();
+    assert_eq!(parts(&bytes).count(), 3);
+    for part in parts(&bytes) {
+        assert!(!incoming.is_complete());
+        incoming.push(part).unwrap();
+    }
+    assert_eq!(incoming.push(&[0]), Err(TransferError::Part { expected: 0, found: 1 }));
+    assert_eq!(incoming.finish().unwrap().hash(), BlobHash::of(&bytes));
+    assert!(IncomingBlob::begin(BlobHash::of(b""), 0).unwrap().finish().unwrap().is_empty());
+}
+
+#[test]
+fn transfer_of_wrong_length_or_content_is_refused() {
+    let hash = BlobHash::of(b"four");
+    let too_long = TransferError::TooLong { found: MAX_BLOB_BYTES as u64 + 1 };
+    assert_eq!(IncomingBlob::begin(hash, MAX_BLOB_BYTES as u64 + 1).unwrap_err(), too_long);
+    let mut incoming = IncomingBlob::begin(hash, 4).unwrap();
+    assert_eq!(incoming.push(b""), Err(TransferError::Part { expected: 4, found: 0 }));
+    assert_eq!(incoming.push(b"fives"), Err(TransferError::Part { expected: 4, found: 5 }));
+    incoming.push(b"for").unwrap();
+    assert!(incoming.finish().is_err());
+    let mut incoming = IncomingBlob::begin(hash, 4).unwrap();
+    incoming.push(b"Four").unwrap();
+    assert!(matches!(incoming.finish(), Err(TransferError::Hash(_))));
+}
+
+#[test]
+fn access_file_round_trips_and_hides_its_secret() {
+    let access = Access { address: "[::1]:4000".into(), certificate: None, secret: secret(0xab) };
+    assert_eq!(Access::parse(&access.to_json()).unwrap(), access);
+    assert!(access.to_json().contains(&"ab".repeat(32)));
+    assert!(!format!("{access:?}").contains("ab"));
+}
+
+#[test]
+fn bad_access_files_are_named_without_repeating_the_secret() {
+    let digits = "ab".repeat(32);
+    let file = |address: &str, certificate: &str, secret: &str| {
+        Access::parse(&format!(r#"{{"address": "{address}", "certificate": {certificate}, "secret": "{secret}"}}"#))
+    };
+    assert!(matches!(file("host", "null", &digits), Err(AccessError::Address { .. })));
+    assert!(matches!(file("host:70000", "null", &digits), Err(AccessError::Address { .. })));
+    assert_eq!(file("h:1", "null", "abc"), Err(AccessError::Secret { found: 3 }));
+    assert_eq!(file("h:1", "null", &"g".repeat(64)), Err(AccessError::Secret { found: 64 }));
+    assert_eq!(file("h:1", "\"pem\"", &digits), Err(AccessError::CertificateNotSupported));
+    let misplaced = Access::parse(&format!(r#"{{"address": "h:1", "certificate": null, "secret": ["{digits}"]}}"#));
+    assert!(!misplaced.unwrap_err().to_string().contains(&digits));
+    assert!(matches!(Access::parse("{"), Err(AccessError::Json(_))));
+}
+
+#[test]
+fn long_text_is_cut_at_a_character() {
+    let text = format!("a{}", "é".repeat(MAX_MESSAGE_TEXT_BYTES));
+    let cut = bounded_text(&text);
+    assert_eq!(cut.len(), MAX_MESSAGE_TEXT_BYTES - 1);
+    assert!(text.starts_with(&cut));
+    assert_eq!(bounded_text("short"), "short");
+}

@@ -1,0 +1,259 @@
+//! What the reactor says: to workers, to its own process, to people. It says it into an [`Outbox`]; who empties the outbox
+//! (the runner with its sockets, or a test) decides what that means.
+
+use std::fmt;
+use std::time::Duration;
+
+use lookalike::graph::{Blob, FailureReason, NodeId, WorkerId};
+
+/// A worker's permission, and duty, to execute a node.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Lease {
+    /// The node.
+    pub node: NodeId,
+    /// Counts the assignments of this node, from 1.
+    pub attempt: u32,
+    /// Counts the coordinator processes of this run, from 1.
+    pub epoch: u64,
+    /// When it ends, unless the worker is heard of before: time since the run began. Every sign of life of a worker renews
+    /// all its leases.
+    pub deadline: Duration,
+}
+
+/// One thing to do.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Action {
+    /// Send the node of this lease to the worker.
+    Assign {
+        /// The worker.
+        worker: WorkerId,
+        /// What it gets.
+        lease: Lease,
+    },
+    /// Tell the worker that the output of this lease is not wanted any more.
+    Cancel {
+        /// The worker.
+        worker: WorkerId,
+        /// The lease that has ended.
+        lease: Lease,
+    },
+    /// Send a blob that the worker asked for.
+    SendBlob {
+        /// The worker.
+        worker: WorkerId,
+        /// The blob.
+        blob: Blob,
+    },
+    /// Tell the worker that its answer has arrived.
+    Acknowledge {
+        /// The worker.
+        worker: WorkerId,
+        /// The node it answered for.
+        node: NodeId,
+        /// The attempt it answered for.
+        attempt: u32,
+    },
+    /// Close the connection of this worker; it is no member any more.
+    Drop {
+        /// The worker.
+        worker: WorkerId,
+    },
+    /// Run this node in the coordinator's own process.
+    RunHere {
+        /// The node.
+        node: NodeId,
+        /// The attempt to answer for.
+        attempt: u32,
+    },
+    /// Tell the user.
+    Tell(RunEvent),
+}
+
+/// Why a worker is no member any more.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Departure {
+    /// Its connection ended without a word: the process died, or the network broke.
+    Lost,
+    /// It was not heard of for too long.
+    Silent,
+    /// It said goodbye: somebody asked it to end.
+    Goodbye,
+    /// It broke the protocol.
+    Violation(String),
+}
+
+impl Departure {
+    /// Whether the nodes that the worker executed may have caused it.
+    #[must_use]
+    pub fn is_suspicious(&self) -> bool {
+        match self {
+            Self::Lost | Self::Violation(_) => true,
+            Self::Silent | Self::Goodbye => false,
+        }
+    }
+}
+
+impl fmt::Display for Departure {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Lost => formatter.write_str("its connection ended"),
+            Self::Silent => formatter.write_str("it was not heard of for too long"),
+            Self::Goodbye => formatter.write_str("it was asked to end"),
+            Self::Violation(what) => write!(formatter, "it broke the protocol: {what}"),
+        }
+    }
+}
+
+/// Where a node runs or ran.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Site {
+    /// On a worker.
+    Worker(WorkerId),
+    /// In the coordinator's own process.
+    Coordinator,
+}
+
+impl fmt::Display for Site {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Worker(worker) => worker.fmt(formatter),
+            Self::Coordinator => formatter.write_str("the coordinator"),
+        }
+    }
+}
+
+/// A node, as the user knows it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct NodeName {
+    /// Its number.
+    pub node: NodeId,
+    /// Its kind.
+    pub kind: String,
+    /// Its label.
+    pub label: String,
+}
+
+impl fmt::Display for NodeName {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(formatter, "{} {:?}", self.kind, self.label)
+    }
+}
+
+/// What the user may want to know while a run goes on.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum RunEvent {
+    /// The coordinator listens.
+    Listening {
+        /// What the access file tells the workers.
+        address: String,
+    },
+    /// A worker has joined.
+    WorkerJoined {
+        /// Its number.
+        worker: WorkerId,
+        /// How many nodes it executes at a time.
+        threads: usize,
+        /// Its process id on its own machine.
+        process: u32,
+    },
+    /// A worker is no member any more.
+    WorkerLeft {
+        /// Its number.
+        worker: WorkerId,
+        /// Why.
+        departure: Departure,
+    },
+    /// A local worker process ended by itself.
+    LocalWorkerEnded {
+        /// Its process id.
+        process: u32,
+        /// How it ended.
+        status: String,
+        /// After how long it is started again; `None`: not any more.
+        restart_after: Option<Duration>,
+    },
+    /// There is work but no worker.
+    WaitingForWorkers {
+        /// How long it has been so.
+        waited: Duration,
+        /// How long it may be so.
+        limit: Duration,
+    },
+    /// The planner has added a node.
+    NodeAdded {
+        /// The node.
+        name: NodeName,
+    },
+    /// A node begins to run.
+    NodeStarted {
+        /// The node.
+        name: NodeName,
+        /// Where.
+        site: Site,
+    },
+    /// How much of a running node is done, as far as it says; about once a second.
+    NodeProgress {
+        /// The node.
+        node: NodeId,
+        /// In thousandths.
+        permille: u16,
+    },
+    /// A node has its output.
+    NodeFinished {
+        /// The node.
+        name: NodeName,
+        /// Where it ran.
+        site: Site,
+        /// The size of the output in bytes.
+        bytes: usize,
+        /// The time from its start to the arrival of the output.
+        elapsed: Duration,
+    },
+    /// A node has failed.
+    NodeFailed {
+        /// The node.
+        name: NodeName,
+        /// Why.
+        reason: FailureReason,
+    },
+    /// A node has lost its worker and waits for another one.
+    NodeRequeued {
+        /// The node.
+        name: NodeName,
+        /// The worker it has lost.
+        worker: WorkerId,
+        /// How many workers have died while they executed it.
+        crashes: u32,
+    },
+    /// A blob goes to a worker.
+    BlobSent {
+        /// The worker.
+        worker: WorkerId,
+        /// Its size in bytes.
+        bytes: usize,
+    },
+}
+
+/// What the reactor has said and nobody has done yet, in order.
+#[derive(Debug, Default)]
+pub struct Outbox {
+    actions: Vec<Action>,
+}
+
+impl Outbox {
+    /// Add something to do.
+    pub fn push(&mut self, action: Action) {
+        self.actions.push(action);
+    }
+
+    /// Add something to tell the user.
+    pub fn tell(&mut self, event: RunEvent) {
+        self.push(Action::Tell(event));
+    }
+
+    /// Take all there is to do, in order.
+    pub fn take(&mut self) -> Vec<Action> {
+        std::mem::take(&mut self.actions)
+    }
+}

@@ -1,0 +1,366 @@
+//! Scenarios: events in, recorded actions out. No sockets, no waiting, no time but the one we set.
+
+use std::time::Duration;
+
+use lookalike::graph::{
+    Blob, BlobHash, FailureReason, GraphEdit, Input, NodeFailure, NodeId, NodeSpec, Placement, PlanError, Planner,
+    WorkerId,
+};
+
+use super::{Event, handle, start};
+use crate::comm::{Action, Departure, Outbox, RunEvent, Site};
+use crate::core::{Core, Policy};
+use crate::runner::RunError;
+
+const A: WorkerId = WorkerId(1);
+const B: WorkerId = WorkerId(2);
+
+/// A plan that is known beforehand, and what its planner was told.
+#[derive(Default)]
+pub(super) struct Script {
+    pub(super) nodes: Vec<NodeSpec>,
+    pub(super) blob: Vec<u8>,
+    /// Added once node 0 is complete.
+    pub(super) follow_up: Option<NodeSpec>,
+    pub(super) tolerates_failures: bool,
+    pub(super) completed: Vec<NodeId>,
+    pub(super) failed: Vec<(NodeId, FailureReason)>,
+}
+
+impl Planner for Script {
+    fn start(&mut self, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
+        graph.add_blob(self.blob.clone())?;
+        self.nodes.iter().try_for_each(|spec| graph.add_node(spec.clone()).map(|_| ()))
+    }
+
+    fn completed(&mut self, node: NodeId, _: &Blob, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
+        self.completed.push(node);
+        if node == NodeId(0) {
+            self.follow_up.take().map(|spec| graph.add_node(spec)).transpose()?;
+        }
+        Ok(())
+    }
+
+    fn failed(&mut self, node: NodeId, reason: &FailureReason, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
+        self.failed.push((node, reason.clone()));
+        let (kind, label) = graph.spec(node).map(|spec| (spec.kind.clone(), spec.label.clone())).unwrap();
+        let error = PlanError::NodeFailed { kind, label, reason: reason.clone() };
+        if self.tolerates_failures { Ok(()) } else { Err(error) }
+    }
+}
+
+pub(super) fn node(label: &str, inputs: Vec<Input>, placement: Placement) -> NodeSpec {
+    NodeSpec { kind: "test".into(), label: label.into(), parameters: vec![], inputs, placement }
+}
+
+fn independent(count: usize) -> Script {
+    let nodes = (0..count).map(|index| node(&format!("n{index}"), vec![], Placement::Worker)).collect();
+    Script { nodes, ..Script::default() }
+}
+
+/// The state under test, with a clock that stands still unless moved.
+struct Bench {
+    core: Core,
+    planner: Script,
+    outbox: Outbox,
+    now: Duration,
+}
+
+impl Bench {
+    fn new(planner: Script) -> Self {
+        let core = Core::new(Policy::default(), 1);
+        let mut bench = Self { core, planner, outbox: Outbox::default(), now: Duration::ZERO };
+        start(&mut bench.core, &mut bench.planner, bench.now, &mut bench.outbox).unwrap();
+        bench
+    }
+
+    fn try_handle(&mut self, event: Event) -> Result<Vec<String>, RunError> {
+        let outcome = handle(&mut self.core, &mut self.planner, event, self.now, &mut self.outbox);
+        let said = self.outbox.take().iter().filter_map(line).collect();
+        outcome.map(|()| said)
+    }
+
+    fn handle(&mut self, event: Event) -> Vec<String> {
+        self.try_handle(event).unwrap()
+    }
+
+    fn join(&mut self, worker: WorkerId, threads: usize) -> Vec<String> {
+        self.handle(Event::WorkerJoined { worker, threads, process: 0 })
+    }
+
+    fn start(&mut self, worker: WorkerId, node: u64, attempt: u32) -> Vec<String> {
+        self.handle(Event::Started { worker, node: NodeId(node), attempt })
+    }
+
+    fn finish(&mut self, worker: WorkerId, node: u64, attempt: u32, byte: u8) -> Vec<String> {
+        self.handle(finished(Site::Worker(worker), node, attempt, byte))
+    }
+
+    fn lose(&mut self, worker: WorkerId, departure: Departure) -> Vec<String> {
+        self.handle(Event::WorkerLeft { worker, departure })
+    }
+
+    fn pass_time(&mut self, seconds: u64) -> Result<Vec<String>, RunError> {
+        self.now += Duration::from_secs(seconds);
+        self.try_handle(Event::DeadlinePassed)
+    }
+}
+
+fn finished(site: Site, node: u64, attempt: u32, byte: u8) -> Event {
+    Event::Finished { site, node: NodeId(node), attempt, output: Blob::new(vec![byte]) }
+}
+
+/// What matters of an action, in a few words: leases as `node.attempt`.
+fn line(action: &Action) -> Option<String> {
+    Some(match action {
+        Action::Assign { worker, lease } => format!("{worker} gets {}.{}", lease.node.0, lease.attempt),
+        Action::Cancel { worker, lease } => format!("{worker} drops {}.{}", lease.node.0, lease.attempt),
+        Action::Acknowledge { worker, node, attempt } => format!("{worker} is thanked for {}.{attempt}", node.0),
+        Action::SendBlob { worker, blob } => format!("{worker} gets {} bytes", blob.len()),
+        Action::Drop { worker } => format!("{worker} is thrown out"),
+        Action::RunHere { node, attempt } => format!("run {}.{attempt} here", node.0),
+        Action::Tell(RunEvent::NodeFailed { name, reason }) => format!("{} failed: {reason}", name.label),
+        Action::Tell(RunEvent::NodeRequeued { name, crashes, .. }) => format!("{} requeued, {crashes}", name.label),
+        Action::Tell(RunEvent::WaitingForWorkers { waited, .. }) => format!("waiting since {} s", waited.as_secs()),
+        Action::Tell(_) => return None,
+    })
+}
+
+#[test]
+fn nodes_fan_out_to_the_least_busy_worker_earliest_first() {
+    let mut bench = Bench::new(independent(6));
+    let first = bench.join(A, 1);
+    assert_eq!(first, ["worker 1 gets 0.1", "worker 1 gets 1.1", "worker 1 gets 2.1"]);
+    let second = bench.join(B, 2);
+    assert_eq!(second, ["worker 2 gets 3.1", "worker 2 gets 4.1", "worker 2 gets 5.1"]);
+    assert_eq!(bench.finish(A, 0, 1, 0), ["worker 1 is thanked for 0.1"]);
+}
+
+#[test]
+fn node_that_merely_waits_moves_to_an_idle_worker() {
+    let mut bench = Bench::new(independent(3));
+    bench.join(A, 1);
+    bench.start(A, 0, 1);
+    assert_eq!(bench.join(B, 1), ["worker 1 drops 2.1", "worker 2 gets 2.2"]);
+    // Worker 1 was faster than the message: its result counts, and worker 2 gets the other node that waits.
+    let late = bench.finish(A, 2, 1, 2);
+    let expected = ["worker 1 is thanked for 2.1", "worker 2 drops 2.2", "worker 1 drops 1.1", "worker 2 gets 1.2"];
+    assert_eq!(late, expected);
+}
+
+#[test]
+fn nodes_of_a_lost_worker_are_requeued_once() {
+    let mut bench = Bench::new(independent(2));
+    bench.join(A, 2);
+    bench.start(A, 0, 1);
+    bench.join(B, 2);
+    let lost = bench.lose(A, Departure::Lost);
+    assert_eq!(lost, ["n0 requeued, 1", "n1 requeued, 0", "worker 2 gets 0.2", "worker 2 gets 1.2"]);
+    assert!(bench.lose(A, Departure::Lost).is_empty());
+    bench.finish(B, 0, 2, 0);
+    bench.finish(B, 1, 2, 1);
+    assert!(bench.core.is_finished());
+    assert_eq!(bench.core.summary().requeued_nodes, 2);
+}
+
+#[test]
+fn node_that_kills_its_workers_fails_by_name_after_three_deaths() {
+    let mut bench = Bench::new(independent(2));
+    for crash in 1..=2 {
+        bench.join(WorkerId(10 + crash), 2);
+        bench.start(WorkerId(10 + crash), 0, u32::try_from(crash).unwrap());
+        bench.lose(WorkerId(10 + crash), Departure::Lost);
+    }
+    bench.join(A, 2);
+    bench.start(A, 0, 3);
+    let error = bench.try_handle(Event::WorkerLeft { worker: A, departure: Departure::Lost }).unwrap_err();
+    let message = error.to_string();
+    assert!(message.starts_with("test \"n0\" failed: 3 worker processes died while they executed it"), "{message}");
+    assert_eq!(error.exit_code(), 3);
+    assert_eq!(bench.planner.failed, [(NodeId(0), FailureReason::Crashed { crashes: 3 })]);
+}
+
+#[test]
+fn only_executing_nodes_of_workers_that_died_are_suspected() {
+    let mut bench = Bench::new(independent(1));
+    for (round, departure) in [Departure::Goodbye, Departure::Silent, Departure::Lost].into_iter().enumerate() {
+        let worker = WorkerId(20 + round as u64);
+        bench.join(worker, 1);
+        if departure != Departure::Lost {
+            bench.start(worker, 0, u32::try_from(round).unwrap() + 1);
+        }
+        assert_eq!(bench.lose(worker, departure), ["n0 requeued, 0"]);
+    }
+}
+
+#[test]
+fn second_result_is_dropped_when_equal_and_an_error_when_different() {
+    let mut bench = Bench::new(independent(2));
+    bench.join(A, 2);
+    bench.lose(A, Departure::Lost);
+    bench.join(B, 2);
+    bench.finish(B, 0, 2, 7);
+    // Worker 1 is back under another number and sends what it had.
+    bench.join(WorkerId(3), 2);
+    assert_eq!(bench.finish(WorkerId(3), 0, 1, 7), ["worker 3 is thanked for 0.1"]);
+    assert_eq!(bench.core.summary().duplicate_results, 1);
+    let error = bench.try_handle(finished(Site::Worker(WorkerId(3)), 0, 1, 8)).unwrap_err();
+    assert!(matches!(&error, RunError::ResultsDiffer { name, .. } if name.label == "n0"), "{error}");
+    assert!(error.to_string().contains("the second one from worker 3"), "{error}");
+}
+
+#[test]
+fn late_result_of_an_earlier_attempt_counts() {
+    let mut bench = Bench::new(independent(1));
+    bench.join(A, 1);
+    bench.start(A, 0, 1);
+    bench.lose(A, Departure::Silent);
+    bench.join(B, 1);
+    bench.start(B, 0, 2);
+    bench.join(WorkerId(3), 1);
+    let late = bench.finish(WorkerId(3), 0, 1, 5);
+    assert_eq!(late, ["worker 3 is thanked for 0.1", "worker 2 drops 0.2"]);
+    assert!(bench.core.is_finished());
+    assert_eq!(bench.planner.completed, [NodeId(0)]);
+}
+
+#[test]
+fn late_result_while_the_node_is_queued_takes_it_out_of_the_queue() {
+    let mut bench = Bench::new(independent(1));
+    bench.join(A, 1);
+    bench.lose(A, Departure::Lost);
+    bench.finish(A, 0, 1, 5);
+    assert!(bench.core.is_finished());
+    assert!(bench.join(B, 1).is_empty());
+}
+
+#[test]
+fn answer_to_nothing_ends_the_membership() {
+    let mut bench = Bench::new(independent(4));
+    bench.join(A, 1);
+    assert_eq!(bench.finish(A, 3, 1, 0)[0], "worker 1 is thrown out");
+    bench.join(B, 1);
+    assert_eq!(bench.finish(B, 0, 9, 0)[0], "worker 2 is thrown out");
+    bench.join(WorkerId(3), 1);
+    let unknown = Event::BlobRequested { worker: WorkerId(3), hash: BlobHash::of(b"unknown") };
+    assert_eq!(bench.handle(unknown)[0], "worker 3 is thrown out");
+}
+
+#[test]
+fn blob_is_sent_when_asked_for_and_counted() {
+    let blob = vec![1; 40];
+    let hash = BlobHash::of(&blob);
+    let nodes = (0..2).map(|_| node("n", vec![Input::Blob(hash)], Placement::Worker)).collect();
+    let mut bench = Bench::new(Script { nodes, blob, ..Script::default() });
+    bench.join(A, 2);
+    assert_eq!(bench.handle(Event::BlobRequested { worker: A, hash }), ["worker 1 gets 40 bytes"]);
+    assert_eq!((bench.core.summary().blobs_sent, bench.core.summary().blob_bytes_sent), (1, 40));
+    assert!(bench.handle(Event::BlobRequested { worker: B, hash }).is_empty());
+}
+
+#[test]
+fn node_waits_for_the_output_it_reads_and_coordinator_nodes_run_here() {
+    let mut planner = independent(2);
+    let inputs = [0, 1].map(|index| Input::OutputOf(NodeId(index))).to_vec();
+    planner.nodes.push(node("join", inputs, Placement::Coordinator));
+    let mut bench = Bench::new(planner);
+    bench.join(A, 4);
+    assert_eq!(bench.finish(A, 1, 1, 1), ["worker 1 is thanked for 1.1"]);
+    assert_eq!(bench.finish(A, 0, 1, 0), ["worker 1 is thanked for 0.1", "run 2.1 here"]);
+    assert!(!bench.core.is_finished());
+    bench.handle(finished(Site::Coordinator, 2, 1, 2));
+    assert!(bench.core.is_finished());
+}
+
+#[test]
+fn node_that_finishes_may_add_nodes() {
+    let follow_up = Some(node("follow-up", vec![Input::OutputOf(NodeId(0))], Placement::Worker));
+    let mut bench = Bench::new(Script { follow_up, ..independent(1) });
+    bench.join(A, 1);
+    assert_eq!(bench.finish(A, 0, 1, 0), ["worker 1 is thanked for 0.1", "worker 1 gets 1.1"]);
+    bench.finish(A, 1, 1, 1);
+    assert!(bench.core.is_finished());
+    assert_eq!(bench.planner.completed, [NodeId(0), NodeId(1)]);
+}
+
+#[test]
+fn application_error_is_not_retried_and_fails_what_depends_on_it() {
+    let mut planner = Script { tolerates_failures: true, ..independent(2) };
+    planner.nodes.push(node("child", vec![Input::OutputOf(NodeId(0))], Placement::Worker));
+    let mut bench = Bench::new(planner);
+    bench.join(A, 3);
+    let failure = NodeFailure::new("the table is empty");
+    let failed = Event::Failed { site: Site::Worker(A), node: NodeId(0), attempt: 1, failure };
+    let expected = [
+        "worker 1 is thanked for 0.1",
+        "n0 failed: the table is empty",
+        "child failed: it needs the output of \"n0\" (node 0), which failed",
+    ];
+    assert_eq!(bench.handle(failed), expected);
+    bench.finish(A, 1, 1, 1);
+    assert!(bench.core.is_finished());
+    assert_eq!((bench.core.summary().completed_nodes, bench.core.summary().failed_nodes), (1, 2));
+    // An output that was under way is too late.
+    assert_eq!(bench.finish(A, 0, 1, 9), ["worker 1 is thanked for 0.1"]);
+}
+
+#[test]
+fn silent_worker_is_lost_after_its_lease_ends_and_any_sign_of_life_renews_it() {
+    let mut bench = Bench::new(independent(1));
+    bench.join(A, 1);
+    bench.start(A, 0, 1);
+    assert_eq!(bench.core.next_deadline(), Some(Duration::from_secs(5)));
+    assert!(bench.pass_time(4).unwrap().is_empty());
+    bench.handle(Event::Heartbeat { worker: A, executing: vec![(NodeId(0), 400)] });
+    assert_eq!(bench.core.next_deadline(), Some(Duration::from_secs(9)));
+    assert!(bench.pass_time(4).unwrap().is_empty());
+    assert_eq!(bench.pass_time(1).unwrap(), ["worker 1 is thrown out", "n0 requeued, 0"]);
+}
+
+#[test]
+fn without_any_worker_the_user_is_reminded_and_then_told() {
+    let mut bench = Bench::new(independent(1));
+    assert_eq!(bench.core.next_deadline(), Some(Duration::from_secs(30)));
+    assert_eq!(bench.pass_time(30).unwrap(), ["waiting since 30 s"]);
+    assert_eq!(bench.pass_time(31).unwrap(), ["waiting since 61 s"]);
+    assert_eq!(bench.core.next_deadline(), Some(Duration::from_secs(91)));
+    let error = bench.pass_time(539).unwrap_err();
+    assert!(error.to_string().starts_with("no worker has come in 600 s"), "{error}");
+}
+
+#[test]
+fn after_the_last_worker_there_is_a_grace_and_a_new_one_ends_it() {
+    let mut bench = Bench::new(independent(1));
+    bench.join(A, 1);
+    bench.lose(A, Departure::Lost);
+    assert_eq!(bench.pass_time(59).unwrap(), ["waiting since 59 s"]);
+    assert_eq!(bench.join(B, 1), ["worker 2 gets 0.2"]);
+    bench.lose(B, Departure::Lost);
+    assert!(bench.pass_time(1).unwrap().is_empty());
+    let error = bench.pass_time(59).unwrap_err();
+    assert!(error.to_string().starts_with("all workers were lost, and no other has come in 60 s"), "{error}");
+}
+
+#[test]
+fn nobody_waits_for_workers_while_only_the_coordinator_has_work() {
+    let mut bench =
+        Bench::new(Script { nodes: vec![node("here", vec![], Placement::Coordinator)], ..Script::default() });
+    assert_eq!(bench.core.next_deadline(), None);
+    let given_up = Event::LocalWorkersGivenUp { last_status: "exit status: 1".into() };
+    assert_eq!(bench.handle(given_up), ["run 0.1 here"]);
+    bench.handle(finished(Site::Coordinator, 0, 1, 0));
+    assert!(bench.core.is_finished());
+}
+
+#[test]
+fn local_workers_that_keep_dying_end_the_run() {
+    let mut bench = Bench::new(independent(1));
+    let given_up = Event::LocalWorkersGivenUp { last_status: "signal: 11".into() };
+    let error = bench.try_handle(given_up).unwrap_err();
+    assert!(error.to_string().contains("keep dying, the last one with signal: 11"), "{error}");
+}
+
+#[test]
+fn empty_plan_is_finished_at_once() {
+    assert!(Bench::new(Script::default()).core.is_finished());
+}

@@ -1,0 +1,110 @@
+//! Why a run ended without its result.
+
+use std::io;
+use std::net::SocketAddr;
+use std::path::PathBuf;
+use std::time::Duration;
+
+use lookalike::graph::{BlobHash, FailureReason, PlanError};
+use thiserror::Error;
+
+use crate::comm::{NodeName, Site};
+
+/// Why a run ended without its result.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum RunError {
+    /// Neither local workers nor an address where others could join.
+    #[error(
+        "no worker can ever join: expected at least one local worker, or an address to listen on for others, found neither; use --workers N or --listen ADDR"
+    )]
+    NoWorkersPossible,
+    /// The address to listen on is every address of the machine, and nobody knows what the others call it.
+    #[error("listening on {listen} tells workers no host name to connect to; add --advertise HOST[:PORT]")]
+    NothingToAdvertise {
+        /// The address to listen on.
+        listen: SocketAddr,
+    },
+    /// The coordinator cannot listen.
+    #[error("cannot listen on {listen}; is the address this machine's, and the port free?")]
+    Listen {
+        /// The address.
+        listen: SocketAddr,
+        /// What the system says.
+        source: io::Error,
+    },
+    /// The access file cannot be written.
+    #[error("cannot write the access file {}", path.display())]
+    AccessFile {
+        /// The file.
+        path: PathBuf,
+        /// What the system says.
+        source: io::Error,
+    },
+    /// The operating system gives no random bytes for the secret.
+    #[error("the system gives no random bytes for the secret: {0}")]
+    Randomness(getrandom::Error),
+    /// Nobody can be told to stop.
+    #[error("cannot listen for Ctrl-C and SIGTERM")]
+    Signals(#[source] io::Error),
+    /// A local worker process cannot be started at all.
+    #[error("cannot start a worker process of {}", program.display())]
+    Spawn {
+        /// The program.
+        program: PathBuf,
+        /// What the system says.
+        source: io::Error,
+    },
+    /// No worker has come.
+    #[error("no worker has come in {} s; check that workers can reach the address in the access file, or wait longer with --wait-for-workers", waited.as_secs())]
+    NoWorkerCame {
+        /// How long there was work but no worker.
+        waited: Duration,
+    },
+    /// All workers are gone, and no new one has come.
+    #[error("all workers were lost, and no other has come in {} s; see why they ended, or wait longer with --grace", waited.as_secs())]
+    LostAllWorkers {
+        /// How long there was work but no worker.
+        waited: Duration,
+    },
+    /// The local workers die whenever they are started.
+    #[error("the local worker processes keep dying, the last one with {last_status}; see their lines on stderr")]
+    LocalWorkersKeepDying {
+        /// How the last one ended.
+        last_status: String,
+    },
+    /// Two computations of one node gave different outputs.
+    #[error(
+        "two results of {name} differ ({first:?} and {second:?}, the second one from {site}), so neither can be trusted; use the same build everywhere, check the memory of that machine, and report this"
+    )]
+    ResultsDiffer {
+        /// The node.
+        name: Box<NodeName>,
+        /// Where the second result came from.
+        site: Site,
+        /// The first output.
+        first: BlobHash,
+        /// The second output.
+        second: BlobHash,
+    },
+    /// The planner cannot go on, by default because a node failed.
+    #[error(transparent)]
+    Plan(#[from] PlanError),
+    /// The user interrupted the run.
+    #[error("interrupted")]
+    Interrupted,
+}
+
+impl RunError {
+    /// The exit code of the program (design section 10): 2 for bad input or usage, 130 when interrupted, else 3: the
+    /// cluster failed.
+    #[must_use]
+    pub fn exit_code(&self) -> u8 {
+        match self {
+            Self::NoWorkersPossible | Self::NothingToAdvertise { .. } | Self::AccessFile { .. } => 2,
+            Self::Plan(PlanError::NodeFailed { reason: FailureReason::Application(_), .. }) => 2,
+            Self::Interrupted => 130,
+            _ => 3,
+        }
+    }
+}

@@ -1,0 +1,133 @@
+//! What a run can be told.
+
+use std::net::{Ipv4Addr, SocketAddr};
+use std::num::NonZeroUsize;
+use std::path::PathBuf;
+use std::time::Duration;
+
+use super::RunError;
+use crate::core::Policy;
+use crate::spawn::WorkerCommand;
+
+/// How to run a graph on workers.
+#[derive(Clone, Debug)]
+pub struct RunnerOptions {
+    /// How many local worker processes to start; 0 to 4096.
+    pub workers: usize,
+    /// The threads of each local worker; `None` shares the cores among them.
+    pub threads_per_worker: Option<NonZeroUsize>,
+    /// How to start a local worker; `None` starts this very program as `worker`.
+    pub worker_command: Option<WorkerCommand>,
+    /// Where to listen for workers from elsewhere; `None` listens on the loopback interface, on any free port, for the local
+    /// ones alone.
+    pub listen: Option<SocketAddr>,
+    /// What the access file tells workers to connect to, as `HOST` or `HOST:PORT`; `None` tells the address listened on.
+    pub advertise: Option<String>,
+    /// Where to write the access file; its folder has to exist.
+    pub access_file: PathBuf,
+    /// How often a worker shall tell that it lives.
+    pub heartbeat: Duration,
+    /// How workers and nodes are treated: waiting, grace, crashes.
+    pub policy: Policy,
+    /// Whether Ctrl-C and SIGTERM stop the run in order, with [`RunError::Interrupted`].
+    pub handle_signals: bool,
+}
+
+impl RunnerOptions {
+    /// `workers` local workers, the access file, and for the rest the defaults of design section 8.
+    #[must_use]
+    pub fn new(workers: usize, access_file: PathBuf) -> Self {
+        Self {
+            workers,
+            threads_per_worker: None,
+            worker_command: None,
+            listen: None,
+            advertise: None,
+            access_file,
+            heartbeat: Duration::from_secs(1),
+            policy: Policy::default(),
+            handle_signals: true,
+        }
+    }
+
+    /// The address to listen on.
+    pub(crate) fn listen_address(&self) -> SocketAddr {
+        self.listen.unwrap_or_else(|| SocketAddr::from((Ipv4Addr::LOCALHOST, 0)))
+    }
+
+    /// That some worker can join, and be told where.
+    pub(crate) fn check(&self) -> Result<(), RunError> {
+        if self.workers == 0 && self.listen.is_none() {
+            return Err(RunError::NoWorkersPossible);
+        }
+        match self.listen {
+            Some(listen) if listen.ip().is_unspecified() && self.advertise.is_none() => {
+                Err(RunError::NothingToAdvertise { listen })
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// What the access file says, for a listener that got this address.
+    pub(crate) fn advertised(&self, bound: SocketAddr) -> String {
+        match &self.advertise {
+            None => bound.to_string(),
+            Some(advertise) if has_port(advertise) => advertise.clone(),
+            Some(host) => format!("{host}:{}", bound.port()),
+        }
+    }
+
+    /// Where local workers connect to, for a listener that got this address.
+    pub(crate) fn local_address(bound: SocketAddr) -> String {
+        let mut local = bound;
+        if bound.ip().is_unspecified() {
+            local.set_ip(if bound.is_ipv4() {
+                Ipv4Addr::LOCALHOST.into()
+            } else {
+                std::net::Ipv6Addr::LOCALHOST.into()
+            });
+        }
+        local.to_string()
+    }
+}
+
+/// `host:4000` and `[::1]:4000` have a port; `host`, `[::1]` and `::1` have none.
+fn has_port(address: &str) -> bool {
+    let is_bare_ipv6 = address.parse::<std::net::Ipv6Addr>().is_ok();
+    !is_bare_ipv6 && address.rsplit_once(':').is_some_and(|(_, port)| port.parse::<u16>().is_ok())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn options(workers: usize, listen: Option<&str>, advertise: Option<&str>) -> RunnerOptions {
+        let listen = listen.map(|address| address.parse().unwrap());
+        let advertise = advertise.map(str::to_owned);
+        RunnerOptions { listen, advertise, ..RunnerOptions::new(workers, "access.json".into()) }
+    }
+
+    #[test]
+    fn run_that_no_worker_can_join_is_refused() {
+        let error = options(0, None, None).check().unwrap_err();
+        assert!(error.to_string().contains("use --workers N or --listen ADDR"), "{error}");
+        assert_eq!(error.exit_code(), 2);
+        assert!(options(1, None, None).check().is_ok());
+        assert!(options(0, Some("127.0.0.1:0"), None).check().is_ok());
+        let error = options(1, Some("0.0.0.0:4000"), None).check().unwrap_err();
+        assert!(error.to_string().contains("add --advertise"), "{error}");
+        assert!(options(1, Some("[::]:4000"), Some("host")).check().is_ok());
+    }
+
+    #[test]
+    fn advertised_address_gets_the_port_that_it_lacks() {
+        let bound = "0.0.0.0:4000".parse().unwrap();
+        let advertised = |advertise| options(0, None, advertise).advertised(bound);
+        assert_eq!(advertised(Some("node7")), "node7:4000");
+        assert_eq!(advertised(Some("node7:5")), "node7:5");
+        assert_eq!(advertised(Some("[::1]")), "[::1]:4000");
+        assert_eq!(advertised(None), "0.0.0.0:4000");
+        assert_eq!(RunnerOptions::local_address(bound), "127.0.0.1:4000");
+        assert_eq!(RunnerOptions::local_address("[::]:4000".parse().unwrap()), "[::1]:4000");
+    }
+}

@@ -1,0 +1,200 @@
+//! Local worker processes: started with the run, started again when they die, gone when the run ends.
+//!
+//! Each one is on a leash: a pipe to its stdin that nobody writes to. When it ends, because the run ended or because the
+//! coordinator was killed by whatever means, the worker ends itself. Each one is in a process group of its own, so that a
+//! Ctrl-C at the terminal reaches the coordinator alone, which ends its workers in order.
+
+use std::ffi::OsString;
+use std::io;
+use std::num::NonZeroUsize;
+use std::path::PathBuf;
+use std::process::{ExitStatus, Stdio};
+use std::time::Duration;
+
+use tokio::process::{Child, ChildStdin, Command};
+use tokio::sync::mpsc::Sender;
+use tokio::task::JoinSet;
+use tokio::time::{Instant, sleep, timeout};
+use tokio_util::sync::CancellationToken;
+use tracing::{debug, warn};
+
+use crate::comm::RunEvent;
+use crate::reactor::Event;
+use crate::rpc::Inbound;
+use crate::runner::RunError;
+
+/// A worker that lived for this long was well; its death starts the count again.
+const HEALTHY_LIFE: Duration = Duration::from_secs(10);
+/// After this many deaths in a row, each soon after the start, a worker is not started again.
+const MAX_QUICK_DEATHS: u32 = 8;
+/// The pause after the first of them; each further one is twice as long.
+const FIRST_PAUSE: Duration = Duration::from_millis(100);
+/// The longest pause.
+const LONGEST_PAUSE: Duration = Duration::from_secs(5);
+/// How long a worker may take to end by itself before it is killed.
+const FAREWELL_TIME: Duration = Duration::from_secs(2);
+/// How long a local worker tries to reach its coordinator, as its command line says it.
+const RECONNECT_FOR: &str = "60s";
+/// The exit code of a worker for which a new attempt would fail too: bad usage, or refused.
+const HOPELESS: i32 = 2;
+
+/// How to start a worker process, but for the flags that every worker gets.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct WorkerCommand {
+    /// The program.
+    pub program: PathBuf,
+    /// Its first arguments, such as `worker`.
+    pub arguments: Vec<OsString>,
+}
+
+impl WorkerCommand {
+    /// This very program as a worker: `lookalike worker`.
+    ///
+    /// # Errors
+    /// When the system does not tell which program this is.
+    pub fn this_program() -> io::Result<Self> {
+        Ok(Self { program: std::env::current_exe()?, arguments: vec!["worker".into()] })
+    }
+}
+
+/// How many local workers there are, and how they are started.
+#[derive(Clone, Debug)]
+pub(crate) struct LocalWorkers {
+    pub(crate) count: usize,
+    pub(crate) command: WorkerCommand,
+    pub(crate) access: PathBuf,
+    /// Where the coordinator listens, as seen from this machine.
+    pub(crate) address: String,
+    pub(crate) threads: NonZeroUsize,
+    /// Whether other workers may come when all local ones are given up.
+    pub(crate) others_may_come: bool,
+}
+
+/// The threads of each of `workers` workers, so that together they use the cores once.
+pub(crate) fn threads_per_worker(workers: usize) -> NonZeroUsize {
+    let cores = std::thread::available_parallelism().map_or(1, NonZeroUsize::get);
+    NonZeroUsize::new(cores / workers.max(1)).unwrap_or(NonZeroUsize::MIN)
+}
+
+impl LocalWorkers {
+    /// Start the workers. A program that cannot be started at all is an error at once.
+    pub(crate) fn start(&self, inbound: &Sender<Inbound>, stop: &CancellationToken) -> Result<JoinSet<()>, RunError> {
+        let mut first = Vec::new();
+        for _ in 0..self.count {
+            first.push(
+                self.spawn().map_err(|source| RunError::Spawn { program: self.command.program.clone(), source })?,
+            );
+        }
+        let mut given_up = JoinSet::new();
+        for process in first {
+            given_up.spawn(self.clone().keep_alive(process, inbound.clone(), stop.clone()));
+        }
+        let mut keeping = JoinSet::new();
+        let (inbound, others_may_come) = (inbound.clone(), self.others_may_come);
+        if self.count > 0 {
+            keeping.spawn(async move { watch(given_up, inbound, others_may_come).await });
+        }
+        Ok(keeping)
+    }
+
+    /// Keep one worker alive until `stop`. When it is given up, how it ended last.
+    async fn keep_alive(self, first: Process, inbound: Sender<Inbound>, stop: CancellationToken) -> Option<String> {
+        let mut quick_deaths = 0;
+        let mut next = Ok(first);
+        loop {
+            let begin = Instant::now();
+            let (process, status, is_hopeless) = match next {
+                Ok(mut process) => tokio::select! {
+                    ended = process.child.wait() => (process.id, describe(&ended), is_hopeless(&ended)),
+                    () = stop.cancelled() => {
+                        process.end().await;
+                        return None;
+                    }
+                },
+                Err(error) => (0, format!("an error at its start: {error}"), false),
+            };
+            quick_deaths = if begin.elapsed() < HEALTHY_LIFE { quick_deaths + 1 } else { 1 };
+            let give_up = is_hopeless || quick_deaths >= MAX_QUICK_DEATHS;
+            let pause = (FIRST_PAUSE * 2_u32.pow(quick_deaths - 1)).min(LONGEST_PAUSE);
+            let restart_after = (!give_up).then_some(pause);
+            warn!(process, status, ?restart_after, "a local worker ended");
+            let event = RunEvent::LocalWorkerEnded { process, status: status.clone(), restart_after };
+            if inbound.send(Inbound::Tell(event)).await.is_err() {
+                return None;
+            }
+            if give_up {
+                return Some(status);
+            }
+            tokio::select! {
+                () = sleep(pause) => next = self.spawn(),
+                () = stop.cancelled() => return None,
+            }
+        }
+    }
+
+    fn spawn(&self) -> io::Result<Process> {
+        let mut command = Command::new(&self.command.program);
+        command.args(&self.command.arguments).arg("--access").arg(&self.access);
+        command.args(["--address", &self.address, "--threads", &self.threads.to_string()]);
+        command.args(["--reconnect-for", RECONNECT_FOR, "--leash"]);
+        // stdout is for results, and a worker has none.
+        command.stdin(Stdio::piped()).stdout(Stdio::null()).stderr(Stdio::inherit()).kill_on_drop(true);
+        #[cfg(unix)]
+        command.process_group(0);
+        let mut child = command.spawn()?;
+        // Taken out of the child: waiting for the child would close it.
+        let leash = child.stdin.take();
+        let id = child.id().unwrap_or(0);
+        debug!(process = id, "started a local worker");
+        Ok(Process { id, child, leash })
+    }
+}
+
+/// Report once all workers are given up.
+async fn watch(mut keepers: JoinSet<Option<String>>, inbound: Sender<Inbound>, others_may_come: bool) {
+    let mut last_status = None;
+    while let Some(ended) = keepers.join_next().await {
+        match ended {
+            Ok(Some(status)) => last_status = Some(status),
+            // Stopped: nobody waits for workers any more.
+            Ok(None) | Err(_) => return drain(keepers).await,
+        }
+    }
+    if let Some(last_status) = last_status.filter(|_| !others_may_come) {
+        // When nobody listens any more the run is over.
+        let _ = inbound.send(Inbound::Event(Event::LocalWorkersGivenUp { last_status })).await;
+    }
+}
+
+async fn drain(mut keepers: JoinSet<Option<String>>) {
+    while keepers.join_next().await.is_some() {}
+}
+
+struct Process {
+    id: u32,
+    child: Child,
+    leash: Option<ChildStdin>,
+}
+
+impl Process {
+    /// Let the worker end by itself, or else kill it; when this returns there is no process.
+    async fn end(mut self) {
+        drop(self.leash.take());
+        if timeout(FAREWELL_TIME, self.child.wait()).await.is_err() {
+            warn!(process = self.id, "a local worker does not end by itself: killing it");
+            // An error means that it has ended meanwhile.
+            let _ = self.child.kill().await;
+        }
+    }
+}
+
+fn describe(ended: &io::Result<ExitStatus>) -> String {
+    match ended {
+        Ok(status) => status.to_string(),
+        Err(error) => format!("an unknown status: {error}"),
+    }
+}
+
+fn is_hopeless(ended: &io::Result<ExitStatus>) -> bool {
+    ended.as_ref().is_ok_and(|status| status.code() == Some(HOPELESS))
+}

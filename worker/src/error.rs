@@ -1,0 +1,80 @@
+//! Why a worker ended without its coordinator's leave.
+
+use std::error::Error;
+use std::io;
+use std::path::PathBuf;
+use std::time::Duration;
+
+use lookalike::protocol::{AccessError, HandshakeError};
+use thiserror::Error;
+
+use crate::wire::WireError;
+
+/// Why a worker ended without its coordinator's leave.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum WorkerError {
+    /// The access file cannot be read.
+    #[error("cannot read the access file {}", path.display())]
+    AccessFile {
+        /// The file.
+        path: PathBuf,
+        /// What the system says.
+        source: io::Error,
+    },
+    /// The access file is none.
+    #[error("the access file {} is not usable", path.display())]
+    AccessContent {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        source: AccessError,
+    },
+    /// The coordinator and this worker do not fit, or the coordinator refuses it. Trying again would not help.
+    #[error("cannot join the coordinator at {address}")]
+    Refused {
+        /// Where the coordinator should be.
+        address: String,
+        /// Why.
+        source: HandshakeError,
+    },
+    /// The coordinator cannot be reached any more.
+    #[error("gave up on the coordinator at {address} after {} s without it", after.as_secs())]
+    CoordinatorLost {
+        /// Where the coordinator should be.
+        address: String,
+        /// How long it was tried.
+        after: Duration,
+        /// What went wrong last.
+        source: WireError,
+    },
+    /// The compute threads cannot be started.
+    #[error("cannot start the compute threads")]
+    Pool(#[from] rayon::ThreadPoolBuildError),
+    /// The system gives no event loop, thread or signal handler.
+    #[error("cannot start the worker's own threads")]
+    Runtime(#[source] io::Error),
+}
+
+impl WorkerError {
+    /// The exit code of the process: 2 when a new attempt would fail too, else 3.
+    #[must_use]
+    pub fn exit_code(&self) -> u8 {
+        match self {
+            Self::AccessFile { .. } | Self::AccessContent { .. } | Self::Refused { .. } => 2,
+            Self::CoordinatorLost { .. } | Self::Pool(_) | Self::Runtime(_) => 3,
+        }
+    }
+
+    /// The message with all its causes in one line.
+    #[must_use]
+    pub fn with_causes(&self) -> String {
+        let mut text = self.to_string();
+        let mut cause = self.source();
+        while let Some(error) = cause {
+            text = format!("{text}: {error}");
+            cause = error.source();
+        }
+        text
+    }
+}

@@ -1,0 +1,293 @@
+//! The socket loop: connect, greet, serve one connection, and again while there is hope.
+
+use std::sync::{Arc, mpsc as blocking};
+use std::time::Duration;
+
+use lookalike::graph::{Blob, BlobHash, Registry};
+use lookalike::protocol::{Access, Hello, IncomingBlob, Secret, ToCoordinator, ToWorker, TransferError, Welcome};
+use tokio::io::AsyncWriteExt;
+use tokio::net::TcpStream;
+use tokio::net::tcp::{OwnedReadHalf, OwnedWriteHalf};
+use tokio::sync::Notify;
+use tokio::sync::mpsc::{UnboundedReceiver, UnboundedSender, unbounded_channel};
+use tokio::task::JoinHandle;
+use tokio::time::{Instant, sleep, timeout};
+use tokio_util::sync::CancellationToken;
+use tracing::{debug, info, warn};
+
+use crate::cache::BlobCache;
+use crate::ending::watch_for_the_end;
+use crate::error::WorkerError;
+use crate::execute::{Completed, Executor};
+use crate::options::WorkerOptions;
+use crate::tasks::{Action, Tasks};
+use crate::wire::{Incoming, Received, WireError, greet_coordinator, send_message, send_parts};
+
+/// How long connecting and greeting may take.
+const GREETING_TIME: Duration = Duration::from_secs(10);
+/// How long the last words may take when the worker ends.
+const FAREWELL_TIME: Duration = Duration::from_secs(1);
+/// The first pause before a new attempt to connect; each further one is twice as long.
+const FIRST_PAUSE: Duration = Duration::from_millis(100);
+/// The longest pause between two attempts.
+const LONGEST_PAUSE: Duration = Duration::from_secs(5);
+
+/// Work until the coordinator ends the run or this process is asked to end.
+pub(crate) async fn run(options: &WorkerOptions, registry: Registry) -> Result<(), WorkerError> {
+    let access = read_access(options)?;
+    let address = options.address.clone().unwrap_or_else(|| access.address.clone());
+    let asked_to_end = watch_for_the_end(options.leash).map_err(WorkerError::Runtime)?;
+    let (completed_sender, completed) = unbounded_channel();
+    let threads = options.threads;
+    let executor = Executor::new(threads, registry, options.decoded_blob_bytes, completed_sender)?;
+    let tasks = Tasks::new(threads.get(), BlobCache::new(options.cached_blob_bytes));
+    let mut session =
+        Session { address, secret: access.secret, threads: threads.get(), asked_to_end, executor, completed, tasks };
+    session.keep_connected(options.reconnect_for).await
+}
+
+fn read_access(options: &WorkerOptions) -> Result<Access, WorkerError> {
+    let path = options.access.clone();
+    let text =
+        std::fs::read_to_string(&path).map_err(|source| WorkerError::AccessFile { path: path.clone(), source })?;
+    Access::parse(&text).map_err(|source| WorkerError::AccessContent { path, source })
+}
+
+/// How one connection came to its end without an error.
+enum Ended {
+    /// The coordinator said that the run is over.
+    RunOver,
+    /// This process was asked to end.
+    AskedToEnd,
+}
+
+struct Session {
+    address: String,
+    secret: Secret,
+    threads: usize,
+    asked_to_end: CancellationToken,
+    executor: Executor,
+    completed: UnboundedReceiver<Completed>,
+    tasks: Tasks,
+}
+
+impl Session {
+    async fn keep_connected(&mut self, patience: Duration) -> Result<(), WorkerError> {
+        let mut without_since = Instant::now();
+        let mut pause = FIRST_PAUSE;
+        loop {
+            let mut was_welcome = false;
+            let error = match self.connect_and_serve(&mut was_welcome).await {
+                Ok(Ended::RunOver | Ended::AskedToEnd) => return Ok(()),
+                Err(WireError::Handshake(source)) => {
+                    return Err(WorkerError::Refused { address: self.address.clone(), source });
+                }
+                Err(error) => error,
+            };
+            if was_welcome {
+                without_since = Instant::now();
+                pause = FIRST_PAUSE;
+            }
+            let after = without_since.elapsed();
+            if after >= patience {
+                return Err(WorkerError::CoordinatorLost { address: self.address.clone(), after, source: error });
+            }
+            info!(address = %self.address, %error, ?pause, "without coordinator, trying again");
+            tokio::select! {
+                () = sleep(pause.min(patience - after)) => {}
+                () = self.asked_to_end.cancelled() => return Ok(()),
+            }
+            pause = (pause * 2).min(LONGEST_PAUSE);
+        }
+    }
+
+    async fn connect_and_serve(&mut self, was_welcome: &mut bool) -> Result<Ended, WireError> {
+        let asked_to_end = self.asked_to_end.clone();
+        let (incoming, writer, welcome) = tokio::select! {
+            greeted = timeout(GREETING_TIME, self.greet()) => greeted.map_err(|_| WireError::TimedOut)??,
+            () = asked_to_end.cancelled() => return Ok(Ended::AskedToEnd),
+        };
+        *was_welcome = true;
+        info!(address = %self.address, worker = welcome.worker, "joined");
+        let (outgoing, announced, mut writing) = start_writing(writer);
+        let heart = Arc::new(Notify::new());
+        let heartbeat = start_heart(Duration::from_millis(welcome.heartbeat_ms.into()), Arc::clone(&heart));
+        let mut connection = Connection { incoming, outgoing, announced, transfer: None };
+        let actions = self.tasks.welcomed(welcome.run);
+        self.act(&connection, actions);
+        let ended = tokio::select! {
+            ended = self.serve(&mut connection, &heart) => ended,
+            ended = &mut writing => Err(ended.map_or(WireError::Ended, |written| written.err().unwrap_or(WireError::Ended))),
+        };
+        drop(heartbeat);
+        drop(connection);
+        if ended.is_ok() {
+            // What is still to be written: the goodbye. If it does not get through, the coordinator sees the end of the stream.
+            let _ = timeout(FAREWELL_TIME, writing).await;
+        } else {
+            writing.abort();
+        }
+        ended
+    }
+
+    async fn greet(&self) -> Result<(Incoming<OwnedReadHalf>, OwnedWriteHalf, Welcome), WireError> {
+        let mut stream = TcpStream::connect(&self.address).await?;
+        stream.set_nodelay(true)?;
+        let mut nonce = [0; 32];
+        getrandom::fill(&mut nonce).map_err(std::io::Error::other)?;
+        greet_coordinator(&mut stream, &self.secret, nonce).await?;
+        let (reader, mut writer) = stream.into_split();
+        let threads = u32::try_from(self.threads).unwrap_or(u32::MAX);
+        let hello = Hello { build: env!("CARGO_PKG_VERSION").into(), threads, process: std::process::id() };
+        send_message(&mut writer, &ToCoordinator::Hello(hello)).await?;
+        let mut incoming = Incoming::new(reader);
+        match incoming.message().await? {
+            ToWorker::Welcome(welcome) => Ok((incoming, writer, welcome)),
+            other => Err(WireError::Unexpected { expected: "a welcome", found: format!("{other:?}") }),
+        }
+    }
+
+    async fn serve(&mut self, connection: &mut Connection, heart: &Notify) -> Result<Ended, WireError> {
+        let asked_to_end = self.asked_to_end.clone();
+        loop {
+            let actions = tokio::select! {
+                received = connection.incoming.next() => match received?.ok_or(WireError::Ended)? {
+                    Received::Message(ToWorker::Stop { reason }) => {
+                        info!(reason, "the coordinator ends this worker");
+                        return Ok(Ended::RunOver);
+                    }
+                    received => self.received(connection, received)?,
+                },
+                Some(serial) = connection.announced.recv() => self.tasks.announced(serial),
+                Some(completed) = self.completed.recv() => self.tasks.completed(completed, || self.executor.context()),
+                () = heart.notified() => vec![Action::Send(ToCoordinator::Heartbeat { executing: self.tasks.executing() })],
+                () = asked_to_end.cancelled() => {
+                    self.act(connection, vec![Action::Send(ToCoordinator::Goodbye)]);
+                    return Ok(Ended::AskedToEnd);
+                }
+            };
+            self.act(connection, actions);
+        }
+    }
+
+    fn received(
+        &mut self,
+        connection: &mut Connection,
+        received: Received<ToWorker>,
+    ) -> Result<Vec<Action>, WireError> {
+        let new_context = || self.executor.context();
+        match received {
+            Received::Message(ToWorker::Assign(assignment)) => {
+                debug!(label = assignment.label, lease = ?assignment.lease, "assigned");
+                return Ok(self.tasks.assigned(assignment, new_context));
+            }
+            Received::Message(ToWorker::Cancel(lease)) => return Ok(self.tasks.cancelled(lease, new_context)),
+            Received::Message(ToWorker::Acknowledge(lease)) => self.tasks.acknowledged(lease),
+            Received::Message(ToWorker::Blob { hash, length }) => {
+                if connection.transfer.is_some() {
+                    return Err(unexpected("the rest of a blob", "another blob"));
+                }
+                connection.transfer = Some(IncomingBlob::begin(BlobHash(hash), length)?);
+            }
+            Received::Message(message @ (ToWorker::Welcome(_) | ToWorker::Stop { .. })) => {
+                return Err(unexpected("work", &format!("{message:?}")));
+            }
+            Received::Part(part) => match &mut connection.transfer {
+                Some(blob) => blob.push(&part)?,
+                None => return Err(unexpected("a message", "a part of a blob")),
+            },
+        }
+        match connection.take_complete()? {
+            Some(blob) => Ok(self.tasks.fetched(blob, new_context)),
+            None => Ok(Vec::new()),
+        }
+    }
+
+    /// Do what the tasks ask for. Nothing here waits.
+    fn act(&self, connection: &Connection, actions: Vec<Action>) {
+        for action in actions {
+            let outgoing = match action {
+                Action::Execute(job) => {
+                    self.executor.start(job);
+                    continue;
+                }
+                Action::Send(message) => Outgoing::Message(message),
+                Action::Announce { lease, serial } => Outgoing::Announce(ToCoordinator::Started(lease), serial),
+                Action::SendOutput { lease, output } => {
+                    let length = output.len() as u64;
+                    Outgoing::Output(ToCoordinator::Finished { lease, hash: output.hash().0, length }, output)
+                }
+            };
+            // A writer that has ended is noticed by `connect_and_serve`; answers are kept until acknowledged.
+            let _ = connection.outgoing.send(outgoing);
+        }
+    }
+}
+
+struct Connection {
+    incoming: Incoming<OwnedReadHalf>,
+    outgoing: UnboundedSender<Outgoing>,
+    announced: UnboundedReceiver<u64>,
+    transfer: Option<IncomingBlob>,
+}
+
+impl Connection {
+    fn take_complete(&mut self) -> Result<Option<Blob>, TransferError> {
+        self.transfer.take_if(|blob| blob.is_complete()).map(IncomingBlob::finish).transpose()
+    }
+}
+
+fn unexpected(expected: &'static str, found: &str) -> WireError {
+    WireError::Unexpected { expected, found: found.to_owned() }
+}
+
+enum Outgoing {
+    Message(ToCoordinator),
+    /// A message, and what to report once it is written.
+    Announce(ToCoordinator, u64),
+    /// A message, and the blob that it announces.
+    Output(ToCoordinator, Blob),
+}
+
+type Writing = JoinHandle<Result<(), WireError>>;
+
+/// Write in a task of its own: a large output must not keep the worker from reading, nor the other way round.
+fn start_writing(mut writer: OwnedWriteHalf) -> (UnboundedSender<Outgoing>, UnboundedReceiver<u64>, Writing) {
+    let (outgoing, mut queue) = unbounded_channel();
+    let (written, announced) = unbounded_channel();
+    let writing = tokio::spawn(async move {
+        while let Some(next) = queue.recv().await {
+            match next {
+                Outgoing::Message(message) => send_message(&mut writer, &message).await?,
+                Outgoing::Announce(message, serial) => {
+                    send_message(&mut writer, &message).await?;
+                    let _ = written.send(serial);
+                }
+                Outgoing::Output(message, output) => {
+                    send_message(&mut writer, &message).await?;
+                    send_parts(&mut writer, &output).await?;
+                }
+            }
+        }
+        writer.shutdown().await?;
+        Ok(())
+    });
+    (outgoing, announced, writing)
+}
+
+/// Beat in a thread of its own until the returned sender is dropped. Beats that nobody has taken yet are one.
+fn start_heart(interval: Duration, heart: Arc<Notify>) -> Option<blocking::Sender<()>> {
+    let (keep, dropped) = blocking::channel::<()>();
+    let beat = move || {
+        while dropped.recv_timeout(interval) == Err(blocking::RecvTimeoutError::Timeout) {
+            heart.notify_one();
+        }
+    };
+    match std::thread::Builder::new().name("heartbeat".into()).spawn(beat) {
+        Ok(_) => Some(keep),
+        Err(error) => {
+            warn!(%error, "cannot start the heartbeat: the coordinator will take this worker for lost");
+            None
+        }
+    }
+}

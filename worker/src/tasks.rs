@@ -1,0 +1,245 @@
+//! What this worker was assigned and how far it is: a state machine without sockets, threads and time.
+//!
+//! ```text
+//!   Gathering --all inputs there, a thread free--> Announcing --"started" is on the wire--> Executing --> Answered
+//! ```
+//! A node executes only after the coordinator was told: if the node kills this process, the coordinator must know whom to
+//! suspect. An answer is kept until it is acknowledged, and sent again on a new connection.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use lookalike::graph::{Blob, BlobHash, NodeFailure, RunContext};
+use lookalike::protocol::{Assignment, Executing, LeaseName, RunName, ToCoordinator, bounded_text};
+
+use crate::cache::BlobCache;
+use crate::execute::{Completed, Job};
+
+/// What to do next.
+#[derive(Debug)]
+pub(crate) enum Action {
+    /// Send a message.
+    Send(ToCoordinator),
+    /// Send a message that a node starts, then say so with [`Tasks::announced`].
+    Announce { lease: LeaseName, serial: u64 },
+    /// Send an output.
+    SendOutput { lease: LeaseName, output: Blob },
+    /// Execute a job.
+    Execute(Job),
+}
+
+/// The assigned nodes.
+#[derive(Debug)]
+pub(crate) struct Tasks {
+    threads: usize,
+    cache: BlobCache,
+    run: Option<RunName>,
+    /// By node number.
+    tasks: BTreeMap<u64, Task>,
+    /// Blobs that were asked for and have not come.
+    fetching: BTreeSet<BlobHash>,
+    /// Executions, by serial number, that use a thread: also those whose task is gone.
+    running: BTreeSet<u64>,
+    next_serial: u64,
+}
+
+#[derive(Debug)]
+struct Task {
+    lease: LeaseName,
+    stage: Stage,
+}
+
+#[derive(Debug)]
+enum Stage {
+    /// Inputs that are there are held here: the cache may drop them before the last one comes.
+    Gathering {
+        assignment: Assignment,
+        inputs: Vec<Option<Blob>>,
+        arrival: u64,
+    },
+    Announcing(Job),
+    Executing {
+        serial: u64,
+        context: RunContext,
+    },
+    Answered(Result<Blob, NodeFailure>),
+}
+
+impl Tasks {
+    pub(crate) fn new(threads: usize, cache: BlobCache) -> Self {
+        Self {
+            threads,
+            cache,
+            run: None,
+            tasks: BTreeMap::new(),
+            fetching: BTreeSet::new(),
+            running: BTreeSet::new(),
+            next_serial: 0,
+        }
+    }
+
+    /// A coordinator has welcomed us, perhaps again. What had not begun was given back by the lost connection; what had
+    /// begun goes on, and answers are sent again. Another run's work is worth nothing.
+    pub(crate) fn welcomed(&mut self, run: RunName) -> Vec<Action> {
+        let is_same_run = self.run.replace(run) == Some(run);
+        self.fetching.clear();
+        for (_, task) in std::mem::take(&mut self.tasks) {
+            match &task.stage {
+                Stage::Gathering { .. } => {}
+                Stage::Announcing(job) => _ = self.running.remove(&job.serial),
+                Stage::Executing { .. } | Stage::Answered(_) if is_same_run => {
+                    self.tasks.insert(task.lease.node, task);
+                }
+                Stage::Executing { context, .. } => context.cancel(),
+                Stage::Answered(_) => {}
+            }
+        }
+        self.tasks.values().filter_map(Task::answer).collect()
+    }
+
+    /// A node was assigned.
+    pub(crate) fn assigned(&mut self, assignment: Assignment, new_context: impl Fn() -> RunContext) -> Vec<Action> {
+        let lease = assignment.lease;
+        if let Some(task) = self.tasks.get_mut(&lease.node) {
+            // We had it before the connection broke: answer under the new lease.
+            task.lease = lease;
+            return match &task.stage {
+                Stage::Executing { .. } => vec![Action::Send(ToCoordinator::Started(lease))],
+                Stage::Answered(_) => task.answer().into_iter().collect(),
+                Stage::Gathering { .. } | Stage::Announcing(_) => Vec::new(),
+            };
+        }
+        let inputs: Vec<_> = assignment.inputs.iter().map(|hash| self.cache.get(BlobHash(*hash))).collect();
+        let mut actions = Vec::new();
+        for (hash, input) in assignment.inputs.iter().zip(&inputs) {
+            if input.is_none() && self.fetching.insert(BlobHash(*hash)) {
+                actions.push(Action::Send(ToCoordinator::Fetch { hash: *hash }));
+            }
+        }
+        let arrival = self.serial();
+        self.tasks.insert(lease.node, Task { lease, stage: Stage::Gathering { assignment, inputs, arrival } });
+        actions.extend(self.begin(new_context));
+        actions
+    }
+
+    /// The "started" of this execution is on the wire.
+    pub(crate) fn announced(&mut self, serial: u64) -> Vec<Action> {
+        let is_meant = |task: &&mut Task| matches!(&task.stage, Stage::Announcing(job) if job.serial == serial);
+        let Some(task) = self.tasks.values_mut().find(is_meant) else {
+            return Vec::new();
+        };
+        let Stage::Announcing(Job { context, .. }) = &task.stage else {
+            return Vec::new();
+        };
+        let executing = Stage::Executing { serial, context: context.clone() };
+        match std::mem::replace(&mut task.stage, executing) {
+            Stage::Announcing(job) => vec![Action::Execute(job)],
+            _ => Vec::new(),
+        }
+    }
+
+    /// A fetched blob has come.
+    pub(crate) fn fetched(&mut self, blob: Blob, new_context: impl Fn() -> RunContext) -> Vec<Action> {
+        self.fetching.remove(&blob.hash());
+        for task in self.tasks.values_mut() {
+            let Stage::Gathering { assignment, inputs, .. } = &mut task.stage else { continue };
+            let missing = assignment.inputs.iter().zip(inputs).filter(|(hash, _)| **hash == blob.hash().0);
+            missing.for_each(|(_, input)| *input = Some(blob.clone()));
+        }
+        self.cache.insert(blob);
+        self.begin(new_context)
+    }
+
+    /// An execution has ended.
+    pub(crate) fn completed(&mut self, completed: Completed, new_context: impl Fn() -> RunContext) -> Vec<Action> {
+        self.running.remove(&completed.serial);
+        let is_meant =
+            |task: &&mut Task| matches!(task.stage, Stage::Executing { serial, .. } if serial == completed.serial);
+        let mut actions = Vec::new();
+        if let Some(task) = self.tasks.values_mut().find(is_meant) {
+            task.stage = Stage::Answered(completed.result);
+            actions.extend(task.answer());
+        }
+        actions.extend(self.begin(new_context));
+        actions
+    }
+
+    /// The coordinator does not want this node any more.
+    pub(crate) fn cancelled(&mut self, lease: LeaseName, new_context: impl Fn() -> RunContext) -> Vec<Action> {
+        if self.tasks.get(&lease.node).is_none_or(|task| task.lease != lease) {
+            return Vec::new();
+        }
+        match self.tasks.remove(&lease.node).map(|task| task.stage) {
+            Some(Stage::Announcing(job)) => _ = self.running.remove(&job.serial),
+            Some(Stage::Executing { context, .. }) => context.cancel(),
+            Some(Stage::Gathering { .. } | Stage::Answered(_)) | None => {}
+        }
+        self.begin(new_context)
+    }
+
+    /// The coordinator has our answer.
+    pub(crate) fn acknowledged(&mut self, lease: LeaseName) {
+        if self.tasks.get(&lease.node).is_some_and(|task| matches!(task.stage, Stage::Answered(_))) {
+            self.tasks.remove(&lease.node);
+        }
+    }
+
+    /// The nodes in execution.
+    pub(crate) fn executing(&self) -> Vec<Executing> {
+        let progress = |task: &Task| match &task.stage {
+            Stage::Executing { context, .. } => {
+                let permille = u16::try_from(context.progress_permille()).unwrap_or(1000);
+                Some(Executing { lease: task.lease, permille })
+            }
+            _ => None,
+        };
+        self.tasks.values().filter_map(progress).collect()
+    }
+
+    /// Give free threads to the nodes that came first among those whose inputs are there.
+    fn begin(&mut self, new_context: impl Fn() -> RunContext) -> Vec<Action> {
+        let mut actions = Vec::new();
+        let mut gathering: Vec<_> = self.tasks.values().filter_map(Task::gathering).collect();
+        gathering.sort_unstable();
+        for (_, node) in gathering {
+            if self.running.len() >= self.threads {
+                break;
+            }
+            let serial = self.serial();
+            let Some(task) = self.tasks.get_mut(&node) else { continue };
+            let Stage::Gathering { assignment, inputs, .. } = &mut task.stage else { continue };
+            let Some(inputs) = inputs.iter().cloned().collect::<Option<Vec<_>>>() else { continue };
+            let kind = std::mem::take(&mut assignment.kind);
+            let parameters = std::mem::take(&mut assignment.parameters);
+            task.stage = Stage::Announcing(Job { serial, kind, parameters, inputs, context: new_context() });
+            self.running.insert(serial);
+            actions.push(Action::Announce { lease: task.lease, serial });
+        }
+        actions
+    }
+
+    fn serial(&mut self) -> u64 {
+        self.next_serial += 1;
+        self.next_serial
+    }
+}
+
+impl Task {
+    fn answer(&self) -> Option<Action> {
+        let lease = self.lease;
+        match &self.stage {
+            Stage::Answered(Ok(output)) => Some(Action::SendOutput { lease, output: output.clone() }),
+            Stage::Answered(Err(failure)) => {
+                let message = bounded_text(&failure.to_string());
+                Some(Action::Send(ToCoordinator::Failed { lease, message }))
+            }
+            _ => None,
+        }
+    }
+
+    fn gathering(&self) -> Option<(u64, u64)> {
+        match &self.stage {
+            Stage::Gathering { arrival, .. } => Some((*arrival, self.lease.node)),
+            _ => None,
+        }
+    }
+}

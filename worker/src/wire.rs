@@ -1,0 +1,183 @@
+//! The protocol on a stream: the only place, for worker and coordinator alike, where protocol bytes meet tokio.
+
+use std::io;
+
+use lookalike::graph::Blob;
+use lookalike::protocol::{
+    CHALLENGE_BYTES, Challenge, CodecError, FrameError, FrameReader, FrameTag, HandshakeError, Nonce, RESPONSE_BYTES,
+    Response, Secret, TransferError, VERDICT_BYTES, Verdict, decode_message, encode_message, frame_header, parts,
+};
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use thiserror::Error;
+use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt};
+
+/// How much is read at a time.
+const READ_BYTES: usize = 64 << 10;
+
+/// A connection that cannot go on.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum WireError {
+    /// The stream itself failed.
+    #[error(transparent)]
+    Stream(#[from] io::Error),
+    /// The handshake failed.
+    #[error(transparent)]
+    Handshake(#[from] HandshakeError),
+    /// The peer sent something that is no frame.
+    #[error(transparent)]
+    Frame(#[from] FrameError),
+    /// The peer sent something that is no message.
+    #[error(transparent)]
+    Codec(#[from] CodecError),
+    /// The peer sent a blob that is not the announced one.
+    #[error(transparent)]
+    Transfer(#[from] TransferError),
+    /// The stream ended where it should not.
+    #[error("the connection ended")]
+    Ended,
+    /// The peer said nothing for too long.
+    #[error("no answer in time")]
+    TimedOut,
+    /// A message or part where none is allowed.
+    #[error("expected {expected}, found {found}")]
+    Unexpected {
+        /// What is allowed.
+        expected: &'static str,
+        /// What came.
+        found: String,
+    },
+}
+
+impl WireError {
+    /// Whether the peer broke the protocol, as opposed to the stream having ended under it.
+    #[must_use]
+    pub fn is_violation(&self) -> bool {
+        !matches!(self, Self::Stream(_) | Self::Ended | Self::TimedOut)
+    }
+}
+
+/// What comes next on a stream.
+#[derive(Debug)]
+pub enum Received<T> {
+    /// A message.
+    Message(T),
+    /// A part of the blob that was announced last.
+    Part(Vec<u8>),
+}
+
+/// The reading half of a connection, after the handshake.
+#[derive(Debug)]
+pub struct Incoming<R> {
+    stream: R,
+    frames: FrameReader,
+    chunk: Vec<u8>,
+}
+
+impl<R: AsyncRead + Unpin> Incoming<R> {
+    /// Read frames from `stream`.
+    pub fn new(stream: R) -> Self {
+        Self { stream, frames: FrameReader::default(), chunk: vec![0; READ_BYTES] }
+    }
+
+    /// The next message or part; `None` when the stream ended between frames. Nothing is lost when the future is dropped.
+    ///
+    /// # Errors
+    /// When the stream fails, ends inside a frame, or holds anything else than frames with messages of type `T` and parts.
+    pub async fn next<T: DeserializeOwned>(&mut self) -> Result<Option<Received<T>>, WireError> {
+        loop {
+            if let Some(frame) = self.frames.next_frame()? {
+                return Ok(Some(match frame.tag {
+                    FrameTag::Message => Received::Message(decode_message(&frame.body)?),
+                    FrameTag::Part => Received::Part(frame.body),
+                }));
+            }
+            match self.stream.read(&mut self.chunk).await? {
+                0 if self.frames.is_between_frames() => return Ok(None),
+                0 => return Err(WireError::Ended),
+                count => self.frames.push(&self.chunk[..count]),
+            }
+        }
+    }
+
+    /// The next thing, which has to be a message.
+    ///
+    /// # Errors
+    /// As [`next`](Self::next), and when a part comes or the stream ends.
+    pub async fn message<T: DeserializeOwned>(&mut self) -> Result<T, WireError> {
+        match self.next().await? {
+            Some(Received::Message(message)) => Ok(message),
+            Some(Received::Part(_)) => {
+                Err(WireError::Unexpected { expected: "a message", found: "a part of a blob".into() })
+            }
+            None => Err(WireError::Ended),
+        }
+    }
+}
+
+/// Send a message.
+///
+/// # Errors
+/// When the stream fails or the message does not fit into a frame.
+pub async fn send_message<T: Serialize>(stream: &mut (impl AsyncWrite + Unpin), message: &T) -> Result<(), WireError> {
+    let body = encode_message(message)?;
+    let header = frame_header(FrameTag::Message, body.len())?;
+    // One write: a small message leaves in one packet.
+    stream.write_all(&[&header, body.as_slice()].concat()).await?;
+    Ok(())
+}
+
+/// Send the parts of a blob; the message that announces it went before.
+///
+/// # Errors
+/// When the stream fails.
+pub async fn send_parts(stream: &mut (impl AsyncWrite + Unpin), blob: &Blob) -> Result<(), WireError> {
+    for part in parts(blob) {
+        stream.write_all(&frame_header(FrameTag::Part, part.len())?).await?;
+        stream.write_all(part).await?;
+    }
+    Ok(())
+}
+
+/// The worker's side of the preamble: prove the secret, and have it proved.
+///
+/// # Errors
+/// When the stream fails, or the other side is no coordinator of this version that knows the secret and accepts us.
+pub async fn greet_coordinator(
+    stream: &mut (impl AsyncRead + AsyncWrite + Unpin),
+    secret: &Secret,
+    nonce: Nonce,
+) -> Result<(), WireError> {
+    let challenge = Challenge::from_bytes(&read_array::<CHALLENGE_BYTES>(stream).await?)?;
+    let response = challenge.answer(secret, nonce)?;
+    stream.write_all(&response.to_bytes()).await?;
+    let verdict = Verdict::from_bytes(&read_array::<VERDICT_BYTES>(stream).await?)?;
+    Ok(verdict.check(&challenge, &response, secret)?)
+}
+
+/// The coordinator's side of the preamble: challenge, judge, and tell the verdict.
+///
+/// # Errors
+/// When the stream fails, or the other side is no worker of this version that knows the secret.
+pub async fn greet_worker(
+    stream: &mut (impl AsyncRead + AsyncWrite + Unpin),
+    secret: &Secret,
+    nonce: Nonce,
+) -> Result<(), WireError> {
+    let challenge = Challenge::new(nonce);
+    stream.write_all(&challenge.to_bytes()).await?;
+    let response = Response::from_bytes(&read_array::<RESPONSE_BYTES>(stream).await?)?;
+    let verdict = response.judge(&challenge, secret);
+    stream.write_all(&verdict.to_bytes()).await?;
+    verdict.refusal.map_or(Ok(()), |refusal| Err(HandshakeError::Refused(refusal).into()))
+}
+
+async fn read_array<const N: usize>(stream: &mut (impl AsyncRead + Unpin)) -> Result<[u8; N], WireError> {
+    let mut bytes = [0; N];
+    match stream.read_exact(&mut bytes).await {
+        Ok(_) => Ok(bytes),
+        Err(error) if error.kind() == io::ErrorKind::UnexpectedEof => Err(WireError::Ended),
+        Err(error) => Err(error.into()),
+    }
+}
