@@ -210,14 +210,12 @@ fn missing_channels_and_blocks_are_errors() {
     assert!(matches!(decode("photo.exr", &bytes), Err(ImageError::Malformed { .. })));
 }
 
-/// Found by fuzzing: the decompressor of the `exr` crate panics where overflow is checked.
+/// Found by fuzzing: where overflow is checked, the decompressor of the `exr` crate panics on differences below zero.
 #[test]
-fn a_broken_b44_block_is_an_error_or_pixels() {
+fn a_broken_b44_block_never_panics() {
     let mut bytes = fixture!("b44a.exr").to_vec();
-    let start = bytes.len() - 2000;
-    for (n, byte) in bytes[start..].iter_mut().enumerate() {
-        *byte = byte.wrapping_mul(167).wrapping_add(u8::try_from(n % 251).unwrap());
-    }
+    let start = bytes.len() - 1500;
+    bytes[start..].fill(0);
     if let Ok(decoded) = decode("photo.exr", &bytes) {
         assert_eq!((decoded.image.width(), decoded.image.height()), SIZE);
     }
