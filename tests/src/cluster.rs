@@ -19,12 +19,15 @@ use crate::plan::{Leaves, TestPlanner};
 /// Longer than anything a test waits for on a slow machine; a test that waits longer has failed.
 const PATIENCE: Duration = Duration::from_secs(60);
 
+/// How a run ended: the output of its last node and what it has cost, or its error.
+pub type Outcome = Result<(Option<Vec<u8>>, RunSummary), RunError>;
+
 /// A run that goes on in a thread.
 #[derive(Debug)]
 pub struct Cluster {
     folder: TempDir,
     events: Receiver<RunEvent>,
-    thread: JoinHandle<Result<(Option<Vec<u8>>, RunSummary), RunError>>,
+    thread: JoinHandle<Outcome>,
 }
 
 /// Options for a run with `workers` workers of `program`, which has to be `lookalike-test-cluster`. The access file is set
@@ -104,8 +107,8 @@ impl Cluster {
     ///
     /// # Panics
     /// When it does not end in time, or its thread panics.
-    #[must_use]
-    pub fn outcome(self) -> (Vec<RunEvent>, Result<(Option<Vec<u8>>, RunSummary), RunError>) {
+    #[must_use = "the outcome may be an error"]
+    pub fn outcome(self) -> (Vec<RunEvent>, Outcome) {
         let mut rest = Vec::new();
         loop {
             match self.events.recv_timeout(PATIENCE) {

@@ -3,12 +3,13 @@
 use std::process::Command;
 use std::time::Duration;
 
+use lookalike_coordinator::access::new_access;
 use lookalike_coordinator::comm::{Departure, RunEvent};
 use lookalike_coordinator::core::Policy;
 use lookalike_coordinator::runner::{RunError, RunnerOptions};
 use lookalike_coordinator::spawn::WorkerCommand;
 use lookalike_tests::cluster::{Cluster, options};
-use lookalike_tests::gate::Gate;
+use lookalike_tests::gate::{Gate, Waiting};
 use lookalike_tests::plan::{Leaves, TestPlanner};
 use lookalike_tests::process::{Process, signal, stderr};
 
@@ -34,7 +35,11 @@ fn local_listener() -> RunnerOptions {
 }
 
 fn worker(cluster: &Cluster) -> Process {
-    Process::start(Command::new(PROGRAM).args(["worker", "--threads", "2", "--access"]).arg(cluster.access_file()))
+    Process::start(Command::new(PROGRAM).args(["worker", "--threads", "1", "--access"]).arg(cluster.access_file()))
+}
+
+fn wait_for_deaths(workers: [Waiting; 2]) {
+    workers.into_iter().for_each(Waiting::wait_for_death);
 }
 
 #[test]
@@ -148,15 +153,20 @@ fn worker_that_hangs_is_lost_after_its_lease() {
 
 #[test]
 fn workers_may_come_from_elsewhere_and_end_with_the_run() {
-    let leaves = Leaves::Digests { count: 21, shared_bytes: 1000 };
-    let cluster = Cluster::start(leaves.clone(), local_listener());
+    let gate = Gate::new();
+    let cluster = Cluster::start(gates(&gate, 2), local_listener());
     cluster.address();
     let workers = [worker(&cluster), worker(&cluster)];
-    let (result, _) = cluster.finish();
-    assert_eq!(result, TestPlanner::reference(leaves));
-    let joined_or_late = workers.map(|worker| worker.output().status.code());
-    // One of them may have come when all was done already: then it has no coordinator to end it, and the test does.
-    assert!(joined_or_late.contains(&Some(0)), "{joined_or_late:?}");
+    // Each executes one node at a time, so both are needed for two at the gate.
+    let waiting = [gate.next(), gate.next()];
+    assert_ne!(waiting[0].process(), waiting[1].process());
+    waiting.into_iter().for_each(Waiting::release);
+    let (result, summary) = cluster.finish();
+    assert_eq!((result, summary.workers_joined), (gates_reference(2), 2));
+    for worker in workers {
+        let output = worker.output();
+        assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    }
 }
 
 #[test]
@@ -201,7 +211,7 @@ fn killed_coordinator_leaves_no_worker_behind() {
     let coordinator = coordinator_at_work(&gate, &folder);
     let workers = [gate.next(), gate.next()];
     signal(coordinator.id(), "KILL");
-    workers.map(lookalike_tests::gate::Waiting::wait_for_death);
+    wait_for_deaths(workers);
 }
 
 #[test]
@@ -214,22 +224,17 @@ fn interrupted_coordinator_ends_its_workers_and_says_so() {
         let output = coordinator.output();
         assert_eq!(output.status.code(), Some(130), "{}", stderr(&output));
         assert!(stderr(&output).contains("error: interrupted"), "{}", stderr(&output));
-        workers.map(lookalike_tests::gate::Waiting::wait_for_death);
+        wait_for_deaths(workers);
     }
 }
 
 #[test]
 fn worker_without_a_coordinator_gives_up_by_name() {
-    let cluster = Cluster::start(Leaves::Digests { count: 1, shared_bytes: 1 }, options(PROGRAM, 1));
-    let access = cluster.folder().join("copy.json");
-    cluster.address();
-    std::fs::copy(cluster.access_file(), &access).unwrap();
-    // Kept beyond the folder's life.
-    let text = std::fs::read_to_string(&access).unwrap();
-    drop(cluster.finish());
     let folder = tempfile::tempdir().unwrap();
     let access = folder.path().join("access.json");
-    std::fs::write(&access, text).unwrap();
+    // A port where nobody listens any more.
+    let address = Gate::new().address().to_string();
+    std::fs::write(&access, new_access(address).unwrap().to_json()).unwrap();
     let output =
         Process::start(Command::new(WORKER).args(["--reconnect-for", "300ms", "--access"]).arg(&access)).output();
     assert_eq!(output.status.code(), Some(3), "{}", stderr(&output));
