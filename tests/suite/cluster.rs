@@ -252,6 +252,9 @@ fn worker_with_bad_usage_or_files_exits_with_two() {
         assert_eq!(output.status.code(), Some(2));
         assert!(stderr(&output).contains(expected), "{}", stderr(&output));
     }
-    let usage = Process::start(Command::new(WORKER).args(["--threads", "0", "--access", "x"])).output();
-    assert_eq!(usage.status.code(), Some(2));
+    for (flag, value) in [("--threads", "0"), ("--reconnect-for", "soon"), ("--log", "worker=loud")] {
+        let output = Process::start(Command::new(WORKER).args([flag, value, "--access", "x"])).output();
+        assert_eq!(output.status.code(), Some(2), "{flag} {value}");
+        assert!(stderr(&output).contains(flag), "{}", stderr(&output));
+    }
 }

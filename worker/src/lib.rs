@@ -89,8 +89,13 @@ struct Program {
     arguments: Arguments,
 
     /// What to log to stderr: error, warn, info, debug, trace, or a filter such as `lookalike_worker=debug` [default: RUST_LOG, else warn]
-    #[arg(long, value_name = "LEVEL")]
+    #[arg(long, value_name = "LEVEL", value_parser = checked_filter)]
     log: Option<String>,
+}
+
+/// The filter itself cannot be cloned, as clap would have to; so the text is kept.
+fn checked_filter(text: &str) -> Result<String, String> {
+    EnvFilter::try_new(text).map(|_| text.to_owned()).map_err(|error| error.to_string())
 }
 
 fn init_tracing(level: Option<&str>) {
