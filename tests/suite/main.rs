@@ -1,3 +1,5 @@
 //! One test binary of modules, so that the suite links once.
 
 mod cli;
+mod cluster;
+mod cluster_hostile;
