@@ -6,6 +6,7 @@
 //! 4. stage three, [`polish`]: a short pattern search on CSSIM itself from the winner.
 //!
 
+mod best;
 mod candidate;
 mod method;
 pub mod nodes;
@@ -17,6 +18,7 @@ mod stage_one;
 mod stage_two;
 mod wire;
 
+pub use best::BestScore;
 pub use candidate::{Candidate, SAME, distinct, needed_span};
 pub use method::{AtZero, JudgedBy, Method, MethodError, SearchKind, Start, gamma_range};
 pub use objective::Objective;

@@ -7,7 +7,7 @@
 //! The graph depends on the inputs alone, never on the number of workers or the order in which nodes finish.
 
 use super::{
-    Candidate, Judged, JudgedBy, Method, MethodError, Polished, SearchKind, Start,
+    BestScore, Candidate, Judged, JudgedBy, Method, MethodError, Polished, SearchKind, Start,
     method::AtZero,
     needed_span,
     nodes::{
@@ -68,6 +68,8 @@ pub struct FitOutcome {
     pub winner: usize,
     /// The outcome of stage three, when it ran.
     pub polished: Option<Polished>,
+    /// The rendering of the winner of stage two, as [`Self::matched`].
+    pub winner_image: Image,
     /// The rendering of the final parameters at full resolution, linear Rec. 709, not multiplied by coverage.
     pub matched: Image,
     /// The error of the match, per window.
@@ -97,6 +99,7 @@ pub struct FitPlanner {
     polish_rounds: usize,
     polish_evaluations: usize,
     polished: Option<Polished>,
+    best: Arc<BestScore>,
     outcome: Option<FitOutcome>,
 }
 
@@ -146,6 +149,7 @@ impl FitPlanner {
             polish_rounds: 0,
             polish_evaluations: 0,
             polished: None,
+            best: Arc::default(),
             outcome: None,
         })
     }
@@ -169,16 +173,10 @@ impl FitPlanner {
         self.outcome
     }
 
-    /// The best score so far: of stage two, or of polish.
+    /// Where the best score so far can be watched while the graph runs.
     #[must_use]
-    pub fn best_score(&self) -> Option<f64> {
-        let selected = winner(&self.judged, self.method.judge).map(|w| self.score(&self.judged[w]));
-        let polished = self.polished.as_ref().map(|p| self.method.judge.pick(p.cssim, p.cssim_object));
-        polished.or(selected)
-    }
-
-    fn score(&self, judged: &Judged) -> f64 {
-        self.method.judge.pick(judged.cssim, judged.cssim_object)
+    pub fn best(&self) -> Arc<BestScore> {
+        Arc::clone(&self.best)
     }
 
     /// Adds the shards of a table of `count` pixels of the list `pixels`.
@@ -313,6 +311,7 @@ impl FitPlanner {
             .collect();
         let best = winner(&self.judged, self.method.judge).ok_or_else(|| PlanError::new("no candidate was judged"))?;
         self.polish_start = self.judged[best].candidate.parameters.clone();
+        self.best.set(self.method.judge.pick(self.judged[best].cssim, self.judged[best].cssim_object));
         if self.method.polish { self.add_polish(graph) } else { self.add_report(graph) }
     }
 
@@ -333,6 +332,7 @@ impl FitPlanner {
             && self.polish_rounds < MAX_POLISH_ROUNDS
             && self.polish_evaluations < MAX_EVALUATIONS;
         self.polish_start = polished.parameters.clone();
+        self.best.set(self.method.judge.pick(polished.cssim, polished.cssim_object));
         self.polished = Some(polished);
         if goes_on {
             self.widen_span();
@@ -357,13 +357,15 @@ impl FitPlanner {
 
     fn add_report(&mut self, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
         let extra = self.extra_candidates().into_iter().map(|j| j.candidate.parameters.clone());
-        let last = self.polished.as_ref().map_or(&self.polish_start, |p| &p.parameters).clone();
-        let parameters = ReportParameters { parameters: extra.chain([last]).collect() };
+        let best = winner(&self.judged, self.method.judge).ok_or_else(|| PlanError::new("no candidate was judged"))?;
+        let won = self.judged[best].candidate.parameters.clone();
+        let last = self.polished.as_ref().map_or(&won, |p| &p.parameters).clone();
+        let parameters = ReportParameters { parameters: extra.chain([won, last]).collect() };
         self.step = Step::Reporting(self.add_judging(graph, nodes::REPORT, &parameters)?);
         Ok(())
     }
 
-    /// The candidates to be rendered beside the match: of the first subset, and only those whose widths the table holds.
+    /// The candidates to be rendered beside the match: those of the first subset.
     fn extra_candidates(&self) -> Vec<&Judged> {
         let wanted = |j: &&Judged| j.candidate.subset == 0 && self.extra_gammas.contains(&j.candidate.gamma);
         self.judged.iter().filter(wanted).collect()
@@ -372,7 +374,9 @@ impl FitPlanner {
     fn reported(&mut self, output: &Blob) -> Result<(), PlanError> {
         let report: ReportWire = read("report", output).map_err(other)?;
         let mut images = report.images.into_iter().map(ImageWire::image).collect::<Result<Vec<_>, _>>().map_err(other)?;
-        let matched = images.pop().ok_or_else(|| PlanError::new("the report holds no image"))?;
+        let missing = || PlanError::new("the report lacks an image");
+        let matched = images.pop().ok_or_else(missing)?;
+        let winner_image = images.pop().ok_or_else(missing)?;
         let gammas = self.extra_candidates().into_iter().map(|j| j.candidate.gamma);
         let extra = gammas.zip(images).collect();
         let (width, height) = (matched.width(), matched.height());
@@ -382,6 +386,7 @@ impl FitPlanner {
             judged: self.judged.clone(),
             winner: best,
             polished: self.polished.clone(),
+            winner_image,
             matched,
             error_map,
             extra,

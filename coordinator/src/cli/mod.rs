@@ -66,7 +66,7 @@ fn dispatch(command: Command) -> anyhow::Result<ExitCode> {
         Command::Fit(args) => fit::run(FitArgs::into_settings(*args)?),
         Command::Render(args) => render::run(args.into_settings()?),
         Command::Compare(args) => compare::run(args.into_settings()),
-        Command::Worker(args) => worker::run(args.into_settings()),
+        Command::Worker(args) => worker::run(args),
         Command::Batch(_) => later("lookalike batch", "run `lookalike fit` once per photo"),
         Command::Status(_) => {
             later("lookalike status", "a fit tells its progress on stderr, its result in OUT/fit.json")

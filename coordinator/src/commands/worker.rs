@@ -1,10 +1,10 @@
-//! `lookalike worker`.
+//! `lookalike worker`: the same as `lookalike-worker`.
 
-use crate::{cli::NotThereYet, settings::WorkerSettings};
+use lookalike::fit::nodes;
+use lookalike_worker::{Arguments, run_and_report};
 use std::process::ExitCode;
 
-/// Computes for a coordinator until it says stop.
-pub(crate) fn run(settings: WorkerSettings) -> anyhow::Result<ExitCode> {
-    tracing::debug!(?settings);
-    Err(NotThereYet { what: "lookalike worker", instead: "this build has no worker" }.into())
+#[allow(clippy::unnecessary_wraps, reason = "every command has this signature")]
+pub(crate) fn run(arguments: Arguments) -> anyhow::Result<ExitCode> {
+    Ok(run_and_report(&arguments.into_options(), nodes::registry()))
 }

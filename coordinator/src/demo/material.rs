@@ -11,8 +11,28 @@
 //! Energy: the coat reflects at most F; what passes it reaches a base whose albedo is below 1 for these constants, and
 //! T is paid on the way in and on the way out (a test integrates the whole: at most 0.69).
 
-use lookalike::math::{Rgb, Vec3, elementary::fifth_power};
+use lookalike::{
+    brdf::Reflectance,
+    math::{Rgb, Vec3, elementary::fifth_power},
+};
 use std::f64::consts::PI;
+
+/// What the material is, in one line.
+pub const DESCRIPTION: &str = "pearl paint under lacquer: two GGX lobes, a clear coat, a retro-reflective diffuse part";
+
+/// The material as something to render.
+#[derive(Debug, Clone, Copy)]
+pub struct Target;
+
+impl Reflectance for Target {
+    fn eval_cos(&self, wi_local: Vec3, wo_local: Vec3) -> Rgb {
+        eval(wi_local, wo_local) * wi_local.z.max(0.0)
+    }
+
+    fn sampling_alphas(&self) -> Vec<f64> {
+        [COAT_ALPHA].into_iter().chain(PIGMENT.iter().map(|p| p.alpha)).chain([1.0]).collect()
+    }
+}
 
 /// The BRDF in 1/sr, without the cosine, for unit directions that point away from the surface, in the frame whose +Z
 /// is the normal. Zero where either lies at or below the surface.

@@ -6,3 +6,4 @@
 pub mod environment;
 pub mod material;
 mod pavilion;
+pub mod photo;

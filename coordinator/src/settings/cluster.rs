@@ -30,6 +30,20 @@ pub enum Workers {
     Count(usize),
 }
 
+impl Default for ClusterSettings {
+    /// One local worker per core, reachable from this machine alone.
+    fn default() -> Self {
+        Self {
+            workers: Workers::PerCore,
+            listen: SocketAddr::from(([127, 0, 0, 1], 0)),
+            advertise: None,
+            access: None,
+            wait_for_workers: Duration::from_mins(10),
+            grace: Duration::from_mins(1),
+        }
+    }
+}
+
 impl Workers {
     /// The number of processes; asks the system how many cores there are.
     #[must_use]

@@ -61,3 +61,23 @@ pub struct MethodSettings {
     /// The seed of every random choice.
     pub seed: u64,
 }
+
+impl Default for MethodSettings {
+    /// The defaults of the command line.
+    fn default() -> Self {
+        Self {
+            preset: None,
+            model: ModelName::default(),
+            gammas: Gammas::default(),
+            samples: Samples::default(),
+            sampling: Sampling::default(),
+            subsets: NonZeroUsize::MIN,
+            search: SearchKind::default(),
+            start: Start::default(),
+            compress_at_zero: CompressAtZero::default(),
+            polish: true,
+            judge: Judge::default(),
+            seed: 0,
+        }
+    }
+}

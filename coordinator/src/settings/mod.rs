@@ -19,7 +19,6 @@ mod model;
 mod render;
 mod samples;
 mod scene;
-mod worker;
 
 pub use camera::CameraSpec;
 pub use choices::{CompressAtZero, EnvMapping, Judge, MetricKind, Preset, ProgressKind, Sampling, SearchKind, Start};
@@ -34,4 +33,3 @@ pub use model::{ModelName, ModelParams};
 pub use render::{Material, RenderSettings};
 pub use samples::Samples;
 pub use scene::{EnvironmentSettings, ViewSettings};
-pub use worker::WorkerSettings;

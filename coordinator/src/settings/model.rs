@@ -1,6 +1,7 @@
 //! `--model` and `--params`: which BRDF, and with which values.
 
 use anyhow::{Context, bail};
+use lookalike::brdf;
 use std::{fmt, str::FromStr};
 
 /// The name of a BRDF model that can be fitted (design section 4).
@@ -26,13 +27,13 @@ impl FromStr for ModelName {
 
     /// One of the models' names; those of the design that do not exist yet are told apart from those that never will.
     fn from_str(text: &str) -> anyhow::Result<Self> {
-        if FITTED.contains(&text) {
+        if brdf::model(text).is_ok() {
             return Ok(Self(text.into()));
         }
         if PLANNED.contains(&text) {
-            bail!("the model {text} is not there yet: this version fits {}", FITTED.join(" and "));
+            bail!("the model {text} is not there yet: this version fits {}", fitted().join(" and "));
         }
-        bail!("no such model; possible values: {}", FITTED.join(", "))
+        bail!("no such model; possible values: {}", fitted().join(", "))
     }
 }
 
@@ -42,8 +43,10 @@ impl fmt::Display for ModelName {
     }
 }
 
-/// Models that this version fits.
-const FITTED: [&str; 2] = ["ggx", "cook-torrance"];
+/// The models of the registry.
+fn fitted() -> Vec<&'static str> {
+    brdf::MODELS.iter().map(|m| m.name()).collect()
+}
 /// Models of the design that this version does not have.
 const PLANNED: [&str; 5] = ["ward", "blinn-phong", "ashikhmin-shirley", "disney", "merl"];
 

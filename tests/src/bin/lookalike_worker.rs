@@ -2,8 +2,8 @@
 
 use std::process::ExitCode;
 
-use lookalike::graph::Registry;
+use lookalike::fit::nodes;
 
 fn main() -> ExitCode {
-    lookalike_worker::main_with(Registry::default())
+    lookalike_worker::main_with(nodes::registry())
 }

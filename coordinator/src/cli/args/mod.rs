@@ -10,7 +10,6 @@ mod later;
 mod method;
 mod render;
 mod scene;
-mod worker;
 
 pub(crate) use fit::FitArgs;
 
@@ -56,7 +55,8 @@ pub(crate) enum Command {
     /// Make an access file before the run it is for (not there yet)
     Access(later::AccessArgs),
     /// Compute for a coordinator: the same as lookalike-worker
-    Worker(worker::WorkerArgs),
+    #[command(after_long_help = "Example:\n  lookalike worker --access run/access.json --threads 8")]
+    Worker(lookalike_worker::Arguments),
 }
 
 impl Command {

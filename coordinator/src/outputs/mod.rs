@@ -1,0 +1,18 @@
+//! What a fit leaves behind in OUT (design section 10): numbers for programs, pictures for people.
+
+mod candidates_csv;
+mod conventions;
+mod fit_json;
+mod folder;
+mod pictures;
+mod strip;
+mod summary;
+
+pub(crate) use conventions::conventions;
+pub(crate) use fit_json::{FitRecord, Timing, parameters_json};
+pub(crate) use folder::OutFolder;
+pub(crate) use pictures::{Pictures, write_pictures};
+pub(crate) use strip::{Panel, strip};
+pub(crate) use summary::print_summary;
+
+pub(crate) use candidates_csv::candidates_csv;

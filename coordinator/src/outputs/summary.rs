@@ -1,0 +1,92 @@
+//! The short table that a fit ends with, on stdout.
+
+use super::{FitRecord, Timing};
+use lookalike::brdf::{Channels, Model};
+use std::{
+    fmt::Write as _,
+    io::{self, Write as _},
+};
+
+/// Prints what was found: winner, parameters, scores, seconds.
+pub(crate) fn print_summary(record: &FitRecord<'_>, timing: &Timing, out: &str) -> io::Result<()> {
+    let text = summary(record, timing, out);
+    io::stdout().lock().write_all(text.as_bytes())
+}
+
+fn summary(record: &FitRecord<'_>, timing: &Timing, out: &str) -> String {
+    let (model, outcome) = (record.method.model, record.outcome);
+    let usable = record.capture.counts().usable;
+    let mut text = format!("{} on {} of {usable} usable pixels", model.name(), record.settings.samples);
+    let _ = writeln!(text, ", {} gammas, seed {}\n", record.method.gammas.len(), record.method.seed);
+    let mut rows = vec![header(model)];
+    let first = outcome.judged.iter().find(|j| j.candidate.gamma == 1.0);
+    if let Some(j) = first {
+        rows.push(row(model, "least squares (L2)", "1", j.cssim, j.cssim_object, &j.candidate.parameters));
+    }
+    let winner = &outcome.judged[outcome.winner];
+    let gamma = winner.candidate.gamma.to_string();
+    let scores = (winner.cssim, winner.cssim_object);
+    rows.push(row(model, "stage two", &gamma, scores.0, scores.1, &winner.candidate.parameters));
+    if let Some(p) = &outcome.polished {
+        rows.push(row(model, "polished", "", p.cssim, p.cssim_object, &p.parameters));
+    }
+    text.push_str(&aligned(&rows));
+    for note in record.notes {
+        let _ = writeln!(text, "\nnote: {note}");
+    }
+    let seconds: Vec<String> = timing.seconds.iter().map(|(stage, s)| format!("{stage} {s:.1}")).collect();
+    let workers = match timing.workers {
+        1 => "1 local worker".to_owned(),
+        n => format!("{n} local workers"),
+    };
+    let _ = writeln!(text, "\nseconds: {} ({workers})", seconds.join(", "));
+    let _ = writeln!(text, "results: {out}");
+    text
+}
+
+fn header(model: &dyn Model) -> Vec<String> {
+    let fixed = ["", "gamma", "CSSIM", "on object"].map(str::to_owned);
+    fixed.into_iter().chain(model.parameters().iter().map(|p| p.name.to_owned())).collect()
+}
+
+fn row(model: &dyn Model, name: &str, gamma: &str, cssim: f64, object: f64, parameters: &[f64]) -> Vec<String> {
+    let mut row = vec![name.to_owned(), gamma.to_owned(), format!("{cssim:.4}"), format!("{object:.4}")];
+    let mut first = 0;
+    for parameter in model.parameters() {
+        let values = &parameters[first..first + parameter.channels.count()];
+        row.push(match parameter.channels {
+            Channels::Scalar => format!("{:.4}", values[0]),
+            Channels::Rgb => values.iter().map(|v| format!("{v:.3}")).collect::<Vec<_>>().join(" "),
+        });
+        first += values.len();
+    }
+    row
+}
+
+/// Columns as wide as their widest entry; the first column left, the others right.
+fn aligned(rows: &[Vec<String>]) -> String {
+    let columns = rows.iter().map(Vec::len).max().unwrap_or(0);
+    let width = |c: usize| rows.iter().filter_map(|r| r.get(c)).map(String::len).max().unwrap_or(0);
+    let widths: Vec<usize> = (0..columns).map(width).collect();
+    let mut text = String::new();
+    for row in rows {
+        let mut line = format!("  {:<1$}", row[0], widths[0]);
+        for (cell, width) in row.iter().zip(&widths).skip(1) {
+            let _ = write!(line, "  {cell:>width$}");
+        }
+        text.push_str(line.trim_end());
+        text.push('\n');
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn columns_line_up() {
+        let rows = [vec!["".into(), "gamma".into()], vec!["stage two".into(), "1.5".into()]].map(|r: Vec<String>| r);
+        assert_eq!(aligned(&rows), "             gamma\n  stage two    1.5\n");
+    }
+}
