@@ -1,5 +1,5 @@
 #!/bin/sh
-# Fills corpus/ with the fixtures and, for Radiance pictures, PFM, PNG and JPEG, tiny files to start from.
+# Fills corpus/ with files to start from.
 set -eu
 cd "$(dirname "$0")"
 mkdir -p corpus/exr corpus/hdr corpus/pfm corpus/png_jpeg
@@ -8,5 +8,4 @@ printf '#?RADIANCE\nEXPOSURE=2\nCOLORCORR=1 1 2\nPRIMARIES=0.64 0.33 0.29 0.60 0
 printf '#?RGBE\n\n+X 1 -Y 4\n\200\100\040\201\001\001\001\003' > corpus/hdr/old
 printf 'PF\n1 1\n-1.0\n\000\000\200\077\000\000\200\077\000\000\200\077' > corpus/pfm/colour
 printf 'Pf\r\n1 2\r\n2\r\n\077\200\000\000\077\200\000\000' > corpus/pfm/grey
-printf '\211PNG\r\n\032\n\000\000\000\015IHDR\000\000\000\003\000\000\000\001\004\003\000\000\000' > corpus/png_jpeg/header
-printf '\377\330\377\340\000\020JFIF\000\001\001\000\000\001\000\001\000\000\377\331' > corpus/png_jpeg/jfif
+cp seeds/png_jpeg/* corpus/png_jpeg/

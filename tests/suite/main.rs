@@ -1,4 +1,6 @@
 //! One test binary of modules, so that the suite links once.
 
 mod cli;
+mod cluster;
+mod cluster_hostile;
 mod tidy;

@@ -11,8 +11,9 @@ mod source;
 use paths::{Found, calls, chain, paths, words};
 use source::{Source, sources};
 
-/// What each module of `common` may import of the others. A tight list: widen it in the commit that explains why.
-const MAY_IMPORT: [(&str, &[&str]); 12] = [
+/// What each module of `common` may import of the others; the longest path that fits a file counts. A tight list: widen
+/// it in the commit that explains why.
+const MAY_IMPORT: [(&str, &[&str]); 15] = [
     ("math", &[]),
     ("image", &["math"]),
     ("brdf", &["math"]),
@@ -21,7 +22,10 @@ const MAY_IMPORT: [(&str, &[&str]); 12] = [
     ("render", &["brdf", "image", "light", "math", "scene"]),
     ("metric", &["image", "math"]),
     ("search", &["math"]),
-    ("fit", &["brdf", "graph", "image", "light", "math", "metric", "render", "scene", "search"]),
+    ("fit", &["brdf", "image", "light", "math", "metric", "render", "scene", "search"]),
+    ("fit/nodes", &["brdf", "graph", "image", "light", "math", "metric", "render", "scene", "search"]),
+    ("fit/plan", &["brdf", "graph", "image", "light", "math", "metric", "render", "scene", "search"]),
+    ("fit/wire", &["brdf", "graph", "image", "light", "math", "metric", "protocol", "render", "scene", "search"]),
     ("export", &["brdf", "image", "math"]),
     ("graph", &[]),
     ("protocol", &["graph"]),
@@ -89,14 +93,18 @@ fn modules_of_the_library_import_in_one_direction() {
     let mut offences = Vec::new();
     for source in common() {
         let Some(module) = source.module_of_common() else { continue };
-        let Some((_, allowed)) = MAY_IMPORT.iter().find(|(name, _)| *name == module) else {
+        let fits = |name: &str| {
+            source.path["common/src/".len()..].strip_prefix(name).is_some_and(|r| r.starts_with(['/', '.']))
+        };
+        let Some((name, allowed)) = MAY_IMPORT.iter().filter(|(name, _)| fits(name)).max_by_key(|(name, _)| name.len())
+        else {
             offences.push(format!("{}: the module {module} is not in MAY_IMPORT; give it its place", source.path));
             continue;
         };
         for found in paths(&source.code, "crate") {
             let target = found.name.split("::").nth(1).unwrap_or("*");
             if target != module && !allowed.contains(&target) {
-                offences.push(at(&source, &found, &format!("must not be imported by {module}")));
+                offences.push(at(&source, &found, &format!("must not be imported by {name}")));
             }
         }
         // A path of `super` that leaves its module would escape the check above.

@@ -18,6 +18,7 @@ pub mod wire;
 #[cfg(test)]
 mod tests;
 
+use std::ffi::OsString;
 use std::process::ExitCode;
 
 use clap::Parser;
@@ -39,10 +40,17 @@ pub fn run(options: &WorkerOptions, registry: Registry) -> Result<(), WorkerErro
     runtime.block_on(session::run(options, registry))
 }
 
-/// The program `lookalike-worker`, with these node types: parses the command line, runs, and tells errors on stderr.
+/// The program `lookalike-worker` with these node types and the process's own command line.
 #[must_use]
 pub fn main_with(registry: Registry) -> ExitCode {
-    let program = match Program::try_parse() {
+    main_from(std::env::args_os(), registry)
+}
+
+/// The program `lookalike-worker` with these node types and this command line, whose first entry is the program's name:
+/// parses it, runs, and tells errors on stderr.
+#[must_use]
+pub fn main_from(arguments: impl IntoIterator<Item = OsString>, registry: Registry) -> ExitCode {
+    let program = match Program::try_parse_from(arguments) {
         Ok(program) => program,
         Err(error) => {
             let is_error = error.use_stderr();
@@ -81,8 +89,13 @@ struct Program {
     arguments: Arguments,
 
     /// What to log to stderr: error, warn, info, debug, trace, or a filter such as `lookalike_worker=debug` [default: RUST_LOG, else warn]
-    #[arg(long, value_name = "LEVEL")]
+    #[arg(long, value_name = "LEVEL", value_parser = checked_filter)]
     log: Option<String>,
+}
+
+/// The filter itself cannot be cloned, as clap would have to; so the text is kept.
+fn checked_filter(text: &str) -> Result<String, String> {
+    EnvFilter::try_new(text).map(|_| text.to_owned()).map_err(|error| error.to_string())
 }
 
 fn init_tracing(level: Option<&str>) {

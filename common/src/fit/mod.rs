@@ -8,15 +8,19 @@
 
 mod candidate;
 mod method;
+pub mod nodes;
 mod objective;
+mod plan;
 mod polish;
 mod scan;
 mod stage_one;
 mod stage_two;
+mod wire;
 
 pub use candidate::{Candidate, SAME, distinct, needed_span};
 pub use method::{AtZero, JudgedBy, Method, MethodError, SearchKind, Start, gamma_range};
 pub use objective::Objective;
+pub use plan::{FitError, FitOutcome, FitPlanner};
 pub use polish::{INITIAL_MESH, MAX_EVALUATIONS, Polished, polish};
 pub use stage_one::{SearchFailure, search_gamma};
 pub use stage_two::{FullView, Judged, judge_candidates, winner};

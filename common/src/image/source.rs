@@ -30,7 +30,8 @@ pub fn decode_mask(name: &str, bytes: &[u8]) -> Result<Plane<f32>, ImageError> {
 }
 
 /// Decodes a normal map: world-space unit normals, exactly zero on the background. OpenEXR (channels `X Y Z` or
-/// `R G B`, also of a named layer) or PFM. Normals within [`normals::LENGTH_TOLERANCE`] of unit length are renormalised.
+/// `R G B`, also of a named layer) or PFM. Normals whose length is within 0.01 of 1 are
+/// renormalised.
 ///
 /// # Errors
 /// As [`decode`], and with the pixel's coordinates if a normal is neither zero nor of unit length.

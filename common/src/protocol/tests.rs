@@ -1,3 +1,4 @@
+use proptest::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::*;
@@ -256,4 +257,33 @@ fn long_text_is_cut_at_a_character() {
     assert_eq!(cut.len(), MAX_MESSAGE_TEXT_BYTES - 1);
     assert!(text.starts_with(&cut));
     assert_eq!(bounded_text("short"), "short");
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn arbitrary_bytes_are_refused_or_understood_but_never_panic(
+        bytes in prop::collection::vec(any::<u8>(), 0..300),
+        variant in 0..8_u8,
+        cut in 1..300_usize,
+    ) {
+        // The first byte is the variant: most random messages would fail on it alone.
+        let message = [&[variant], bytes.as_slice()].concat();
+        if let Ok(understood) = decode_message::<ToWorker>(&message) {
+            prop_assert_eq!(decode_message::<ToWorker>(&encode_message(&understood).unwrap()).unwrap(), understood);
+        }
+        if let Ok(understood) = decode_message::<ToCoordinator>(&message) {
+            prop_assert_eq!(decode_message::<ToCoordinator>(&encode_message(&understood).unwrap()).unwrap(), understood);
+        }
+        let _ = decode::<Vec<(String, f64)>>(&bytes);
+        let _ = Access::parse(&String::from_utf8_lossy(&bytes));
+        let mut reader = FrameReader::default();
+        for piece in bytes.chunks(cut) {
+            reader.push(piece);
+            while let Ok(Some(frame)) = reader.next_frame() {
+                prop_assert!(frame.body.len() < MAX_FRAME_BYTES);
+            }
+        }
+    }
 }

@@ -126,6 +126,9 @@ impl World {
             let member = &self.core.workers[worker];
             assert!(leases.len() <= member.threads + self.core.policy.spare_leases);
             assert!(leases.keys().eq(member.leases.keys()));
+            assert!(
+                member.leases.values().all(|lease| lease.deadline == member.deadline && lease.deadline >= self.now)
+            );
         }
     }
 

@@ -1,4 +1,4 @@
-//! The runner: drives the [reactor](crate::reactor) with real sockets, processes and time.
+//! The runner: drives the [`reactor`] with real sockets, processes and time.
 //!
 //! ```text
 //!   connections, processes --Inbound--+

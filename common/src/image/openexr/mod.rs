@@ -8,6 +8,7 @@
 //! - Colours with alpha are premultiplied, as the format demands, and stay so.
 //! - Of several resolution levels the largest is read. Deep data and chroma-subsampled channels are refused.
 
+mod block;
 mod channels;
 mod header;
 mod raster;

@@ -13,7 +13,7 @@ use exr::prelude::f16;
 use rayon::prelude::*;
 
 use super::channels::Layer;
-use super::{FORMAT, header};
+use super::{FORMAT, block, header};
 use crate::image::error::ImageError;
 use crate::image::source::Source;
 
@@ -63,6 +63,13 @@ impl Raster {
     fn prepare(source: &Source<'_>, header: &Header, layer: &Layer) -> Result<Self, ImageError> {
         let (display, data) = (header.shared_attributes.display_window, header.data_window());
         let (width, height) = (display.size.width(), display.size.height());
+        if block::largest(header) > MAX_BLOCK_BYTES {
+            return Err(source.unsupported(
+                FORMAT,
+                "a tile above 2 GB",
+                "write it with smaller tiles or fewer channels",
+            ));
+        }
         let mut warnings = Vec::new();
         let (ours, theirs) = (Window::of(display), Window::of(data));
         if !ours.meets(theirs) {
@@ -98,14 +105,15 @@ impl Raster {
             let ours = block.layer == layer.part && tile.is_largest_resolution_level();
             ours && wanted.insert(position(&block))
         })?;
+        let batch_size = (BATCH_BYTES / block::largest(&meta.headers[layer.part]).max(1)).clamp(1, MAX_BATCH);
         let placement = Placement::new(&meta.headers[layer.part], layer, self.width);
         loop {
-            let batch: Vec<Chunk> = chunks.by_ref().take(BATCH).collect::<Result<_, _>>()?;
+            let batch: Vec<Chunk> = chunks.by_ref().take(batch_size).collect::<Result<_, _>>()?;
             if batch.is_empty() {
                 return if wanted.is_empty() { Ok(()) } else { Err(Fill::Missing) };
             }
             let blocks: Vec<exr::error::Result<UncompressedBlock>> =
-                batch.into_par_iter().map(|chunk| UncompressedBlock::decompress_chunk(chunk, &meta, false)).collect();
+                batch.into_par_iter().map(|chunk| block::decompress(chunk, &meta)).collect();
             for block in blocks {
                 let block = block?;
                 if block.index.layer != layer.part || !wanted.remove(&position(&block.index)) {
@@ -263,5 +271,9 @@ impl Window {
 /// Attributes that describe the file's layout, not its content.
 const LAYOUT: [&str; 5] = ["type", "chunkCount", "version", "screenWindowWidth", "maxSamplesPerPixel"];
 
-/// Blocks decompressed at a time: enough for all cores, little memory.
-const BATCH: usize = 64;
+/// Blocks decompressed at a time: enough for all cores, of little memory.
+const MAX_BATCH: usize = 64;
+const BATCH_BYTES: usize = 1 << 28;
+
+/// The largest block that is let pass, after decompression: a tile of 16384 x 16384 pixels of four half floats.
+const MAX_BLOCK_BYTES: usize = 1 << 31;

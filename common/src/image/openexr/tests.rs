@@ -210,6 +210,32 @@ fn missing_channels_and_blocks_are_errors() {
     assert!(matches!(decode("photo.exr", &bytes), Err(ImageError::Malformed { .. })));
 }
 
+/// Found by fuzzing: where overflow is checked, the decompressor of the `exr` crate panics on differences below zero.
+#[test]
+fn a_broken_b44_block_never_panics() {
+    let mut bytes = fixture!("b44a.exr").to_vec();
+    let start = bytes.len() - 1500;
+    bytes[start..].fill(0);
+    if let Ok(decoded) = decode("photo.exr", &bytes) {
+        assert_eq!((decoded.image.width(), decoded.image.height()), SIZE);
+    }
+}
+
+/// Found by fuzzing: the `exr` crate allocates what the counters of a DWA block say.
+#[test]
+fn a_dwa_block_that_claims_too_much_is_an_error() {
+    let whole = fixture!("dwab.exr");
+    let mut found = 0;
+    // The block starts with version 2 and ends the file; its counters follow.
+    let start = whole.windows(8).rposition(|w| w == 2u64.to_le_bytes()).unwrap();
+    for counter in [1, 6, 7, 8, 9] {
+        let mut bytes = whole.to_vec();
+        bytes[start + counter * 8..][..8].copy_from_slice(&(1u64 << 40).to_le_bytes());
+        found += usize::from(matches!(decode("photo.exr", &bytes), Err(ImageError::Malformed { .. })));
+    }
+    assert_eq!(found, 5);
+}
+
 #[test]
 fn deep_data_are_refused() {
     let mut bytes = Written::new(rgb(), Compression::RLE).bytes();

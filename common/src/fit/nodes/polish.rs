@@ -1,0 +1,42 @@
+//! `polish`: stage three, a short pattern search on CSSIM from the winner.
+
+use super::view::Scene;
+use crate::{
+    fit::{
+        polish,
+        wire::{PolishedWire, read, write},
+    },
+    graph::{Blob, NodeFailure, NodeType, RunContext},
+};
+use serde::{Deserialize, Serialize};
+use std::ops::ControlFlow;
+
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub(in crate::fit) struct PolishParameters {
+    pub(in crate::fit) start: Vec<f64>,
+    pub(in crate::fit) max_evaluations: u32,
+}
+
+#[derive(Debug)]
+pub(super) struct Polish;
+
+impl NodeType for Polish {
+    fn kind(&self) -> &'static str {
+        super::POLISH
+    }
+
+    fn run(&self, parameters: &[u8], inputs: &[Blob], context: &RunContext) -> Result<Vec<u8>, NodeFailure> {
+        let PolishParameters { start, max_evaluations } = read("parameters of polish", parameters)?;
+        let scene = Scene::read(inputs, context)?;
+        let mut observe = |progress: &crate::search::Progress<'_>| {
+            context.report(progress.evaluations as u64, u64::from(max_evaluations));
+            if context.is_cancelled() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        };
+        let (view, limit) = (scene.full(), max_evaluations as usize);
+        let polished = polish(&view, &scene.view.judge, scene.view.by, &start, limit, &mut observe)
+            .map_err(|error| NodeFailure::new(format!("polish: {error}")))?;
+        // A search that was told to stop is not a result.
+        context.check()?;
+        write("polish", &PolishedWire::of(polished))
+    }
+}

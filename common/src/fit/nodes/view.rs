@@ -1,0 +1,95 @@
+//! What the nodes of stage two, polish and report share: the photo, the judge, and the full-resolution table.
+//!
+//! Inputs of all three: the view; the shards of the full-resolution table, in order.
+
+use crate::{
+    brdf::{self, Model},
+    fit::{
+        FullView, JudgedBy,
+        wire::{ImageWire, TableWire, read},
+    },
+    graph::{Blob, NodeFailure, RunContext},
+    image::Image,
+    metric::{Judge, JudgeOptions},
+    render::{table::TransportTable, transport::Pixel},
+};
+use serde::{Deserialize, Serialize};
+use std::sync::Arc;
+
+/// The photo and how it is scored.
+#[derive(Debug, Serialize, Deserialize)]
+pub(in crate::fit) struct ViewWire {
+    pub(in crate::fit) model: String,
+    pub(in crate::fit) photo: ImageWire,
+    /// One value in [0, 1] per pixel; both images are multiplied by it.
+    pub(in crate::fit) coverage: Vec<f32>,
+    pub(in crate::fit) exposure: f64,
+    pub(in crate::fit) judge_object: bool,
+    /// The pixels of the full-resolution table.
+    pub(in crate::fit) pixels: Vec<Pixel>,
+}
+
+/// A decoded view with its prepared judge.
+#[derive(Debug)]
+pub(super) struct View {
+    pub(super) model: &'static dyn Model,
+    pub(super) judge: Judge,
+    pub(super) by: JudgedBy,
+    pixels: Vec<Pixel>,
+    width: usize,
+    height: usize,
+}
+
+/// A view with the table that fills it.
+#[derive(Debug)]
+pub(super) struct Scene {
+    pub(super) view: Arc<View>,
+    table: TransportTable,
+}
+
+impl Scene {
+    pub(super) fn read(inputs: &[Blob], context: &RunContext) -> Result<Self, NodeFailure> {
+        let Some((view, shards)) = inputs.split_first() else {
+            return Err(NodeFailure::new("expected a view and a transport table, found no input"));
+        };
+        let view = context.decoded(view, View::decode)?;
+        let table = concatenated(shards, context)?;
+        if table.pixels != view.pixels.len() {
+            let (expected, found) = (view.pixels.len(), table.pixels);
+            return Err(NodeFailure::new(format!("expected a table of {expected} pixels, found {found}")));
+        }
+        Ok(Self { view, table })
+    }
+
+    pub(super) fn full(&self) -> FullView<'_> {
+        let View { model, pixels, width, height, .. } = &*self.view;
+        FullView { model: *model, table: &self.table, pixels, width: *width, height: *height }
+    }
+}
+
+impl View {
+    fn decode(bytes: &[u8]) -> Result<Self, NodeFailure> {
+        let wire: ViewWire = read("view", bytes)?;
+        let photo: Image = wire.photo.image()?;
+        let model = brdf::model(&wire.model).map_err(|error| NodeFailure::new(error.to_string()))?;
+        let judge = Judge::new(&photo, &wire.coverage, wire.exposure, &JudgeOptions::default())
+            .map_err(|error| NodeFailure::new(format!("the photo cannot be judged: {error}")))?;
+        let (width, height) = (photo.width(), photo.height());
+        if let Some(p) = wire.pixels.iter().find(|p| p[0] as usize >= width || p[1] as usize >= height) {
+            return Err(NodeFailure::new(format!("pixel {p:?} lies outside the {width} x {height} photo")));
+        }
+        let by = if wire.judge_object { JudgedBy::Object } else { JudgedBy::Image };
+        Ok(Self { model, judge, by, pixels: wire.pixels, width, height })
+    }
+}
+
+/// The table of consecutive shards.
+pub(super) fn concatenated(shards: &[Blob], context: &RunContext) -> Result<TransportTable, NodeFailure> {
+    let tables = shards
+        .iter()
+        .map(|shard| context.decoded(shard, |bytes| read::<TableWire>("transport table", bytes)?.table()))
+        .collect::<Result<Vec<_>, _>>()?;
+    let tables: Vec<&TransportTable> = tables.iter().map(|table| &**table).collect();
+    TransportTable::concatenate(&tables)
+        .ok_or_else(|| NodeFailure::new("the shards of a transport table do not belong together, or there are none"))
+}

@@ -1,0 +1,457 @@
+//! The plan of one fit: which nodes there are and what follows from their outputs (design section 7).
+//!
+//! ```text
+//! transport(subset) shards -> search(gamma) x 21 -> transport(full) shards -> select -> polish -> report
+//! ```
+//!
+//! The graph depends on the inputs alone, never on the number of workers or the order in which nodes finish.
+
+use super::{
+    Candidate, Judged, JudgedBy, Method, MethodError, Polished, SearchKind, Start,
+    method::AtZero,
+    needed_span,
+    nodes::{
+        self, PolishParameters, ReportParameters, ReportWire, SearchParameters, SelectParameters, TransportParameters,
+        ViewWire,
+    },
+    polish::MAX_EVALUATIONS,
+    winner,
+    wire::{CandidateWire, EnvironmentWire, ImageWire, KnotsWire, PolishedWire, ScoresWire, SubsetWire, read, write},
+};
+use crate::{
+    brdf::flat_bounds,
+    graph::{Blob, BlobHash, GraphEdit, Input, NodeFailure, NodeId, NodeSpec, Placement, PlanError, Planner},
+    image::Image,
+    math::{luminance, widen},
+    metric::ErrorMap,
+    render::{
+        knots::{Knots, PER_OCTAVE},
+        subset::{self, PixelSubset},
+        transport::{Accuracy, Pixel},
+    },
+    scene::Capture,
+};
+use serde::Serialize;
+use std::{collections::BTreeMap, sync::Arc};
+use thiserror::Error;
+
+/// Pixels per shard of a subset's table: small enough to spread over several workers.
+const SUBSET_SHARD: usize = 32;
+
+/// Pixels per shard of the full-resolution table.
+const FULL_SHARD: usize = 2048;
+
+/// How often polish may run on towards a width beyond its table.
+const MAX_POLISH_ROUNDS: usize = 4;
+
+/// Factor by which the table grows at the edge that polish reached.
+const WIDEN: f64 = 1.6;
+
+/// Why a fit cannot be planned.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum FitError {
+    /// A setting is out of range.
+    #[error(transparent)]
+    Method(#[from] MethodError),
+    /// The photo has no light to fit to.
+    #[error("every usable pixel of the photo is black: check the exposure of the photo and the place of the object")]
+    Black,
+}
+
+/// The outcome of a fit.
+#[derive(Debug, Clone)]
+pub struct FitOutcome {
+    /// Every candidate with its scores: by subset, then by gamma.
+    pub judged: Vec<Judged>,
+    /// Index of the winner of stage two.
+    pub winner: usize,
+    /// The outcome of stage three, when it ran.
+    pub polished: Option<Polished>,
+    /// The rendering of the final parameters at full resolution, linear Rec. 709, not multiplied by coverage.
+    pub matched: Image,
+    /// The error of the match, per window.
+    pub error_map: ErrorMap,
+    /// Renderings asked for by [`FitPlanner::also_render`]: gamma and image (of the first subset).
+    pub extra: Vec<(f64, Image)>,
+}
+
+/// The planner of one fit.
+#[derive(Debug)]
+pub struct FitPlanner {
+    capture: Arc<Capture>,
+    method: Method,
+    exposure: f64,
+    mean_radiance: f64,
+    subsets: Vec<PixelSubset>,
+    pixels: Vec<Pixel>,
+    extra_gammas: Vec<f64>,
+    environment: Option<BlobHash>,
+    view: Option<BlobHash>,
+    searches: BTreeMap<NodeId, usize>,
+    candidates: BTreeMap<usize, Candidate>,
+    step: Step,
+    span: Option<(f64, f64)>,
+    judged: Vec<Judged>,
+    polish_start: Vec<f64>,
+    polish_rounds: usize,
+    polish_evaluations: usize,
+    polished: Option<Polished>,
+    outcome: Option<FitOutcome>,
+}
+
+/// The node whose output decides what comes next.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Step {
+    Searching,
+    Selecting(NodeId),
+    Polishing(NodeId),
+    Reporting(NodeId),
+    Done,
+}
+
+impl FitPlanner {
+    /// Plans a fit of a captured photo. `exposure` is that of the display transform before CSSIM.
+    ///
+    /// # Errors
+    /// When a setting is out of range or the photo is black.
+    pub fn new(capture: Arc<Capture>, method: Method, exposure: f64) -> Result<Self, FitError> {
+        method.check()?;
+        let candidates = intensities(&capture);
+        let mean_radiance = candidates.iter().map(|c| c.intensity).sum::<f64>() / candidates.len() as f64;
+        if mean_radiance.is_nan() || mean_radiance <= 0.0 {
+            return Err(FitError::Black);
+        }
+        let draw = |index| {
+            PixelSubset::draw(&candidates, method.samples, method.sampling, method.seed, index).ok_or(FitError::Black)
+        };
+        let subsets = (0..method.subsets).map(draw).collect::<Result<Vec<_>, _>>()?;
+        let pixels = covered_pixels(&capture);
+        Ok(Self {
+            capture,
+            method,
+            exposure,
+            mean_radiance,
+            subsets,
+            pixels,
+            extra_gammas: Vec::new(),
+            environment: None,
+            view: None,
+            searches: BTreeMap::new(),
+            candidates: BTreeMap::new(),
+            step: Step::Searching,
+            span: None,
+            judged: Vec::new(),
+            polish_start: Vec::new(),
+            polish_rounds: 0,
+            polish_evaluations: 0,
+            polished: None,
+            outcome: None,
+        })
+    }
+
+    /// Also renders the candidates of these gammas, for pictures; gammas that are not searched are left out.
+    #[must_use]
+    pub fn also_render(mut self, gammas: &[f64]) -> Self {
+        self.extra_gammas = gammas.to_vec();
+        self
+    }
+
+    /// The pixel subsets of stage one.
+    #[must_use]
+    pub fn subsets(&self) -> &[PixelSubset] {
+        &self.subsets
+    }
+
+    /// The outcome, once the graph has run.
+    #[must_use]
+    pub fn into_outcome(self) -> Option<FitOutcome> {
+        self.outcome
+    }
+
+    /// The best score so far: of stage two, or of polish.
+    #[must_use]
+    pub fn best_score(&self) -> Option<f64> {
+        let selected = winner(&self.judged, self.method.judge).map(|w| self.score(&self.judged[w]));
+        let polished = self.polished.as_ref().map(|p| self.method.judge.pick(p.cssim, p.cssim_object));
+        polished.or(selected)
+    }
+
+    fn score(&self, judged: &Judged) -> f64 {
+        self.method.judge.pick(judged.cssim, judged.cssim_object)
+    }
+
+    /// Adds the shards of a table of `count` pixels of the list `pixels`.
+    fn add_transport(
+        &self,
+        graph: &mut GraphEdit<'_>,
+        what: &str,
+        pixels: (BlobHash, usize, usize),
+        knots: Knots,
+        accuracy: Accuracy,
+    ) -> Result<Vec<Input>, PlanError> {
+        let (list, count, shard) = pixels;
+        let geometry = self.capture.geometry();
+        let environment = self.environment.ok_or_else(|| PlanError::new("the environment was not added"))?;
+        let mut inputs = vec![Input::Blob(environment), Input::Blob(list)];
+        if let Some(map) = geometry.normal_map() {
+            inputs.push(Input::Blob(add(graph, "normal map", &ImageWire::of(&map.to_image()))?));
+        }
+        let mut shards = Vec::new();
+        for first in (0..count).step_by(shard) {
+            let range = (index(first), index(shard.min(count - first)));
+            let parameters = TransportParameters {
+                model: self.method.model.name().to_owned(),
+                geometry: geometry.spec(),
+                knots: KnotsWire::of(&knots),
+                tolerance: accuracy.tolerance,
+                range,
+            };
+            let spec = NodeSpec {
+                kind: nodes::TRANSPORT.to_owned(),
+                label: format!("transport {what}, pixels {first} to {}", first + range.1 as usize - 1),
+                parameters: encode("parameters", &parameters)?,
+                inputs: inputs.clone(),
+                placement: Placement::Worker,
+            };
+            shards.push(Input::OutputOf(graph.add_node(spec)?));
+        }
+        Ok(shards)
+    }
+
+    fn add_searches(&mut self, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
+        let model = self.method.model;
+        for (s, subset) in self.subsets.clone().into_iter().enumerate() {
+            let list = add(graph, "list of pixels", &subset.pixels)?;
+            let photo = subset.pixels.iter().map(|p| self.capture.photo().pixel(p[0] as usize, p[1] as usize));
+            let wire =
+                SubsetWire { photo: photo.collect(), pixels: subset.pixels.clone(), weights: subset.weights.clone() };
+            let mut inputs = vec![Input::Blob(add(graph, "pixel subset", &wire)?)];
+            let what = if self.subsets.len() == 1 { "of the subset".to_owned() } else { format!("of subset {s}") };
+            let (count, shard) = (subset.pixels.len(), if subset.pixels.len() > 4096 { FULL_SHARD } else { SUBSET_SHARD });
+            let knots = stage_one_knots(&self.method);
+            inputs.extend(self.add_transport(graph, &what, (list, count, shard), knots, Accuracy::SUBSET)?);
+            for (g, &gamma) in self.method.gammas.iter().enumerate() {
+                let parameters = SearchParameters {
+                    model: model.name().to_owned(),
+                    gamma,
+                    subset: index(s),
+                    mean_radiance: self.mean_radiance,
+                    pattern: self.method.search == SearchKind::Pattern,
+                    paper_start: self.method.start == Start::Paper,
+                    clamp_at_zero: self.method.at_zero == AtZero::Clamp,
+                };
+                let of_subset = if self.subsets.len() == 1 { String::new() } else { format!(", subset {s}") };
+                let node = graph.add_node(NodeSpec {
+                    kind: nodes::SEARCH.to_owned(),
+                    label: format!("search gamma {gamma}{of_subset}"),
+                    parameters: encode("parameters", &parameters)?,
+                    inputs: inputs.clone(),
+                    placement: Placement::Worker,
+                })?;
+                self.searches.insert(node, s * self.method.gammas.len() + g);
+            }
+        }
+        Ok(())
+    }
+
+    /// The full-resolution table over the current span, and a node of `kind` on it.
+    fn add_judging<T: Serialize>(
+        &mut self,
+        graph: &mut GraphEdit<'_>,
+        kind: &str,
+        parameters: &T,
+    ) -> Result<NodeId, PlanError> {
+        let view = match self.view {
+            Some(view) => view,
+            None => add(graph, "view", &self.view_wire())?,
+        };
+        self.view = Some(view);
+        let list = add(graph, "list of pixels", &self.pixels)?;
+        let knots = match self.span {
+            Some((lower, upper)) => Knots::covering(lower, upper, PER_OCTAVE),
+            None => stage_one_knots(&self.method),
+        };
+        let mut inputs = vec![Input::Blob(view)];
+        let count = self.pixels.len();
+        inputs.extend(self.add_transport(graph, "in full", (list, count, FULL_SHARD), knots, Accuracy::FULL)?);
+        graph.add_node(NodeSpec {
+            kind: kind.to_owned(),
+            label: kind.to_owned(),
+            parameters: encode("parameters", parameters)?,
+            inputs,
+            placement: Placement::Coordinator,
+        })
+    }
+
+    fn view_wire(&self) -> ViewWire {
+        ViewWire {
+            model: self.method.model.name().to_owned(),
+            photo: ImageWire::of(self.capture.photo()),
+            coverage: self.capture.scoring_coverage(),
+            exposure: self.exposure,
+            judge_object: self.method.judge == JudgedBy::Object,
+            pixels: self.pixels.clone(),
+        }
+    }
+
+    fn searched(&mut self, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
+        let points = self.candidates.values().map(|c| &c.parameters[..]);
+        self.span = needed_span(self.method.model, points);
+        let candidates = self.candidates.values().map(CandidateWire::of).collect();
+        let node = self.add_judging(graph, nodes::SELECT, &SelectParameters { candidates })?;
+        self.step = Step::Selecting(node);
+        Ok(())
+    }
+
+    fn selected(&mut self, output: &Blob, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
+        let ScoresWire(scores) = read("scores", output).map_err(other)?;
+        let candidates = std::mem::take(&mut self.candidates).into_values();
+        self.judged = candidates
+            .zip(scores)
+            .map(|(candidate, (cssim, cssim_object))| Judged { candidate, cssim, cssim_object })
+            .collect();
+        let best = winner(&self.judged, self.method.judge).ok_or_else(|| PlanError::new("no candidate was judged"))?;
+        self.polish_start = self.judged[best].candidate.parameters.clone();
+        if self.method.polish { self.add_polish(graph) } else { self.add_report(graph) }
+    }
+
+    fn add_polish(&mut self, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
+        let left = MAX_EVALUATIONS.saturating_sub(self.polish_evaluations);
+        let parameters = PolishParameters { start: self.polish_start.clone(), max_evaluations: index(left) };
+        self.step = Step::Polishing(self.add_judging(graph, nodes::POLISH, &parameters)?);
+        Ok(())
+    }
+
+    /// Polish ends, or goes on with a wider table where it ran into the edge of this one.
+    fn polished(&mut self, output: &Blob, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
+        let mut polished = read::<PolishedWire>("polish", output).and_then(PolishedWire::polished).map_err(other)?;
+        self.polish_rounds += 1;
+        self.polish_evaluations += polished.evaluations;
+        polished.evaluations = self.polish_evaluations;
+        let goes_on = polished.at_table_edge
+            && self.polish_rounds < MAX_POLISH_ROUNDS
+            && self.polish_evaluations < MAX_EVALUATIONS;
+        self.polish_start = polished.parameters.clone();
+        self.polished = Some(polished);
+        if goes_on {
+            self.widen_span();
+            self.add_polish(graph)
+        } else {
+            self.add_report(graph)
+        }
+    }
+
+    fn widen_span(&mut self) {
+        let Some(entry) = self.method.model.lobes().iter().find_map(|b| b.width) else { return };
+        let (lower, upper) = flat_bounds(self.method.model.parameters());
+        if let Some((low, high)) = &mut self.span {
+            let width = self.polish_start[entry];
+            if width * width < *low * *high {
+                *low = (*low / WIDEN).max(lower[entry]);
+            } else {
+                *high = (*high * WIDEN).min(upper[entry]);
+            }
+        }
+    }
+
+    fn add_report(&mut self, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
+        let extra = self.extra_candidates().into_iter().map(|j| j.candidate.parameters.clone());
+        let last = self.polished.as_ref().map_or(&self.polish_start, |p| &p.parameters).clone();
+        let parameters = ReportParameters { parameters: extra.chain([last]).collect() };
+        self.step = Step::Reporting(self.add_judging(graph, nodes::REPORT, &parameters)?);
+        Ok(())
+    }
+
+    /// The candidates to be rendered beside the match: of the first subset, and only those whose widths the table holds.
+    fn extra_candidates(&self) -> Vec<&Judged> {
+        let wanted = |j: &&Judged| j.candidate.subset == 0 && self.extra_gammas.contains(&j.candidate.gamma);
+        self.judged.iter().filter(wanted).collect()
+    }
+
+    fn reported(&mut self, output: &Blob) -> Result<(), PlanError> {
+        let report: ReportWire = read("report", output).map_err(other)?;
+        let mut images = report.images.into_iter().map(ImageWire::image).collect::<Result<Vec<_>, _>>().map_err(other)?;
+        let matched = images.pop().ok_or_else(|| PlanError::new("the report holds no image"))?;
+        let gammas = self.extra_candidates().into_iter().map(|j| j.candidate.gamma);
+        let extra = gammas.zip(images).collect();
+        let (width, height) = (matched.width(), matched.height());
+        let error_map = ErrorMap { width, height, error: report.error };
+        let best = winner(&self.judged, self.method.judge).ok_or_else(|| PlanError::new("no candidate was judged"))?;
+        self.outcome = Some(FitOutcome {
+            judged: self.judged.clone(),
+            winner: best,
+            polished: self.polished.clone(),
+            matched,
+            error_map,
+            extra,
+        });
+        self.step = Step::Done;
+        Ok(())
+    }
+}
+
+impl Planner for FitPlanner {
+    fn start(&mut self, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
+        let environment = EnvironmentWire::of(self.capture.environment());
+        self.environment = Some(add(graph, "environment", &environment)?);
+        self.add_searches(graph)
+    }
+
+    fn completed(&mut self, node: NodeId, output: &Blob, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
+        if let Some(place) = self.searches.remove(&node) {
+            let candidate =
+                read::<CandidateWire>("candidate", output).and_then(CandidateWire::candidate).map_err(other)?;
+            self.candidates.insert(place, candidate);
+            return if self.searches.is_empty() { self.searched(graph) } else { Ok(()) };
+        }
+        match self.step {
+            Step::Selecting(select) if select == node => self.selected(output, graph),
+            Step::Polishing(polish) if polish == node => self.polished(output, graph),
+            Step::Reporting(report) if report == node => self.reported(output),
+            _ => Ok(()),
+        }
+    }
+}
+
+/// The grid of widths of stage one: the model's whole range.
+fn stage_one_knots(method: &Method) -> Knots {
+    let (lower, upper) = flat_bounds(method.model.parameters());
+    let entry = method.model.lobes().iter().find_map(|b| b.width);
+    let (low, high) = entry.map_or((0.5, 1.0), |entry| (lower[entry], upper[entry]));
+    Knots::covering(low, high, PER_OCTAVE)
+}
+
+/// The usable pixels with their luminance.
+fn intensities(capture: &Capture) -> Vec<subset::Candidate> {
+    let (photo, width) = (capture.photo(), capture.photo().width());
+    let candidate = |i: usize| subset::Candidate {
+        pixel: [index(i % width), index(i / width)],
+        intensity: luminance(widen(photo.pixels()[i])).max(0.0),
+    };
+    capture.usable().map(candidate).collect()
+}
+
+/// The pixels that count for the score, in raster order.
+fn covered_pixels(capture: &Capture) -> Vec<Pixel> {
+    let width = capture.photo().width();
+    let coverage = capture.scoring_coverage();
+    let covered = coverage.iter().enumerate().filter(|(_, c)| **c > 0.0);
+    covered.map(|(i, _)| [index(i % width), index(i / width)]).collect()
+}
+
+fn add<T: Serialize>(graph: &mut GraphEdit<'_>, what: &str, value: &T) -> Result<BlobHash, PlanError> {
+    graph.add_blob(encode(what, value)?)
+}
+
+fn encode<T: Serialize>(what: &str, value: &T) -> Result<Vec<u8>, PlanError> {
+    write(what, value).map_err(other)
+}
+
+fn other(failure: NodeFailure) -> PlanError {
+    PlanError::new(failure.to_string())
+}
+
+fn index(value: usize) -> u32 {
+    u32::try_from(value).unwrap_or(u32::MAX)
+}

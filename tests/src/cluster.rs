@@ -1,0 +1,151 @@
+//! A run on real worker processes whose coordinator is in the test's own process.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, channel};
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+use lookalike::protocol::Access;
+use lookalike_coordinator::comm::RunEvent;
+use lookalike_coordinator::core::RunSummary;
+use lookalike_coordinator::runner::{RunError, RunnerOptions, run};
+use lookalike_coordinator::spawn::WorkerCommand;
+use tempfile::TempDir;
+
+use crate::nodes::registry;
+use crate::plan::{Leaves, TestPlanner};
+
+/// Longer than anything a test waits for on a slow machine; a test that waits longer has failed.
+const PATIENCE: Duration = Duration::from_secs(60);
+
+/// How a run ended: the output of its last node and what it has cost, or its error.
+pub type Outcome = Result<(Option<Vec<u8>>, RunSummary), RunError>;
+
+/// A run that goes on in a thread.
+#[derive(Debug)]
+pub struct Cluster {
+    folder: TempDir,
+    events: Receiver<RunEvent>,
+    thread: JoinHandle<Outcome>,
+}
+
+/// Options for a run with `workers` workers of `program`, which has to be `lookalike-test-cluster`. The access file is set
+/// by [`Cluster::start`].
+#[must_use]
+pub fn options(program: &str, workers: usize) -> RunnerOptions {
+    let command = WorkerCommand { program: program.into(), arguments: vec!["worker".into()] };
+    RunnerOptions {
+        worker_command: Some(command),
+        handle_signals: false,
+        ..RunnerOptions::new(workers, PathBuf::new())
+    }
+}
+
+impl Cluster {
+    /// Start a run.
+    ///
+    /// # Panics
+    /// When there is no temporary folder.
+    #[must_use]
+    pub fn start(leaves: Leaves, options: RunnerOptions) -> Self {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let options = RunnerOptions { access_file: folder.path().join("access.json"), ..options };
+        let (sender, events) = channel();
+        let thread = std::thread::spawn(move || {
+            let runtime = tokio::runtime::Runtime::new().expect("a tokio runtime");
+            let observer = move |event: &RunEvent| _ = sender.send(event.clone());
+            let outcome = runtime.block_on(run(options, TestPlanner::new(leaves), Arc::new(registry()), observer));
+            outcome.map(|(planner, summary)| (planner.result, summary))
+        });
+        Self { folder, events, thread }
+    }
+
+    /// Wait for the first event that `pick` takes.
+    ///
+    /// # Panics
+    /// When it does not come in time, or the run ends before.
+    pub fn wait_for<T>(&self, mut pick: impl FnMut(&RunEvent) -> Option<T>) -> T {
+        loop {
+            let event = self.events.recv_timeout(PATIENCE).expect("an event in time");
+            if let Some(picked) = pick(&event) {
+                return picked;
+            }
+        }
+    }
+
+    /// Wait until the coordinator listens, and return where.
+    pub fn address(&self) -> String {
+        self.wait_for(|event| match event {
+            RunEvent::Listening { address } => Some(address.clone()),
+            _ => None,
+        })
+    }
+
+    /// The access file; there once the coordinator listens.
+    #[must_use]
+    pub fn access_file(&self) -> PathBuf {
+        self.folder.path().join("access.json")
+    }
+
+    /// What the access file says.
+    ///
+    /// # Panics
+    /// When it is not there or not one.
+    #[must_use]
+    pub fn access(&self) -> Access {
+        read_access(&self.access_file())
+    }
+
+    /// A folder that lives as long as the cluster.
+    #[must_use]
+    pub fn folder(&self) -> &Path {
+        self.folder.path()
+    }
+
+    /// Wait for the end of the run: the events that nobody waited for, and its outcome.
+    ///
+    /// # Panics
+    /// When it does not end in time, or its thread panics.
+    #[must_use = "the outcome may be an error"]
+    pub fn outcome(self) -> (Vec<RunEvent>, Outcome) {
+        let mut rest = Vec::new();
+        loop {
+            match self.events.recv_timeout(PATIENCE) {
+                Ok(event) => rest.push(event),
+                Err(std::sync::mpsc::RecvTimeoutError::Disconnected) => break,
+                Err(std::sync::mpsc::RecvTimeoutError::Timeout) => panic!("the run does not end: {rest:?}"),
+            }
+        }
+        (rest, self.thread.join().expect("a run that does not panic"))
+    }
+
+    /// Wait for the successful end of the run: result and summary.
+    ///
+    /// # Panics
+    /// When the run fails.
+    #[must_use]
+    pub fn finish(self) -> (Option<Vec<u8>>, RunSummary) {
+        let (_, outcome) = self.outcome();
+        outcome.expect("a run that succeeds")
+    }
+
+    /// Wait for the end of the run and return its error.
+    ///
+    /// # Panics
+    /// When the run succeeds.
+    #[must_use]
+    pub fn error(self) -> RunError {
+        let (_, outcome) = self.outcome();
+        outcome.expect_err("a run that fails")
+    }
+}
+
+/// Read an access file.
+///
+/// # Panics
+/// When it is not there or not one.
+#[must_use]
+pub fn read_access(path: &Path) -> Access {
+    Access::parse(&std::fs::read_to_string(path).expect("an access file")).expect("a valid access file")
+}

@@ -1,0 +1,100 @@
+//! Node types of the cluster suite: small, pure as far as their outputs go, some of them murderous.
+
+use std::io::{Read, Write};
+use std::net::TcpStream;
+use std::path::Path;
+
+use lookalike::graph::{Blob, BlobHash, NodeFailure, NodeType, Registry, RunContext};
+
+/// All of them.
+#[must_use]
+pub fn registry() -> Registry {
+    Registry::default().with(Digest).with(Grow).with(Fail).with(Abort).with(Gate)
+}
+
+/// The hash of parameters and inputs: 32 bytes that depend on every bit and on the order.
+struct Digest;
+
+impl NodeType for Digest {
+    fn kind(&self) -> &'static str {
+        "digest"
+    }
+
+    fn run(&self, parameters: &[u8], inputs: &[Blob], context: &RunContext) -> Result<Vec<u8>, NodeFailure> {
+        let mut hashes = parameters.to_vec();
+        for input in inputs {
+            let decoded = context.decoded(input, |bytes| Ok::<_, NodeFailure>(BlobHash::of(bytes)))?;
+            hashes.extend(decoded.0);
+        }
+        Ok(BlobHash::of(&hashes).0.to_vec())
+    }
+}
+
+/// As many bytes as the parameters say (eight, little-endian), made from the inputs.
+struct Grow;
+
+impl NodeType for Grow {
+    fn kind(&self) -> &'static str {
+        "grow"
+    }
+
+    fn run(&self, parameters: &[u8], inputs: &[Blob], _: &RunContext) -> Result<Vec<u8>, NodeFailure> {
+        let length = parameters.try_into().map(u64::from_le_bytes).ok().and_then(|length| usize::try_from(length).ok());
+        let length = length.ok_or_else(|| NodeFailure::new("expected a length of eight bytes"))?;
+        let seed = BlobHash::of(&inputs.iter().flat_map(|input| input.hash().0).collect::<Vec<_>>());
+        Ok(seed.0.iter().copied().cycle().take(length).collect())
+    }
+}
+
+/// An application error with the parameters as its message.
+struct Fail;
+
+impl NodeType for Fail {
+    fn kind(&self) -> &'static str {
+        "fail"
+    }
+
+    fn run(&self, parameters: &[u8], _: &[Blob], _: &RunContext) -> Result<Vec<u8>, NodeFailure> {
+        Err(NodeFailure::new(String::from_utf8_lossy(parameters)))
+    }
+}
+
+/// Aborts its process, once if the parameters name a file: the file remembers.
+struct Abort;
+
+impl NodeType for Abort {
+    fn kind(&self) -> &'static str {
+        "abort"
+    }
+
+    fn run(&self, parameters: &[u8], _: &[Blob], _: &RunContext) -> Result<Vec<u8>, NodeFailure> {
+        let path = String::from_utf8_lossy(parameters);
+        let marker = Path::new(path.as_ref());
+        if marker.exists() {
+            return Ok(b"survived".to_vec());
+        }
+        if !path.is_empty() {
+            std::fs::write(marker, "").map_err(|error| NodeFailure::new(error.to_string()))?;
+        }
+        std::process::abort()
+    }
+}
+
+/// Tells a listener (its address is the parameters) which process it runs in and waits for one byte: a test knows that the
+/// node is executing, decides how it goes on, and sees the death of the process as the end of the stream.
+struct Gate;
+
+impl NodeType for Gate {
+    fn kind(&self) -> &'static str {
+        "gate"
+    }
+
+    fn run(&self, parameters: &[u8], _: &[Blob], _: &RunContext) -> Result<Vec<u8>, NodeFailure> {
+        let pass = || -> std::io::Result<()> {
+            let mut stream = TcpStream::connect(String::from_utf8_lossy(parameters).as_ref())?;
+            stream.write_all(&std::process::id().to_le_bytes())?;
+            stream.read_exact(&mut [0])
+        };
+        pass().map(|()| b"passed".to_vec()).map_err(|error| NodeFailure::new(format!("the gate is gone: {error}")))
+    }
+}

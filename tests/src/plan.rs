@@ -1,0 +1,113 @@
+//! Plans of the cluster suite: leaves on workers, their digest on the coordinator, a last node on a worker that is added
+//! when the digest is there. The result depends on every output.
+
+use lookalike::graph::{
+    Blob, Execution, GraphEdit, Input, NodeId, NodeSpec, Placement, PlanError, Planner, run_in_process,
+};
+
+use crate::nodes::registry;
+
+/// What the leaves are.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Leaves {
+    /// So many digests of one shared blob of so many bytes.
+    Digests {
+        /// How many.
+        count: usize,
+        /// The size of the blob.
+        shared_bytes: usize,
+    },
+    /// Two large outputs from a large blob.
+    Large {
+        /// The size of the blob and of each output.
+        bytes: usize,
+    },
+    /// So many nodes that wait at a gate.
+    Gates {
+        /// How many.
+        count: usize,
+        /// Where.
+        address: String,
+    },
+    /// One node that aborts its process unless this file exists; it makes the file first, unless the name is empty.
+    Abort {
+        /// The file.
+        marker: String,
+    },
+    /// One node with an application error.
+    Fail {
+        /// Its message.
+        message: String,
+    },
+}
+
+/// Plans and remembers.
+#[derive(Debug)]
+pub struct TestPlanner {
+    leaves: Leaves,
+    nodes: Vec<NodeId>,
+    open_leaves: usize,
+    digest: Option<NodeId>,
+    /// The output of the last node.
+    pub result: Option<Vec<u8>>,
+}
+
+impl TestPlanner {
+    /// A planner that has done nothing yet.
+    #[must_use]
+    pub fn new(leaves: Leaves) -> Self {
+        Self { leaves, nodes: Vec::new(), open_leaves: 0, digest: None, result: None }
+    }
+
+    /// What any run of these leaves has to result in, computed in this process.
+    ///
+    /// # Panics
+    /// When the plan fails.
+    #[must_use]
+    pub fn reference(leaves: Leaves) -> Option<Vec<u8>> {
+        let planner = run_in_process(Self::new(leaves), &registry(), Execution::Sequential);
+        planner.expect("a plan that works").result
+    }
+}
+
+impl Planner for TestPlanner {
+    fn start(&mut self, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
+        let (kind, parameters, shared_bytes) = match &self.leaves {
+            Leaves::Digests { count, shared_bytes } => {
+                let parameters = (0..*count).map(|index| index.to_le_bytes().to_vec()).collect();
+                ("digest", parameters, *shared_bytes)
+            }
+            Leaves::Large { bytes } => ("grow", vec![(*bytes as u64).to_le_bytes().to_vec(); 2], *bytes),
+            Leaves::Gates { count, address } => ("gate", vec![address.clone().into_bytes(); *count], 0),
+            Leaves::Abort { marker } => ("abort", vec![marker.clone().into_bytes()], 0),
+            Leaves::Fail { message } => ("fail", vec![message.clone().into_bytes()], 0),
+        };
+        let shared = graph.add_blob((0..=250_u8).cycle().take(shared_bytes).collect())?;
+        for (index, parameters) in parameters.into_iter().enumerate() {
+            let inputs = vec![Input::Blob(shared)];
+            self.nodes.push(graph.add_node(node(kind, &format!("leaf {index}"), parameters, inputs))?);
+        }
+        self.open_leaves = self.nodes.len();
+        Ok(())
+    }
+
+    fn completed(&mut self, node_id: NodeId, output: &Blob, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
+        if self.nodes.contains(&node_id) {
+            self.open_leaves -= 1;
+            if self.open_leaves == 0 {
+                let inputs = self.nodes.iter().map(|leaf| Input::OutputOf(*leaf)).collect();
+                let digest = node("digest", "of all leaves", vec![], inputs);
+                self.digest = Some(graph.add_node(NodeSpec { placement: Placement::Coordinator, ..digest })?);
+            }
+        } else if self.digest == Some(node_id) {
+            graph.add_node(node("digest", "last", b"last".to_vec(), vec![Input::OutputOf(node_id)]))?;
+        } else {
+            self.result = Some(output.to_vec());
+        }
+        Ok(())
+    }
+}
+
+fn node(kind: &str, label: &str, parameters: Vec<u8>, inputs: Vec<Input>) -> NodeSpec {
+    NodeSpec { kind: kind.into(), label: label.into(), parameters, inputs, placement: Placement::Worker }
+}

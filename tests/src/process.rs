@@ -1,0 +1,60 @@
+//! Real processes: to signal them, and to wait for them without ever hanging a test for good.
+
+use std::process::{Child, Command, Output, Stdio};
+
+/// A process that is killed when the test forgets it.
+#[derive(Debug)]
+pub struct Process(Option<Child>);
+
+impl Process {
+    /// Start it with its outputs captured.
+    ///
+    /// # Panics
+    /// When it cannot be started.
+    #[must_use]
+    pub fn start(command: &mut Command) -> Self {
+        command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
+        Self(Some(command.spawn().expect("a program that can be started")))
+    }
+
+    /// Its process id.
+    #[must_use]
+    pub fn id(&self) -> u32 {
+        self.0.as_ref().map_or(0, Child::id)
+    }
+
+    /// Wait for its end.
+    ///
+    /// # Panics
+    /// When it cannot be waited for.
+    #[must_use]
+    pub fn output(mut self) -> Output {
+        self.0.take().expect("a process that is waited for once").wait_with_output().expect("an end")
+    }
+}
+
+impl Drop for Process {
+    fn drop(&mut self) {
+        if let Some(child) = &mut self.0 {
+            // An error means that it has ended.
+            let _ = child.kill();
+            let _ = child.wait();
+        }
+    }
+}
+
+/// Send a signal, such as `KILL`, to one process.
+///
+/// # Panics
+/// When there is no such process.
+pub fn signal(process: u32, name: &str) {
+    assert!(process > 1, "not a process of ours: {process}");
+    let status = Command::new("sh").args(["-c", &format!("kill -{name} {process}")]).status();
+    assert!(status.is_ok_and(|status| status.success()), "cannot send {name} to process {process}");
+}
+
+/// The standard error of a process as text.
+#[must_use]
+pub fn stderr(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}

@@ -1,0 +1,51 @@
+//! `lookalike-test-cluster`: coordinator and worker in one program, as `lookalike` is, with the nodes of this suite.
+//!
+//! ```text
+//!   lookalike-test-cluster worker --access FILE ...
+//!   lookalike-test-cluster gates COUNT ADDRESS WORKERS ACCESS_FILE
+//! ```
+
+use std::io::Write;
+use std::process::ExitCode;
+use std::sync::Arc;
+
+use lookalike_coordinator::runner::{RunError, RunnerOptions, run};
+
+use crate::nodes::registry;
+use crate::plan::{Leaves, TestPlanner};
+
+/// The program.
+#[must_use]
+pub fn main() -> ExitCode {
+    let arguments: Vec<_> = std::env::args_os().collect();
+    if arguments.get(1).is_some_and(|command| command == "worker") {
+        return lookalike_worker::main_from(arguments.into_iter().skip(1), registry());
+    }
+    let arguments: Vec<_> = arguments.iter().map(|argument| argument.to_string_lossy().into_owned()).collect();
+    let ["gates", count, address, workers, access_file] =
+        arguments[1..].iter().map(String::as_str).collect::<Vec<_>>()[..]
+    else {
+        return ExitCode::from(2);
+    };
+    let (Ok(count), Ok(workers)) = (count.parse(), workers.parse()) else {
+        return ExitCode::from(2);
+    };
+    match coordinate(Leaves::Gates { count, address: address.to_owned() }, workers, access_file) {
+        Ok(result) => {
+            // Nobody reads it when the test is over.
+            let _ = writeln!(std::io::stdout(), "{result:?}");
+            ExitCode::SUCCESS
+        }
+        Err(error) => {
+            let _ = writeln!(std::io::stderr(), "error: {error}");
+            ExitCode::from(error.exit_code())
+        }
+    }
+}
+
+fn coordinate(leaves: Leaves, workers: usize, access_file: &str) -> Result<Option<Vec<u8>>, RunError> {
+    let runtime = tokio::runtime::Runtime::new().map_err(RunError::Signals)?;
+    let options = RunnerOptions::new(workers, access_file.into());
+    let (planner, _) = runtime.block_on(run(options, TestPlanner::new(leaves), Arc::new(registry()), |_| {}))?;
+    Ok(planner.result)
+}
