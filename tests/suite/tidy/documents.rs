@@ -50,7 +50,7 @@ fn links_and_paths_in_documents_resolve() {
         let text = document(name);
         let (_, prose) = blocks(&text);
         let links = between(&prose, "](", ")").into_iter().chain(between(&prose, "src=\"", "\""));
-        let named = between(&prose, "`", "`").into_iter().filter(|path| {
+        let named = prose.split('`').skip(1).step_by(2).filter(|path| {
             FOLDERS.iter().any(|folder| path.starts_with(folder)) && !path.contains(['*', '<', ' ', '{', '('])
         });
         for link in links.filter(|link| !link.starts_with("http")).chain(named) {
