@@ -58,7 +58,9 @@ pub(super) fn sources() -> Vec<Source> {
 /// Adds the Rust files below a folder, sorted, as paths relative to the root. Build output and hidden folders are not ours.
 fn collect(root: &Path, folder: &str, paths: &mut Vec<String>) {
     let entries = fs::read_dir(root.join(folder)).unwrap_or_else(|error| panic!("{folder}: {error}"));
-    let mut names: Vec<_> = entries.map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
+    let mut names: Vec<_> = entries
+        .map(|entry| entry.expect("a folder can be listed").file_name().into_string().expect("names are UTF-8"))
+        .collect();
     names.sort();
     for name in names.iter().filter(|name| !name.starts_with('.') && *name != "target") {
         let path = format!("{folder}/{name}");
