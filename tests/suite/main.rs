@@ -3,3 +3,4 @@
 mod cli;
 mod cluster;
 mod cluster_hostile;
+mod tidy;

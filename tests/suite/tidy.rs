@@ -1,0 +1,237 @@
+//! The rules of the project that a compiler does not know: which module may import which, what the science must not
+//! touch, what keeps results the same on every machine, what a file looks like. Each reads the sources; each message
+//! says where and what to do instead. ARCHITECTURE.md states the same rules in prose.
+
+mod documents;
+mod files;
+mod models;
+mod paths;
+mod source;
+
+use paths::{Found, calls, chain, paths, words};
+use source::{Source, sources};
+
+/// What each module of `common` may import of the others; the longest path that fits a file counts. A tight list: widen
+/// it in the commit that explains why.
+const MAY_IMPORT: [(&str, &[&str]); 15] = [
+    ("math", &[]),
+    ("image", &["math"]),
+    ("brdf", &["math"]),
+    ("light", &["image", "math"]),
+    ("scene", &["image", "light", "math"]),
+    ("render", &["brdf", "image", "light", "math", "scene"]),
+    ("metric", &["image", "math"]),
+    ("search", &["math"]),
+    ("fit", &["brdf", "image", "light", "math", "metric", "render", "scene", "search"]),
+    ("fit/nodes", &["brdf", "graph", "image", "light", "math", "metric", "render", "scene", "search"]),
+    ("fit/plan", &["brdf", "graph", "image", "light", "math", "metric", "render", "scene", "search"]),
+    ("fit/wire", &["brdf", "graph", "image", "light", "math", "metric", "protocol", "render", "scene", "search"]),
+    ("export", &["brdf", "image", "math"]),
+    ("graph", &[]),
+    ("protocol", &["graph"]),
+];
+
+/// Parts of the standard library that `common` must not use: it opens nothing, waits for nothing, prints nothing.
+const WORLD: [&str; 8] = [
+    "std::env",
+    "std::fs",
+    "std::net",
+    "std::os",
+    "std::process",
+    "std::thread",
+    "std::time::Instant",
+    "std::time::SystemTime",
+];
+
+/// Words that mean the same, however they were imported.
+const WORLD_WORDS: [&str; 8] = ["Instant", "SystemTime", "from_file", "stderr", "stdin", "stdout", "to_file", "tokio"];
+
+/// Macros that print.
+const PRINTING: [&str; 5] = ["dbg", "eprint", "eprintln", "print", "println"];
+
+/// Methods of `f64` whose result depends on the system's mathematical library, or on what the processor fuses.
+const UNPORTABLE: [&str; 27] = [
+    "acos", "acosh", "asin", "asinh", "atan", "atan2", "atanh", "cbrt", "cos", "cosh", "exp", "exp2", "exp_m1",
+    "hypot", "ln", "ln_1p", "log", "log10", "log2", "mul_add", "powf", "powi", "sin", "sin_cos", "sinh", "tan", "tanh",
+];
+
+/// Functions of glam that call them.
+const UNPORTABLE_OF_GLAM: [&str; 9] = [
+    "angle_between",
+    "from_axis_angle",
+    "from_euler",
+    "from_rotation_x",
+    "from_rotation_y",
+    "from_rotation_z",
+    "rotate_towards",
+    "slerp",
+    "to_axis_angle",
+];
+
+/// Fails with one line per offence.
+#[track_caller]
+fn none(rule: &str, offences: Vec<String>) {
+    assert!(offences.is_empty(), "{rule}:\n  {}", offences.join("\n  "));
+}
+
+/// The sources of the library, without its tests.
+fn common() -> impl Iterator<Item = Source> {
+    sources().into_iter().filter(|source| source.path.starts_with("common/src/"))
+}
+
+fn at(source: &Source, found: &Found, what: &str) -> String {
+    format!("{}:{}: {} {what}", source.path, found.line, found.name)
+}
+
+/// Whether a path lies in [`WORLD`].
+fn is_outside(path: &str) -> bool {
+    WORLD.iter().any(|world| path.strip_prefix(world).is_some_and(|rest| rest.is_empty() || rest.starts_with("::")))
+}
+
+#[test]
+fn modules_of_the_library_import_in_one_direction() {
+    let mut offences = Vec::new();
+    for source in common() {
+        let Some(module) = source.module_of_common() else { continue };
+        let fits = |name: &str| {
+            source.path["common/src/".len()..].strip_prefix(name).is_some_and(|r| r.starts_with(['/', '.']))
+        };
+        let Some((name, allowed)) = MAY_IMPORT.iter().filter(|(name, _)| fits(name)).max_by_key(|(name, _)| name.len())
+        else {
+            offences.push(format!("{}: the module {module} is not in MAY_IMPORT; give it its place", source.path));
+            continue;
+        };
+        for found in paths(&source.code, "crate") {
+            let target = found.name.split("::").nth(1).unwrap_or("*");
+            if target != module && !allowed.contains(&target) {
+                offences.push(at(&source, &found, &format!("must not be imported by {name}")));
+            }
+        }
+        // A path of `super` that leaves its module would escape the check above.
+        let folders = source.path.matches('/').count() - 2 + usize::from(!source.path.ends_with("/mod.rs"));
+        for found in paths(&source.code, "super") {
+            if found.name.split("::").filter(|name| *name == "super").count() >= folders.max(1) {
+                offences.push(at(&source, &found, "leaves its module; write crate::"));
+            }
+        }
+    }
+    none("the order is math <- image <- {brdf, light} <- scene <- render, see MAY_IMPORT", offences);
+}
+
+#[test]
+fn the_library_touches_nothing_outside_itself() {
+    let mut offences = Vec::new();
+    for source in common() {
+        let used =
+            paths(&source.code, "std").into_iter().filter(|found| is_outside(&found.name) || found.name == "std::time");
+        offences.extend(used.map(|found| at(&source, &found, "(take bytes, readers or values instead)")));
+        for (word, after) in words(&source.code) {
+            let prints = after.starts_with('!') && !after.starts_with("!=") && PRINTING.contains(&word.name.as_str());
+            if prints || WORLD_WORDS.contains(&word.name.as_str()) {
+                offences.push(at(&source, &word, "(return values; the binaries read, time and print)"));
+            }
+        }
+    }
+    none("nothing under common/ opens a file or a socket, reads a clock or a variable, or prints", offences);
+}
+
+#[test]
+fn results_do_not_depend_on_the_systems_mathematics() {
+    let scientific = |path: &str| path.starts_with("common/src/") || path.starts_with("coordinator/src/demo/");
+    let mut offences = Vec::new();
+    for source in sources().iter().filter(|source| scientific(&source.path)) {
+        if source.path != "common/src/math/elementary.rs" {
+            let unportable = calls(&source.code).into_iter().filter(|found| UNPORTABLE.contains(&found.name.as_str()));
+            offences.extend(unportable.map(|found| at(source, &found, "is not portable; see math::elementary")));
+            let of_glam = words(&source.code).filter(|(word, _)| UNPORTABLE_OF_GLAM.contains(&word.name.as_str()));
+            offences.extend(of_glam.map(|(word, _)| at(source, &word, "is not portable; see math::elementary")));
+        }
+        if !source.path.starts_with("common/src/math/") {
+            let direct = paths(&source.code, "libm");
+            offences.extend(direct.iter().map(|found| at(source, found, "bypasses math::elementary")));
+        }
+    }
+    none("elementary functions come from math::elementary", offences);
+}
+
+#[test]
+fn results_do_not_depend_on_hashing_or_on_threads() {
+    let mut offences = Vec::new();
+    for source in common() {
+        let hashed = words(&source.code).filter(|(word, _)| word.name == "HashMap" || word.name == "HashSet");
+        offences.extend(hashed.map(|(word, _)| at(&source, &word, "has no order; use BTreeMap or BTreeSet")));
+        for (place, _) in source.code.match_indices("par_") {
+            let chain = chain(&source.code, place);
+            let merging =
+                ["sum", "product", "reduce", "fold", "reduce_with", "try_reduce", "find_any", "for_each_with"];
+            if let Some(name) = chain.iter().find(|name| merging.contains(name)) {
+                let line = Source::line(&source.code, place);
+                offences
+                    .push(format!("{}:{line}: {name} of a parallel iterator; collect in order, then sum", source.path));
+            }
+        }
+    }
+    none("sums run in one order, and no order comes from a hash or a thread", offences);
+}
+
+#[test]
+fn state_machines_know_neither_sockets_nor_clocks() {
+    const PURE: [&str; 5] = [
+        "coordinator/src/comm.rs",
+        "coordinator/src/core.rs",
+        "coordinator/src/reactor.rs",
+        "worker/src/cache.rs",
+        "worker/src/tasks.rs",
+    ];
+    let mut offences = Vec::new();
+    let mut seen = 0;
+    for source in sources().iter().filter(|source| PURE.contains(&source.path.as_str())) {
+        seen += 1;
+        let used = paths(&source.code, "std").into_iter().filter(|found| is_outside(&found.name));
+        offences.extend(used.map(|found| at(source, &found, "(time and events are injected)")));
+        let words = words(&source.code).filter(|(word, _)| WORLD_WORDS.contains(&word.name.as_str()));
+        offences.extend(words.map(|(word, _)| at(source, &word, "(time and events are injected)")));
+    }
+    assert_eq!(seen, PURE.len(), "a file of {PURE:?} was moved: follow it here");
+    none("state changes are plain functions of (state, event)", offences);
+}
+
+#[test]
+fn the_worker_knows_nothing_of_rendering() {
+    let mut offences = Vec::new();
+    let inside = |path: &str| path.starts_with("worker/src/") && path != "worker/src/main.rs";
+    for source in sources().iter().filter(|source| inside(&source.path)) {
+        for found in paths(&source.code, "lookalike") {
+            if !found.name.starts_with("lookalike::graph") && !found.name.starts_with("lookalike::protocol") {
+                offences.push(at(
+                    source,
+                    &found,
+                    "(a worker runs what its registry holds; only main.rs names node types)",
+                ));
+            }
+        }
+    }
+    none("the worker's library imports graph and protocol only", offences);
+}
+
+#[test]
+fn the_rules_read_rust_as_it_is_written() {
+    let blanked =
+        source::without_comments_and_strings("a /* b /* c */ */ \"d // \\\" e\" r#\"f\"#; 'g' 'h: '\\'' // i\nj");
+    let left: Vec<String> = words(&blanked).map(|(word, _)| word.name).collect();
+    assert_eq!(left, ["a", "r", "h", "j"]);
+    let tree =
+        "use std::{fs::{self, File}, io::Read as _, path::*}; crate::x::<u8>(); mystd::no; std::time::Instant::now()";
+    let names = |root| paths(tree, root).into_iter().map(|found| found.name).collect::<Vec<_>>();
+    assert_eq!(names("std"), ["std::fs", "std::fs::File", "std::io::Read", "std::path::*", "std::time::Instant::now"]);
+    assert_eq!(names("crate"), ["crate::x"]);
+    let sum = "v.par_iter().map(|x| x.iter().fold(0, f)).sum::<f64>().max(y.min(z)); w.reduce(g)";
+    assert_eq!(chain(sum, 2), ["map", "sum", "max"]);
+    let all: Vec<String> =
+        calls("x.exp(); f64::powf(x, 2.0); y.sin_cos ; z.sum::<f64>()").into_iter().map(|f| f.name).collect();
+    assert_eq!(all, ["powf", "exp", "sum"]);
+    let files = sources();
+    let source = |path: &str| files.iter().find(|source| source.path == path).expect(path);
+    assert!(source("common/src/metric/tests/vectors.rs").code.is_empty(), "a test module is not library code");
+    assert!(!source("common/src/fit/objective.rs").code.contains("mod tests"), "nor is an inline one");
+}

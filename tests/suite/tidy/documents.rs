@@ -1,0 +1,129 @@
+//! Documents say what is there: links and paths resolve, commands and flags exist, keys are in the bibliography.
+
+use super::{
+    none,
+    source::{root, sources},
+};
+use std::{collections::BTreeSet, fs, process::Command};
+
+const DOCUMENTS: [&str; 4] = ["README.md", "ARCHITECTURE.md", "CONTRIBUTING.md", "CHANGELOG.md"];
+const FOLDERS: [&str; 8] = ["common/", "coordinator/", "docs/", "fuzz/", "tests/", "worker/", ".ci/", "experiments/"];
+
+/// A document without its HTML comments.
+fn document(name: &str) -> String {
+    let text = fs::read_to_string(root().join(name)).unwrap_or_else(|error| panic!("{name}: {error}"));
+    let mut parts = text.split("<!--");
+    let before = parts.next().unwrap_or_default();
+    parts.fold(before.to_owned(), |shown, part| shown + part.split_once("-->").map_or("", |(_, after)| after))
+}
+
+/// What stands between `open` and `close`, each time.
+fn between<'a>(text: &'a str, open: &str, close: &str) -> Vec<&'a str> {
+    text.split(open).skip(1).filter_map(|rest| Some(rest.split_once(close)?.0)).collect()
+}
+
+/// The fenced blocks of a document and what is left without them.
+fn blocks(text: &str) -> (Vec<&str>, String) {
+    let parts: Vec<&str> = text.split("```").collect();
+    (parts.iter().skip(1).step_by(2).copied().collect(), parts.iter().step_by(2).copied().collect())
+}
+
+/// The `--flags` in a text.
+fn flags(text: &str) -> BTreeSet<&str> {
+    let is_part = |c: char| c.is_ascii_lowercase() || c == '-';
+    let starts = text.match_indices("--").filter(|(i, _)| !text[..*i].ends_with(|c: char| is_part(c)));
+    let ends = starts.map(|(i, _)| &text[i..i + text[i..].find(|c: char| !is_part(c)).unwrap_or(text.len() - i)]);
+    ends.filter(|flag| flag.len() > 2 && flag.as_bytes()[2] != b'-').collect()
+}
+
+fn help(command: &str) -> String {
+    let mut program = Command::new(env!("CARGO_BIN_EXE_lookalike-under-test"));
+    let output = program.args(command.split(' ')).arg("--help").output().expect("the binary under test starts");
+    assert!(output.status.success(), "lookalike {command} --help");
+    String::from_utf8(output.stdout).expect("help is UTF-8")
+}
+
+#[test]
+fn links_and_paths_in_documents_resolve() {
+    let mut offences = Vec::new();
+    for name in DOCUMENTS {
+        let text = document(name);
+        let (_, prose) = blocks(&text);
+        let links = between(&prose, "](", ")").into_iter().chain(between(&prose, "src=\"", "\""));
+        let named = prose.split('`').skip(1).step_by(2).filter(|path| {
+            FOLDERS.iter().any(|folder| path.starts_with(folder)) && !path.contains(['*', '<', ' ', '{', '('])
+        });
+        for link in links.filter(|link| !link.starts_with("http")).chain(named) {
+            let path = link.split('#').next().unwrap_or_default();
+            if !path.is_empty() && !root().join(path).exists() {
+                offences.push(format!("{name}: {link} does not exist"));
+            }
+        }
+    }
+    none("documents name what is there", offences);
+}
+
+#[test]
+fn commands_and_flags_in_documents_exist() {
+    const COMMANDS: [&str; 5] = ["demo", "fit", "render", "compare", "worker"];
+    const OF_CARGO: [&str; 7] = ["--bin", "--features", "--lib", "--locked", "--path", "--release", "--test"];
+    let helps: Vec<(&str, String)> = COMMANDS.iter().map(|command| (*command, help(command))).collect();
+    let known: BTreeSet<&str> = helps.iter().flat_map(|(_, help)| flags(help)).chain(OF_CARGO).collect();
+    let mut offences = Vec::new();
+    for name in DOCUMENTS {
+        let text = document(name);
+        offences.extend(flags(&text).difference(&known).map(|flag| format!("{name}: no command has {flag}")));
+        let joined = text.replace("\\\n", " ");
+        for line in joined.lines().filter(|line| line.starts_with("lookalike ")) {
+            let command = line.split_whitespace().nth(1).unwrap_or_default();
+            match helps.iter().find(|(known, _)| *known == command) {
+                Some((_, help)) => {
+                    let unknown =
+                        flags(line).difference(&flags(help)).map(|flag| (*flag).to_owned()).collect::<Vec<_>>();
+                    offences.extend(unknown.iter().map(|flag| format!("{name}: lookalike {command} has no {flag}")));
+                }
+                None => offences.push(format!("{name}: lookalike {command} is not there")),
+            }
+        }
+    }
+    none("documents name commands and flags that exist", offences);
+}
+
+#[test]
+fn the_readme_names_the_two_commands() {
+    let text = document("README.md");
+    let lines: Vec<&str> = blocks(&text).0.into_iter().flat_map(str::lines).collect();
+    for command in ["cargo run --release --bin lookalike -- demo", "cargo test"] {
+        assert!(lines.contains(&command), "expected the line {command:?} in a code block of README.md");
+    }
+}
+
+#[test]
+fn keys_cited_in_the_sources_are_in_the_bibliography() {
+    let bibliography = fs::read_to_string(root().join("docs/references.bib")).expect("docs/references.bib");
+    let entries: Vec<&str> = bibliography
+        .lines()
+        .filter_map(|line| line.strip_prefix('@')?.split_once('{'))
+        .map(|(_, key)| key.trim_end_matches(','))
+        .collect();
+    let keys: BTreeSet<&str> = entries.iter().copied().collect();
+    let mut offences = Vec::new();
+    if keys.len() != entries.len() {
+        offences.push("docs/references.bib: a key is there twice".to_owned());
+    }
+    let texts = sources().into_iter().map(|source| (source.path.clone(), source.text));
+    for (path, text) in texts.chain(DOCUMENTS.map(|name| (name.to_owned(), document(name)))) {
+        // [BP20b]: capital initials, two digits of the year, perhaps a letter.
+        let plain = text.replace("\\[", "[").replace("\\]", "]");
+        let cited =
+            between(&plain, "[", "]").into_iter().filter(|key| is_key(key)).map(str::to_owned).collect::<Vec<_>>();
+        offences.extend(cited.iter().filter(|key| !keys.contains(key.as_str())).map(|key| format!("{path}: [{key}]")));
+    }
+    none("every key is in docs/references.bib", offences);
+}
+
+fn is_key(text: &str) -> bool {
+    let initials = text.trim_start_matches(|c: char| c.is_ascii_uppercase());
+    let year = initials.trim_end_matches(|c: char| c.is_ascii_lowercase());
+    text.len() - initials.len() >= 2 && year.len() == 2 && year.bytes().all(|byte| byte.is_ascii_digit())
+}
