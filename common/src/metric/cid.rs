@@ -4,14 +4,14 @@
 //! the sixth feature c_C (chroma contrast), and 3 or 5 scales: contrast and structure are taken at every scale with the
 //! exponents of MS-SSIM, lightness only at the coarsest, chroma and hue only at the finest.
 
-use super::colour::{A, B, CHROMA, LIGHTNESS};
+use super::colour::{A, B, LIGHTNESS};
 use super::cssim::{SIGMA, check_size};
 use super::dispatch::Lanes;
 use super::display::{DisplayImage, decode_srgb};
 use super::features::{FEATURES, chroma_contrast_row, deficit_rows, row_sum};
 use super::planes::Planes;
 use super::region::Region;
-use super::window::{RADIUS, SIZE, Statistics, Window};
+use super::window::{SIZE, Statistics, Window};
 use super::working::{Pipeline, SpatialFilter};
 use super::{Lab2000hl, MetricError};
 use crate::math::elementary::{pow, sin_cos};
@@ -63,14 +63,13 @@ impl Default for CidOptions {
 pub fn cid(reference: &DisplayImage, image: &DisplayImage, options: &CidOptions) -> Result<f64, MetricError> {
     let exponents = options.scales.exponents();
     check_pair(reference, image, SIZE, exponents.len())?;
-    let lanes = Lanes::Detected;
-    let pipeline = Pipeline::new(options.filter, options.cycles_per_degree, options.space.clone(), lanes)?;
-    let statistics = Statistics { window: Window::new(SIGMA), chroma: options.chroma_contrast, lanes };
+    let pipeline = Pipeline::new(options.filter, options.cycles_per_degree, options.space.clone(), Lanes::Detected)?;
+    let statistics = Statistics { window: Window::new(SIGMA), chroma: options.chroma_contrast, lanes: Lanes::Detected };
     let [mut first, mut second] = [reference, image].map(|displayed| working(&pipeline, displayed));
     let mut product = Power { magnitude: 1.0, half_turns: 0.0 };
     for (scale, &exponent) in exponents.iter().enumerate() {
         if scale > 0 {
-            [first, second] = [&first, &second].map(|planes| halve(planes, lanes));
+            [first, second] = [&first, &second].map(halve);
         }
         let [l_l, c_l, s_l, l_c, l_h, c_c] = means(&statistics, &first, &second);
         let at_every_scale = if options.chroma_contrast { &[c_l, s_l, c_c][..] } else { &[c_l, s_l] };
@@ -150,7 +149,7 @@ pub(super) fn working(pipeline: &Pipeline, displayed: &DisplayImage) -> Planes<4
 }
 
 /// Means over all windows of l_L, c_L, s_L, l_C, l_H and c_C (1 if not asked for).
-fn means(statistics: &Statistics, reference: &Planes<4>, image: &Planes<4>) -> [f64; FEATURES + 1] {
+pub(super) fn means(statistics: &Statistics, reference: &Planes<4>, image: &Planes<4>) -> [f64; FEATURES + 1] {
     let reference = statistics.prepare(reference.clone());
     let (columns, stride) = (reference.moments.width(), reference.moments.stride());
     let rows = statistics.compare(&reference, image, |_, row| {
@@ -169,7 +168,7 @@ fn means(statistics: &Statistics, reference: &Planes<4>, image: &Planes<4>) -> [
 
 /// Half the size of an image in the working space: low-pass of the biorthogonal 9/7 wavelet with half-sample
 /// reflection, then every second pixel.
-fn halve(planes: &Planes<4>, lanes: Lanes) -> Planes<4> {
+fn halve(planes: &Planes<4>) -> Planes<4> {
     let (width, height) = (planes.width(), planes.height());
     let mut half = Planes::<4>::new(width.div_ceil(2), height.div_ceil(2));
     let sum = LOW_PASS[0] + 2.0 * LOW_PASS[1..].iter().sum::<f64>();
@@ -179,7 +178,7 @@ fn halve(planes: &Planes<4>, lanes: Lanes) -> Planes<4> {
         || vec![0.0; width],
         |smoothed, y, out| {
             let [l, a, b, chroma] = out;
-            for (channel, out) in [(LIGHTNESS, &mut *l), (A, &mut *a), (B, &mut *b)] {
+            for (channel, out) in [(LIGHTNESS, l), (A, &mut *a), (B, &mut *b)] {
                 let source = |k: usize| rows[2 * y + k].map_or(&[][..], |row| planes.row_of(channel, row));
                 smoothed.iter_mut().enumerate().for_each(|(x, sum)| {
                     *sum = low_pass(&taps, |k| source(k)[x]);
@@ -188,17 +187,9 @@ fn halve(planes: &Planes<4>, lanes: Lanes) -> Planes<4> {
                     out[x] = low_pass(&taps, |k| columns[2 * x + k].map_or(0.0, |column| smoothed[column]));
                 });
             }
-            lanes.run(
-                #[inline(always)]
-                || {
-                    for (chroma, (a, b)) in chroma.iter_mut().zip(a.iter().zip(b.iter())) {
-                        *chroma = (a * a + b * b).sqrt();
-                    }
-                },
-            );
+            chroma.iter_mut().zip(a.iter().zip(b.iter())).for_each(|(chroma, (a, b))| *chroma = (a * a + b * b).sqrt());
         },
     );
-    debug_assert_eq!(half.row(0)[CHROMA].len(), half.stride());
     half
 }
 
@@ -208,8 +199,10 @@ fn low_pass(taps: &[f64; 5], value: impl Fn(usize) -> f64) -> f64 {
 }
 
 /// Half of the low-pass of the biorthogonal 9/7 wavelet, from its centre (`CID_advanced.m`).
-const LOW_PASS: [f64; 5] =
-    [0.852_698_679_008_890, 0.377_402_855_612_830, -0.110_624_404_418_440, -0.023_849_465_019_560, 0.037_828_455_507_260];
-
-// Windows of 11 pixels are centred on pixel 5.
-const _: () = assert!(SIZE == 2 * RADIUS + 1);
+const LOW_PASS: [f64; 5] = [
+    0.852_698_679_008_890,
+    0.377_402_855_612_830,
+    -0.110_624_404_418_440,
+    -0.023_849_465_019_560,
+    0.037_828_455_507_260,
+];

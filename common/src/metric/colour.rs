@@ -58,7 +58,7 @@ pub(super) fn working_row(space: &Lab2000hl, xyz: [&[f64]; 3], working: [&mut [f
     let [l, a, b, chroma] = working;
     let n = l.len();
     let (a, b, chroma) = (&mut a[..n], &mut b[..n], &mut chroma[..n]);
-    let [x, y, z] = xyz.map(|row| &row[..n]);
+    let (x, y, z) = (&xyz[0][..n], &xyz[1][..n], &xyz[2][..n]);
     for i in 0..n {
         [l[i], a[i], b[i]] = lab(x[i], y[i], z[i]);
     }
@@ -82,7 +82,7 @@ pub(super) fn transform_row(matrix: &Matrix, rows: [&mut [f64]; 3]) {
 
 #[inline(always)]
 fn lab(x: f64, y: f64, z: f64) -> [f64; 3] {
-    let [fx, fy, fz] = [x, y, z].map(compress);
+    let (fx, fy, fz) = (compress(x), compress(y), compress(z));
     [116.0 * fy - 16.0, 500.0 * (fx - fy), 200.0 * (fy - fz)]
 }
 

@@ -21,7 +21,6 @@ use super::window::{Prepared, RADIUS, RowStatistics, SIZE, Statistics, Window};
 use super::working::{Pipeline, SpatialFilter};
 use super::{Lab2000hl, MetricError};
 use crate::image::Image;
-use crate::math::widen;
 
 /// Settings of a [`Judge`].
 #[derive(Debug, Clone)]
@@ -130,17 +129,21 @@ impl Judge {
                 #[inline(always)]
                 || {
                     deficit_rows(statistics, &mut deficits);
-                    let all = deficits.each_ref().map(|row| row_sum(&row[..windows]));
-                    (all, deficits.each_ref().map(|row| weighted_row_sum(&row[..windows], object)))
+                    let mut sums = [(0.0, 0.0); FEATURES];
+                    for (sum, row) in sums.iter_mut().zip(&deficits) {
+                        *sum = (row_sum(&row[..windows]), weighted_row_sum(&row[..windows], object));
+                    }
+                    sums
                 },
             )
         });
-        let sum = |rows: &mut dyn Iterator<Item = [f64; FEATURES]>| {
-            rows.fold([0.0; FEATURES], |sum, row| std::array::from_fn(|i| sum[i] + row[i]))
-        };
-        let all = sum(&mut rows.iter().map(|row| row.0));
-        let object = sum(&mut rows.iter().map(|row| row.1));
-        Ok(self.combine(all, object))
+        let mut sums = [(0.0, 0.0); FEATURES];
+        for row in &rows {
+            for (sum, (all, object)) in sums.iter_mut().zip(row) {
+                *sum = (sum.0 + all, sum.1 + object);
+            }
+        }
+        Ok(self.combine(sums.map(|sum| sum.0), sums.map(|sum| sum.1)))
     }
 
     /// The features and the error of every window, for a picture.
@@ -178,8 +181,7 @@ impl Judge {
     }
 
     fn convert(&self, image: &Image) -> Result<Planes<4>, MetricError> {
-        let (expected, found) =
-            ((self.region.image_width, self.region.image_height), (image.width(), image.height()));
+        let (expected, found) = ((self.region.image_width, self.region.image_height), (image.width(), image.height()));
         if expected != found {
             return Err(MetricError::SizeMismatch { expected, found });
         }
@@ -208,8 +210,10 @@ fn convert(pipeline: &Pipeline, region: &Region, gain: &Planes<1>, image: &Image
         let start = (region.y0 + y) * region.image_width + region.x0;
         let pixels = &image.pixels()[start..start + region.width];
         let gains = gain.row_of(0, y);
-        for (i, (&pixel, &gain)) in pixels.iter().zip(gains).enumerate() {
-            [r[i], g[i], b[i]] = widen(pixel).to_array().map(|x| expose(x, gain));
+        for (i, (&[red, green, blue], &gain)) in pixels.iter().zip(gains).enumerate() {
+            r[i] = expose(f64::from(red), gain);
+            g[i] = expose(f64::from(green), gain);
+            b[i] = expose(f64::from(blue), gain);
         }
     })
 }
@@ -231,9 +235,7 @@ fn gains(coverage: &[f32], region: &Region, exposure: f64) -> Planes<1> {
 fn object_windows(coverage: &[f32], region: &Region) -> (Planes<1>, usize) {
     let (columns, rows) = region.windows();
     let mut object = Planes::<1>::new(columns, rows);
-    let centre = |x: usize, y: usize| {
-        (region.y0 + y + RADIUS) * region.image_width + region.x0 + x + RADIUS
-    };
+    let centre = |x: usize, y: usize| (region.y0 + y + RADIUS) * region.image_width + region.x0 + x + RADIUS;
     object.fill_rows(
         || (),
         |(), y, [row]| {

@@ -144,11 +144,7 @@ pub(super) fn check_covered_finite(what: &'static str, image: &Image, coverage: 
     check_finite(what, image.width(), seen)
 }
 
-fn check_finite(
-    what: &'static str,
-    width: usize,
-    pixels: impl Iterator<Item = [f64; 3]>,
-) -> Result<(), MetricError> {
+fn check_finite(what: &'static str, width: usize, pixels: impl Iterator<Item = [f64; 3]>) -> Result<(), MetricError> {
     for (i, pixel) in pixels.enumerate() {
         if let Some(channel) = pixel.iter().position(|x| !x.is_finite()) {
             let value = pixel[channel];

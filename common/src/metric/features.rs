@@ -25,17 +25,16 @@ const STRUCTURE_CONSTANT: f64 = 0.1;
 #[inline(always)]
 pub(super) fn deficit_rows(statistics: &RowStatistics<'_>, out: &mut [Vec<f64>; FEATURES]) {
     let n = out[0].len();
-    let [l_l, c_l, s_l, l_c, l_h] = out.each_mut().map(|row| &mut row[..n]);
-    let first = statistics.reference.map(|row| &row[..n]);
-    let second = statistics.image.map(|row| &row[..n]);
+    let [l_l, c_l, s_l, l_c, l_h] = out;
+    mean_deficit_row(LIGHTNESS_WEIGHT, statistics.reference[MEAN_LIGHTNESS], statistics.image[MEAN_LIGHTNESS], l_l);
+    mean_deficit_row(CHROMA_WEIGHT, statistics.reference[MEAN_CHROMA], statistics.image[MEAN_CHROMA], l_c);
+    let (c_l, s_l, l_h) = (&mut c_l[..n], &mut s_l[..n], &mut l_h[..n]);
     let (covariance, hue) = (&statistics.covariance_lightness[..n], &statistics.hue_difference[..n]);
+    let (v1, v2) = (&statistics.reference[VARIANCE_LIGHTNESS][..n], &statistics.image[VARIANCE_LIGHTNESS][..n]);
     for x in 0..n {
-        l_l[x] = mean_deficit(LIGHTNESS_WEIGHT, first[MEAN_LIGHTNESS][x] - second[MEAN_LIGHTNESS][x]);
-        l_c[x] = mean_deficit(CHROMA_WEIGHT, first[MEAN_CHROMA][x] - second[MEAN_CHROMA][x]);
         l_h[x] = mean_deficit(HUE_WEIGHT, hue[x]);
-        let (v1, v2) = (first[VARIANCE_LIGHTNESS][x], second[VARIANCE_LIGHTNESS][x]);
-        let product = (v1 * v2).sqrt();
-        c_l[x] = contrast_deficit(CONTRAST_CONSTANT, v1 + v2, product);
+        let product = (v1[x] * v2[x]).sqrt();
+        c_l[x] = contrast_deficit(CONTRAST_CONSTANT, v1[x] + v2[x], product);
         s_l[x] = structure_deficit(STRUCTURE_CONSTANT, covariance[x], product);
     }
 }
@@ -47,6 +46,15 @@ pub(super) fn chroma_contrast_row(statistics: &RowStatistics<'_>, out: &mut [f64
     let (v1, v2) = (&statistics.reference[VARIANCE_CHROMA][..n], &statistics.image[VARIANCE_CHROMA][..n]);
     for x in 0..n {
         out[x] = contrast_deficit(CONTRAST_CONSTANT, v1[x] + v2[x], (v1[x] * v2[x]).sqrt());
+    }
+}
+
+#[inline(always)]
+fn mean_deficit_row(k: f64, first: &[f64], second: &[f64], out: &mut [f64]) {
+    let n = out.len();
+    let (first, second) = (&first[..n], &second[..n]);
+    for x in 0..n {
+        out[x] = mean_deficit(k, first[x] - second[x]);
     }
 }
 
@@ -78,9 +86,13 @@ pub(super) fn row_sum(row: &[f64]) -> f64 {
     let mut sums = [0.0; LANES];
     let (chunks, rest) = row.as_chunks::<LANES>();
     for chunk in chunks {
-        (0..LANES).for_each(|i| sums[i] += chunk[i]);
+        for i in 0..LANES {
+            sums[i] += chunk[i];
+        }
     }
-    sums.iter_mut().zip(rest).for_each(|(sum, x)| *sum += x);
+    for i in 0..rest.len() {
+        sums[i] += rest[i];
+    }
     sums.iter().sum()
 }
 
@@ -89,9 +101,13 @@ pub(super) fn row_sum(row: &[f64]) -> f64 {
 pub(super) fn weighted_row_sum(row: &[f64], weights: &[f64]) -> f64 {
     let mut sums = [0.0; LANES];
     let ((chunks, rest), (weight_chunks, weight_rest)) = (row.as_chunks::<LANES>(), weights.as_chunks::<LANES>());
-    for (chunk, weight) in chunks.iter().zip(weight_chunks) {
-        (0..LANES).for_each(|i| sums[i] += weight[i] * chunk[i]);
+    for j in 0..chunks.len() {
+        for i in 0..LANES {
+            sums[i] += weight_chunks[j][i] * chunks[j][i];
+        }
     }
-    sums.iter_mut().zip(rest.iter().zip(weight_rest)).for_each(|(sum, (x, w))| *sum += w * x);
+    for i in 0..rest.len() {
+        sums[i] += weight_rest[i] * rest[i];
+    }
     sums.iter().sum()
 }

@@ -25,7 +25,8 @@ pub(super) fn filter(planes: &mut Planes<3>, cycles_per_degree: f64) {
         .into_iter()
         .enumerate()
         .map(|(channel, sensitivity)| {
-            let values: Vec<f64> = (0..height).flat_map(|y| planes.row_of(channel, y)[..width].iter().copied()).collect();
+            let values: Vec<f64> =
+                (0..height).flat_map(|y| planes.row_of(channel, y)[..width].iter().copied()).collect();
             let mean = if channel == 0 { values.iter().sum::<f64>() / values.len() as f64 } else { 0.0 };
             filter_channel(&values, mean, width, |f| sensitivity(cycles_per_degree * f))
         })
@@ -44,7 +45,15 @@ pub(super) fn filter(planes: &mut Planes<3>, cycles_per_degree: f64) {
 fn filter_channel(values: &[f64], mean: f64, width: usize, gain: impl Fn(f64) -> f64 + Sync) -> Vec<f64> {
     let height = values.len() / width;
     let (columns, rows) = (3 * width, 3 * height);
-    let mirrored = |i: usize, n: usize| if i < n { n - 1 - i } else if i < 2 * n { i - n } else { 3 * n - 1 - i };
+    let mirrored = |i: usize, n: usize| {
+        if i < n {
+            n - 1 - i
+        } else if i < 2 * n {
+            i - n
+        } else {
+            3 * n - 1 - i
+        }
+    };
     let mut spectrum: Vec<Complex<f64>> = (0..columns * rows)
         .map(|i| {
             let (x, y) = (mirrored(i % columns, width), mirrored(i / columns, height));
@@ -54,25 +63,29 @@ fn filter_channel(values: &[f64], mean: f64, width: usize, gain: impl Fn(f64) ->
     transform_rows(&mut spectrum, columns, FftDirection::Forward);
     let mut spectrum = transpose(&spectrum, columns);
     transform_rows(&mut spectrum, rows, FftDirection::Forward);
+    // Both signs of a frequency have one gain, so a quarter of the gains is all of them.
+    let gains: Vec<Vec<f64>> = (0..=columns / 2)
+        .into_par_iter()
+        .map(|u| {
+            let fu = axis_frequency(u, columns);
+            let radial = |fv: f64| (fu * fu + fv * fv).sqrt();
+            (0..=rows / 2).map(|v| gain(radial(axis_frequency(v, rows)))).collect()
+        })
+        .collect();
     spectrum.par_chunks_exact_mut(rows).enumerate().for_each(|(u, line)| {
-        let fu = axis_frequency(u, columns);
-        for (v, value) in line.iter_mut().enumerate() {
-            let fv = axis_frequency(v, rows);
-            *value *= gain((fu * fu + fv * fv).sqrt());
-        }
+        let gains = &gains[u.min(columns - u)];
+        line.iter_mut().enumerate().for_each(|(v, value)| *value *= gains[v.min(rows - v)]);
     });
     transform_rows(&mut spectrum, rows, FftDirection::Inverse);
     let mut spectrum = transpose(&spectrum, rows);
     transform_rows(&mut spectrum, columns, FftDirection::Inverse);
     let scale = 1.0 / (columns * rows) as f64;
-    (0..values.len())
-        .map(|i| spectrum[(i / width + height) * columns + i % width + width].re * scale + mean)
-        .collect()
+    (0..values.len()).map(|i| spectrum[(i / width + height) * columns + i % width + width].re * scale + mean).collect()
 }
 
-/// |frequency| of a bin relative to that of bin `floor(n/2)`.
+/// Frequency of a bin up to `floor(n/2)`, relative to that one's.
 fn axis_frequency(bin: usize, n: usize) -> f64 {
-    bin.min(n - bin) as f64 / (n / 2) as f64
+    bin as f64 / (n / 2) as f64
 }
 
 fn transform_rows(values: &mut [Complex<f64>], length: usize, direction: FftDirection) {

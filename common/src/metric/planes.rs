@@ -1,7 +1,7 @@
 //! Working buffers of the metric: `N` planes of `f64`, interleaved by row.
 
 /// Values that the row loops handle together. Row lengths are padded to a multiple of it.
-pub(super) const LANES: usize = 8;
+pub(super) const LANES: usize = 16;
 
 /// `N` planes of `height x width` values. The rows of all planes with the same index lie together, so that one parallel
 /// task can write to all planes of its row. Each row is followed by padding up to a multiple of [`LANES`].

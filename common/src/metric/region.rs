@@ -116,6 +116,6 @@ mod tests {
         coverage[50 * width + 60] = 0.25;
         coverage[52 * width + 61] = 1.0;
         let region = Region::around(&coverage, width, height, 19).unwrap();
-        assert_eq!((region.x0, region.y0, region.width, region.height), (24, 21, 91 - 24, 82 - 21));
+        assert_eq!((region.x0, region.y0, region.width, region.height), (16, 21, 91 - 16, 82 - 21));
     }
 }

@@ -8,6 +8,11 @@
 //! Each output row filters along y first (one sum of mirrored rows serves all Gaussians of a channel), then along x from
 //! buffers that stay in the first-level cache. The authors filter along x first; the difference is rounding.
 
+#![allow(
+    clippy::needless_range_loop,
+    reason = "indexed loops over chunks become vector code; the closures of iterator adaptors are not always inlined"
+)]
+
 use super::colour::Matrix;
 use super::planes::{LANES, Planes};
 use super::region::Region;
@@ -81,9 +86,8 @@ impl Scielab {
     pub(super) fn filter_row(&self, opponent: &Planes<3>, y: usize, scratch: &mut Scratch, out: [&mut [f64]; 3]) {
         let Scratch { rows, columns, zeros, smoothed } = scratch;
         let (sources, zeros) = (&rows[y..y + 2 * self.reach + 1], &zeros[..]);
-        let source = |channel: usize| {
-            sources.iter().map(move |row| row.map_or(zeros, move |row| opponent.row_of(channel, row)))
-        };
+        let source =
+            |channel: usize| sources.iter().map(move |row| row.map_or(zeros, move |row| opponent.row_of(channel, row)));
         let [narrow, wide_a, wide_b] = smoothed;
         let [achromatic, red_green, blue_yellow] = out;
         let layout = Layout { reach: self.reach, width: opponent.width(), columns };
@@ -141,45 +145,58 @@ impl<const W: usize> Channel<W> {
         source: impl Iterator<Item = &'a [f64]>,
         reach: usize,
         narrow: &mut [f64],
-        mut wide: [&mut [f64]; W],
+        wide: [&mut [f64]; W],
     ) {
         let rows: Vec<&[[f64; LANES]]> = source.map(|row| row.as_chunks().0).collect();
         let (centre, pairs) = (rows[reach], self.narrow.len());
         for j in 0..centre.len() {
-            let mut narrow_sum = scale(self.narrow[0], centre[j]);
-            let mut wide_sum: [[f64; LANES]; W] = std::array::from_fn(|g| scale(self.wide[0][g], centre[j]));
+            let (mut narrow_sum, mut wide_sum) = (ZERO, [ZERO; W]);
+            add_scaled(&mut narrow_sum, self.narrow[0], &centre[j]);
+            for g in 0..W {
+                add_scaled(&mut wide_sum[g], self.wide[0][g], &centre[j]);
+            }
             for k in 1..pairs {
-                let pair = add(rows[reach - k][j], rows[reach + k][j]);
-                accumulate(&mut narrow_sum, self.narrow[k], pair);
-                (0..W).for_each(|g| accumulate(&mut wide_sum[g], self.wide[k][g], pair));
+                let pair = sum_of(&rows[reach - k][j], &rows[reach + k][j]);
+                add_scaled(&mut narrow_sum, self.narrow[k], &pair);
+                for g in 0..W {
+                    add_scaled(&mut wide_sum[g], self.wide[k][g], &pair);
+                }
             }
             for k in pairs..=reach {
-                let pair = add(rows[reach - k][j], rows[reach + k][j]);
-                (0..W).for_each(|g| accumulate(&mut wide_sum[g], self.wide[k][g], pair));
+                let pair = sum_of(&rows[reach - k][j], &rows[reach + k][j]);
+                for g in 0..W {
+                    add_scaled(&mut wide_sum[g], self.wide[k][g], &pair);
+                }
             }
             narrow[j * LANES..][..LANES].copy_from_slice(&narrow_sum);
-            (0..W).for_each(|g| wide[g][j * LANES..][..LANES].copy_from_slice(&wide_sum[g]));
+            for g in 0..W {
+                wide[g][j * LANES..][..LANES].copy_from_slice(&wide_sum[g]);
+            }
         }
     }
 
     /// Sums along rows that begin `reach` columns before column 0.
     #[inline(always)]
     fn along_x(&self, reach: usize, narrow: &[f64], wide: [&[f64]; W], out: &mut [f64]) {
-        for (j, out) in out.as_chunks_mut::<LANES>().0.iter_mut().enumerate() {
-            let centre = reach + j * LANES;
-            let mut sum = scale(self.narrow[0], lanes(narrow, centre));
+        let (chunks, _) = out.as_chunks_mut::<LANES>();
+        for j in 0..chunks.len() {
+            let span = j * LANES..(j + 1) * LANES + 2 * reach;
+            let mut sum = ZERO;
+            let row = &narrow[span.clone()];
+            add_scaled(&mut sum, self.narrow[0], lanes(row, reach));
             for k in 1..self.narrow.len() {
-                accumulate(&mut sum, self.narrow[k], add(lanes(narrow, centre - k), lanes(narrow, centre + k)));
+                add_scaled(&mut sum, self.narrow[k], &sum_of(lanes(row, reach - k), lanes(row, reach + k)));
             }
             for g in 0..W {
-                let mut part = scale(self.wide[0][g], lanes(wide[g], centre));
+                let row = &wide[g][span.clone()];
+                let mut part = ZERO;
+                add_scaled(&mut part, self.wide[0][g], lanes(row, reach));
                 for k in 1..=reach {
-                    let pair = add(lanes(wide[g], centre - k), lanes(wide[g], centre + k));
-                    accumulate(&mut part, self.wide[k][g], pair);
+                    add_scaled(&mut part, self.wide[k][g], &sum_of(lanes(row, reach - k), lanes(row, reach + k)));
                 }
-                accumulate(&mut sum, self.sign[g], part);
+                add_scaled(&mut sum, self.sign[g], &part);
             }
-            *out = sum;
+            chunks[j] = sum;
         }
     }
 }
@@ -193,25 +210,24 @@ fn continue_row(row: &mut [f64], layout: &Layout<'_>) {
     }
 }
 
+const ZERO: [f64; LANES] = [0.0; LANES];
+
 #[inline(always)]
-fn lanes(row: &[f64], at: usize) -> [f64; LANES] {
-    let mut chunk = [0.0; LANES];
-    chunk.copy_from_slice(&row[at..at + LANES]);
-    chunk
+fn lanes(row: &[f64], at: usize) -> &[f64; LANES] {
+    row[at..at + LANES].as_array().unwrap_or(&ZERO)
 }
 
 #[inline(always)]
-fn scale(tap: f64, chunk: [f64; LANES]) -> [f64; LANES] {
-    chunk.map(|x| tap * x)
+fn sum_of(a: &[f64; LANES], b: &[f64; LANES]) -> [f64; LANES] {
+    let mut sum = ZERO;
+    for i in 0..LANES {
+        sum[i] = a[i] + b[i];
+    }
+    sum
 }
 
 #[inline(always)]
-fn add(a: [f64; LANES], b: [f64; LANES]) -> [f64; LANES] {
-    std::array::from_fn(|i| a[i] + b[i])
-}
-
-#[inline(always)]
-fn accumulate(sum: &mut [f64; LANES], tap: f64, chunk: [f64; LANES]) {
+fn add_scaled(sum: &mut [f64; LANES], tap: f64, chunk: &[f64; LANES]) {
     for i in 0..LANES {
         sum[i] += tap * chunk[i];
     }

@@ -2,6 +2,11 @@
 //!
 //! Only windows that lie inside the region count. CID uses sigma 1.5, iCID 2.0 (`fspecial('gaussian', 11, sigma)`).
 
+#![allow(
+    clippy::needless_range_loop,
+    reason = "indexed loops over chunks become vector code; the closures of iterator adaptors are not always inlined"
+)]
+
 use super::colour::{A, B, CHROMA, LIGHTNESS};
 use super::dispatch::Lanes;
 use super::planes::{LANES, Planes, ROWS_PER_TASK};
@@ -71,48 +76,68 @@ impl Window {
         Self { taps }
     }
 
-    /// Weighted means along a row of windows of a quantity given by (row of the window, chunk of columns).
+    /// Weighted means along a row of windows: of the values of `first` or, with `PRODUCT`, of their products with `second`.
     #[inline(always)]
-    fn mean_row(&self, quantity: impl Fn(usize, usize) -> [f64; LANES], column_sums: &mut [f64], out: &mut [f64]) {
-        for (j, sum) in column_sums.as_chunks_mut::<LANES>().0.iter_mut().enumerate() {
-            let centre = quantity(RADIUS, j);
-            let mut total: [f64; LANES] = std::array::from_fn(|i| self.taps[0] * centre[i]);
+    fn mean_row<const PRODUCT: bool>(
+        &self,
+        first: &WindowRows<'_>,
+        second: &WindowRows<'_>,
+        column_sums: &mut [f64],
+        out: &mut [f64],
+    ) {
+        let (sums, _) = column_sums.as_chunks_mut::<LANES>();
+        for j in 0..first[0].len() {
+            let mut total = [0.0; LANES];
+            for i in 0..LANES {
+                total[i] = self.taps[0] * value::<PRODUCT>(first[RADIUS][j][i], second[RADIUS][j][i]);
+            }
             for k in 1..=RADIUS {
-                let (above, below) = (quantity(RADIUS - k, j), quantity(RADIUS + k, j));
-                (0..LANES).for_each(|i| total[i] += self.taps[k] * (above[i] + below[i]));
+                let above = (&first[RADIUS - k][j], &second[RADIUS - k][j]);
+                let below = (&first[RADIUS + k][j], &second[RADIUS + k][j]);
+                for i in 0..LANES {
+                    let pair = value::<PRODUCT>(above.0[i], above.1[i]) + value::<PRODUCT>(below.0[i], below.1[i]);
+                    total[i] += self.taps[k] * pair;
+                }
             }
-            *sum = total;
+            sums[j] = total;
         }
-        let columns = column_sums.len() - 2 * RADIUS;
-        let out = &mut out[..columns];
-        let at = |k: usize| &column_sums[k..k + columns];
-        let (centre, rest): (_, [_; RADIUS]) = (at(RADIUS), std::array::from_fn(|k| (at(RADIUS - k - 1), at(RADIUS + k + 1))));
-        for x in 0..columns {
-            let mut total = self.taps[0] * centre[x];
-            for (k, (left, right)) in rest.iter().enumerate() {
-                total += self.taps[k + 1] * (left[x] + right[x]);
+        let (chunks, _) = out.as_chunks_mut::<LANES>();
+        for j in 0..chunks.len() {
+            let around = &column_sums[j * LANES..(j + 1) * LANES + 2 * RADIUS];
+            let mut total = [0.0; LANES];
+            for i in 0..LANES {
+                total[i] = self.taps[0] * around[i + RADIUS];
             }
-            out[x] = total;
+            for k in 1..=RADIUS {
+                let (left, right) = (&around[RADIUS - k..][..LANES], &around[RADIUS + k..][..LANES]);
+                for i in 0..LANES {
+                    total[i] += self.taps[k] * (left[i] + right[i]);
+                }
+            }
+            chunks[j] = total;
         }
     }
+}
+
+/// The rows of one plane under a row of windows.
+type WindowRows<'a> = [&'a [[f64; LANES]]; SIZE];
+
+#[inline(always)]
+fn value<const PRODUCT: bool>(first: f64, second: f64) -> f64 {
+    if PRODUCT { first * second } else { first }
 }
 
 impl Statistics {
     /// Takes the statistics of an image in the working space.
     pub(super) fn prepare(&self, working: Planes<4>) -> Prepared {
         let mut moments = Moments::new(working.width() - 2 * RADIUS, working.height() - 2 * RADIUS);
-        let stride = working.stride();
         moments.fill_rows(
-            || (vec![0.0; stride], std::array::from_fn(|_| vec![0.0; stride])),
-            |(column_sums, buffers), y, rows| {
+            || column_sums(working.stride()),
+            |column_sums, y, rows| {
                 self.lanes.run(
                     #[inline(always)]
-                    || self.moments_row(&working, y, column_sums, buffers),
+                    || self.moments_row(&working, y, column_sums, rows),
                 );
-                rows.into_iter().zip(buffers).for_each(|(row, buffer)| {
-                    let n = row.len();
-                    row.copy_from_slice(&buffer[..n]);
-                });
             },
         );
         Prepared { working, moments }
@@ -128,7 +153,7 @@ impl Statistics {
     ) -> Vec<T> {
         use rayon::prelude::*;
         let hue = self.hue_differences(&reference.working, image);
-        let buffers = || Buffers::new(image.stride());
+        let buffers = || Buffers::new(image.stride(), reference.moments.stride());
         (0..image.height() - 2 * RADIUS)
             .into_par_iter()
             .with_min_len(ROWS_PER_TASK)
@@ -136,7 +161,8 @@ impl Statistics {
                 self.lanes.run(
                     #[inline(always)]
                     || {
-                        self.moments_row(image, y, &mut buffers.column_sums, &mut buffers.moments);
+                        let moments = buffers.moments.each_mut().map(|row| &mut row[..]);
+                        self.moments_row(image, y, &mut buffers.column_sums, moments);
                         self.joint_row(reference, image, &hue, y, buffers);
                     },
                 );
@@ -146,16 +172,16 @@ impl Statistics {
     }
 
     #[inline(always)]
-    fn moments_row(&self, working: &Planes<4>, y: usize, column_sums: &mut [f64], moments: &mut [Vec<f64>; 4]) {
-        let lightness = window_rows(working, LIGHTNESS, y);
-        let chroma = window_rows(working, CHROMA, y);
+    fn moments_row(&self, working: &Planes<4>, y: usize, column_sums: &mut [f64], moments: [&mut [f64]; 4]) {
+        let lightness = &window_rows(working, LIGHTNESS, y);
+        let chroma = &window_rows(working, CHROMA, y);
         let [mean_l, variance_l, mean_c, variance_c] = moments;
-        self.window.mean_row(|k, j| lightness[k][j], column_sums, mean_l);
-        self.window.mean_row(|k, j| lightness[k][j].map(|x| x * x), column_sums, variance_l);
-        self.window.mean_row(|k, j| chroma[k][j], column_sums, mean_c);
+        self.window.mean_row::<false>(lightness, lightness, column_sums, mean_l);
+        self.window.mean_row::<true>(lightness, lightness, column_sums, variance_l);
+        self.window.mean_row::<false>(chroma, chroma, column_sums, mean_c);
         centre_squares(mean_l, variance_l);
         if self.chroma {
-            self.window.mean_row(|k, j| chroma[k][j].map(|x| x * x), column_sums, variance_c);
+            self.window.mean_row::<true>(chroma, chroma, column_sums, variance_c);
             centre_squares(mean_c, variance_c);
         }
     }
@@ -163,22 +189,17 @@ impl Statistics {
     #[inline(always)]
     fn joint_row(&self, reference: &Prepared, image: &Planes<4>, hue: &Planes<1>, y: usize, buffers: &mut Buffers) {
         let Buffers { column_sums, moments, covariance_lightness, hue_difference, covariance_chroma } = buffers;
-        let hue: [_; SIZE] = std::array::from_fn(|k| hue.row_of(0, y + k).as_chunks().0);
-        self.window.mean_row(|k, j| hue[k][j], column_sums, hue_difference);
-        let mut covariance = |channel: usize, mean: usize, out: &mut Vec<f64>| {
-            let first = window_rows(&reference.working, channel, y);
-            let second = window_rows(image, channel, y);
-            let products = |k: usize, j: usize| {
-                let (a, b) = (&first[k][j], &second[k][j]);
-                std::array::from_fn(|i| a[i] * b[i])
-            };
-            self.window.mean_row(products, column_sums, out);
-            let means = reference.moments.row_of(mean, y).iter().zip(&moments[mean]);
-            out.iter_mut().zip(means).for_each(|(x, (a, b))| *x -= a * b);
-        };
-        covariance(LIGHTNESS, MEAN_LIGHTNESS, covariance_lightness);
+        let hue = &window_rows(hue, 0, y);
+        self.window.mean_row::<false>(hue, hue, column_sums, hue_difference);
+        let first = window_rows(&reference.working, LIGHTNESS, y);
+        let second = window_rows(image, LIGHTNESS, y);
+        self.window.mean_row::<true>(&first, &second, column_sums, covariance_lightness);
+        centre_products(reference.moments.row_of(MEAN_LIGHTNESS, y), &moments[MEAN_LIGHTNESS], covariance_lightness);
         if self.chroma {
-            covariance(CHROMA, MEAN_CHROMA, covariance_chroma);
+            let first = window_rows(&reference.working, CHROMA, y);
+            let second = window_rows(image, CHROMA, y);
+            self.window.mean_row::<true>(&first, &second, column_sums, covariance_chroma);
+            centre_products(reference.moments.row_of(MEAN_CHROMA, y), &moments[MEAN_CHROMA], covariance_chroma);
         }
     }
 
@@ -202,25 +223,40 @@ impl Statistics {
 #[inline(always)]
 fn hue_difference_row(first: [&[f64]; 4], second: [&[f64]; 4], out: &mut [f64]) {
     let n = out.len();
-    let (first, second) = (first.map(|row| &row[..n]), second.map(|row| &row[..n]));
+    let (a1, b1, c1) = (&first[A][..n], &first[B][..n], &first[CHROMA][..n]);
+    let (a2, b2, c2) = (&second[A][..n], &second[B][..n], &second[CHROMA][..n]);
     for i in 0..n {
-        let square = |channel: usize| {
-            let d = first[channel][i] - second[channel][i];
-            d * d
-        };
-        out[i] = (square(A) + square(B) - square(CHROMA)).max(0.0).sqrt();
+        let (da, db, dc) = (a1[i] - a2[i], b1[i] - b2[i], c1[i] - c2[i]);
+        out[i] = (da * da + db * db - dc * dc).max(0.0).sqrt();
     }
 }
 
 /// Turns means of squares into variances.
 #[inline(always)]
 fn centre_squares(means: &[f64], squares: &mut [f64]) {
-    squares.iter_mut().zip(means).for_each(|(square, mean)| *square = (*square - mean * mean).max(0.0));
+    let means = &means[..squares.len()];
+    for i in 0..means.len() {
+        squares[i] = (squares[i] - means[i] * means[i]).max(0.0);
+    }
 }
 
+/// Turns means of products into covariances.
 #[inline(always)]
-fn window_rows(planes: &Planes<4>, channel: usize, y: usize) -> [&[[f64; LANES]]; SIZE] {
-    std::array::from_fn(|k| planes.row_of(channel, y + k).as_chunks().0)
+fn centre_products(first: &[f64], second: &[f64], products: &mut [f64]) {
+    let n = first.len();
+    let (second, products) = (&second[..n], &mut products[..n]);
+    for i in 0..n {
+        products[i] -= first[i] * second[i];
+    }
+}
+
+fn window_rows<const N: usize>(planes: &Planes<N>, plane: usize, y: usize) -> WindowRows<'_> {
+    std::array::from_fn(|k| planes.row_of(plane, y + k).as_chunks().0)
+}
+
+/// Room for the vertical sums over a row of pixels and for what the last chunk of windows reads beyond it.
+fn column_sums(stride: usize) -> Vec<f64> {
+    vec![0.0; stride + 2 * RADIUS]
 }
 
 /// Rows that one task fills again and again.
@@ -233,10 +269,10 @@ struct Buffers {
 }
 
 impl Buffers {
-    fn new(stride: usize) -> Self {
-        let row = || vec![0.0; stride];
+    fn new(stride: usize, windows_stride: usize) -> Self {
+        let row = || vec![0.0; windows_stride];
         Self {
-            column_sums: row(),
+            column_sums: column_sums(stride),
             moments: [row(), row(), row(), row()],
             covariance_lightness: row(),
             hue_difference: row(),

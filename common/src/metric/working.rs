@@ -74,10 +74,6 @@ impl Pipeline {
         }
     }
 
-    pub(super) fn lanes(&self) -> Lanes {
-        self.lanes
-    }
-
     /// The working space over a region of an image that is 0 outside the region. `fill` writes row `y` of the region,
     /// linear Rec. 709 in [0, 1], to rows that are padded with zeros.
     pub(super) fn convert(&self, region: &Region, fill: impl Fn(usize, [&mut [f64]; 3]) + Sync + Send) -> Planes<4> {
@@ -116,8 +112,15 @@ impl Pipeline {
                 || {
                     let [x, y_row, z] = rows.each_mut().map(|row| &mut row[..]);
                     match filter {
-                        Some((filter, scratch)) => filter.filter_row(planes, y, scratch, [&mut *x, &mut *y_row, &mut *z]),
-                        None => planes.row(y).iter().zip([&mut *x, &mut *y_row, &mut *z]).for_each(|(from, to)| to.copy_from_slice(from)),
+                        Some((filter, scratch)) => {
+                            filter.filter_row(planes, y, scratch, [&mut *x, &mut *y_row, &mut *z])
+                        }
+                        None => {
+                            let from = planes.row(y);
+                            x.copy_from_slice(from[0]);
+                            y_row.copy_from_slice(from[1]);
+                            z.copy_from_slice(from[2]);
+                        }
                     }
                     transform_row(&self.after, [&mut *x, &mut *y_row, &mut *z]);
                     working_row(&self.space, [x, y_row, z], out);

@@ -16,7 +16,13 @@ fn framed(s: &Sphere, width: usize, height: usize, (left, top): (usize, usize)) 
         image.pixels_mut()[to] = pixel.map(to_f32);
         let radius = |i: usize| (i as f64 + 0.5) / s.size as f64 * 2.0 - 1.0;
         let r2 = (radius(x) * radius(x) + radius(y) * radius(y)) / (0.92 * 0.92);
-        coverage[to] = if r2 < 0.98 { 1.0 } else if r2 < 1.0 { 0.5 } else { 0.0 };
+        coverage[to] = if r2 < 0.98 {
+            1.0
+        } else if r2 < 1.0 {
+            0.5
+        } else {
+            0.0
+        };
     }
     (image, coverage)
 }

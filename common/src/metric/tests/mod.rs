@@ -5,6 +5,8 @@ mod vectors;
 
 use std::path::PathBuf;
 
+use super::window::{Statistics, Window};
+use super::working::Pipeline;
 use super::*;
 use pairs::{Picture, base, noise, pair};
 use vectors::{COLOURS, EXPECTED, VARIANTS};
@@ -76,7 +78,8 @@ fn every_variant_scores_every_pair_as_the_authors_program_with_their_table() {
     let Some(space) = table() else { return };
     for expected in &EXPECTED {
         let (first, second) = pair(expected.name);
-        for ((found, expected_score), variant) in scores(&first, &second, &space).iter().zip(expected.scores).zip(VARIANTS)
+        for ((found, expected_score), variant) in
+            scores(&first, &second, &space).iter().zip(expected.scores).zip(VARIANTS)
         {
             let name = expected.name;
             match (found, expected_score) {
@@ -86,6 +89,22 @@ fn every_variant_scores_every_pair_as_the_authors_program_with_their_table() {
                 (Err(MetricError::TooSmall { .. }), None) => {}
                 other => panic!("{name} {variant}: {other:?}"),
             }
+        }
+    }
+}
+
+#[test]
+fn the_means_of_the_features_are_those_of_the_authors_program_with_their_table() {
+    let Some(space) = table() else { return };
+    let lanes = Lanes::Detected;
+    let pipeline = Pipeline::new(SpatialFilter::Scielab, 20.0, space, lanes).unwrap();
+    let statistics = Statistics { window: Window::new(cssim::SIGMA), chroma: false, lanes };
+    for expected in &EXPECTED {
+        let (first, second) = pair(expected.name);
+        let [first, second] = [first, second].map(|picture| cid::working(&pipeline, &picture.display()));
+        let means = cid::means(&statistics, &first, &second);
+        for (found, feature) in means.iter().zip(expected.features) {
+            assert!((found - feature).abs() < TABLE_TOLERANCE, "{}: {means:?}", expected.name);
         }
     }
 }
@@ -145,8 +164,27 @@ fn swapping_the_images_changes_no_bit() {
 #[test]
 fn the_score_grows_with_the_noise() {
     let picture = base(96, 80);
-    let scores: Vec<f64> = [0.0, 0.01, 0.02, 0.05, 0.1, 0.2, 0.4].map(|a| default_cid(&picture, &noise(&picture, a))).into();
+    let scores: Vec<f64> =
+        [0.0, 0.01, 0.02, 0.05, 0.1, 0.2, 0.4].map(|a| default_cid(&picture, &noise(&picture, a))).into();
     assert!(scores.is_sorted() && scores[0] == 0.0 && scores[6] > 0.1, "{scores:?}");
+}
+
+#[test]
+fn the_object_score_of_icid_sees_only_windows_centred_on_the_object() {
+    // Noise on the left, the object on the right, an image that is averaged down by 2.
+    let clean = base(420, 400);
+    let mut noisy = noise(&clean, 0.2);
+    let right = |i: usize| i % 420 >= 210;
+    noisy.pixels.iter_mut().zip(&clean.pixels).enumerate().filter(|&(i, _)| right(i)).for_each(|(_, (n, c))| *n = *c);
+    let coverage_from =
+        |column: usize| -> Vec<f32> { (0..420 * 400).map(|i| f32::from(u8::from(i % 420 >= column))).collect() };
+    let options = IcidOptions { filter: SpatialFilter::None, ..IcidOptions::default() };
+    let score = |from| icid(&clean.display(), &noisy.display(), &coverage_from(from), &options).unwrap();
+    // A window of 11 averaged pixels reaches 10 or 11 pixels to the left of its centre.
+    assert_eq!(score(222).icid_object.to_bits(), 0);
+    let touched = score(206);
+    assert!(touched.icid_object > 0.0 && touched.icid > 10.0 * touched.icid_object);
+    assert_eq!((touched.error.width, touched.error.height, touched.error.error.len()), (210, 200, 200 * 190));
 }
 
 #[test]
