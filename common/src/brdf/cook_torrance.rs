@@ -17,7 +17,8 @@
 //! `ks` and `f0` trade against each other: only `ks f0`, the specular colour at normal incidence, is well determined.
 
 use super::{
-    Angles, BasisLobe, Channels, Incident, Lambert, Lobe, Model, Parameter, Role, Scale, Spread, Split, lobe::{accumulate, second_order},
+    Angles, BasisLobe, Channels, Incident, Lambert, Lobe, Model, Parameter, Role, Scale, Split, Spread,
+    lobe::{accumulate, second_order},
 };
 use crate::math::{Rgb, elementary::exp_nonpositive};
 use std::f64::consts::PI;

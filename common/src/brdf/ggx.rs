@@ -14,7 +14,8 @@
 //! | `alpha` | microfacet width (an artist's roughness is its square root) | [0.005, 1] |
 
 use super::{
-    Angles, BasisLobe, Channels, Incident, Lambert, Lobe, Model, Parameter, Role, Scale, Spread, Split, lobe::{accumulate, second_order},
+    Angles, BasisLobe, Channels, Incident, Lambert, Lobe, Model, Parameter, Role, Scale, Split, Spread,
+    lobe::{accumulate, second_order},
 };
 use crate::math::Rgb;
 use std::f64::consts::PI;

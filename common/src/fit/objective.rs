@@ -155,10 +155,8 @@ mod tests {
         for model in MODELS {
             let pixels = 20;
             let table = table(*model, pixels);
-            let subset = PixelSubset {
-                pixels: vec![[0, 0]; pixels],
-                weights: (0..pixels).map(|p| 0.5 + p as f64).collect(),
-            };
+            let subset =
+                PixelSubset { pixels: vec![[0, 0]; pixels], weights: (0..pixels).map(|p| 0.5 + p as f64).collect() };
             let photo: Vec<[f32; 3]> = (0..pixels).map(|p| [0.1 * p as f32, 0.5, 0.9]).collect();
             let (lower, upper) = flat_bounds(model.parameters());
             for gamma in [1.0, 2.2, 3.0] {

@@ -44,8 +44,11 @@ const FULL_SHARD: usize = 2048;
 /// How often polish may run on towards a width beyond its table.
 const MAX_POLISH_ROUNDS: usize = 4;
 
-/// Factor by which the table grows at the edge that polish reached.
-const WIDEN: f64 = 1.6;
+/// Reach of the next table around a width that polish took to the edge of this one.
+const AROUND: f64 = 1.6;
+
+/// Knots per factor of two of width in full-resolution tables (design section 7: at least 5).
+const FULL_PER_OCTAVE: f64 = 5.0;
 
 /// Why a fit cannot be planned.
 #[derive(Debug, Error)]
@@ -93,7 +96,12 @@ pub struct FitPlanner {
     searches: BTreeMap<NodeId, usize>,
     candidates: BTreeMap<usize, Candidate>,
     step: Step,
-    span: Option<(f64, f64)>,
+    /// Widths that the table of the next judging node spans; `None` for a model without widths.
+    span: Span,
+    /// Full-resolution tables by their span: none is integrated twice.
+    tables: Vec<(Span, Vec<Input>)>,
+    reports: Vec<NodeId>,
+    pictures: BTreeMap<NodeId, ReportWire>,
     judged: Vec<Judged>,
     polish_start: Vec<f64>,
     polish_rounds: usize,
@@ -103,14 +111,16 @@ pub struct FitPlanner {
     outcome: Option<FitOutcome>,
 }
 
+/// Smallest and largest width of a table.
+type Span = Option<(f64, f64)>;
+
 /// The node whose output decides what comes next.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Step {
     Searching,
     Selecting(NodeId),
     Polishing(NodeId),
-    Reporting(NodeId),
-    Done,
+    Reporting,
 }
 
 impl FitPlanner {
@@ -144,6 +154,9 @@ impl FitPlanner {
             candidates: BTreeMap::new(),
             step: Step::Searching,
             span: None,
+            tables: Vec::new(),
+            reports: Vec::new(),
+            pictures: BTreeMap::new(),
             judged: Vec::new(),
             polish_start: Vec::new(),
             polish_rounds: 0,
@@ -203,6 +216,7 @@ impl FitPlanner {
                 geometry: geometry.spec(),
                 knots: KnotsWire::of(&knots),
                 tolerance: accuracy.tolerance,
+                footprint: accuracy.footprint,
                 range,
             };
             let spec = NodeSpec {
@@ -226,7 +240,8 @@ impl FitPlanner {
                 SubsetWire { photo: photo.collect(), pixels: subset.pixels.clone(), weights: subset.weights.clone() };
             let mut inputs = vec![Input::Blob(add(graph, "pixel subset", &wire)?)];
             let what = if self.subsets.len() == 1 { "of the subset".to_owned() } else { format!("of subset {s}") };
-            let (count, shard) = (subset.pixels.len(), if subset.pixels.len() > 4096 { FULL_SHARD } else { SUBSET_SHARD });
+            let (count, shard) =
+                (subset.pixels.len(), if subset.pixels.len() > 4096 { FULL_SHARD } else { SUBSET_SHARD });
             let knots = stage_one_knots(&self.method);
             inputs.extend(self.add_transport(graph, &what, (list, count, shard), knots, Accuracy::SUBSET)?);
             for (g, &gamma) in self.method.gammas.iter().enumerate() {
@@ -253,11 +268,12 @@ impl FitPlanner {
         Ok(())
     }
 
-    /// The full-resolution table over the current span, and a node of `kind` on it.
+    /// A node of `kind` on the full-resolution table over a span.
     fn add_judging<T: Serialize>(
         &mut self,
         graph: &mut GraphEdit<'_>,
         kind: &str,
+        span: Span,
         parameters: &T,
     ) -> Result<NodeId, PlanError> {
         let view = match self.view {
@@ -265,14 +281,8 @@ impl FitPlanner {
             None => add(graph, "view", &self.view_wire())?,
         };
         self.view = Some(view);
-        let list = add(graph, "list of pixels", &self.pixels)?;
-        let knots = match self.span {
-            Some((lower, upper)) => Knots::covering(lower, upper, PER_OCTAVE),
-            None => stage_one_knots(&self.method),
-        };
         let mut inputs = vec![Input::Blob(view)];
-        let count = self.pixels.len();
-        inputs.extend(self.add_transport(graph, "in full", (list, count, FULL_SHARD), knots, Accuracy::FULL)?);
+        inputs.extend(self.full_table(graph, span)?);
         graph.add_node(NodeSpec {
             kind: kind.to_owned(),
             label: kind.to_owned(),
@@ -280,6 +290,22 @@ impl FitPlanner {
             inputs,
             placement: Placement::Coordinator,
         })
+    }
+
+    /// The shards of the full-resolution table over a span.
+    fn full_table(&mut self, graph: &mut GraphEdit<'_>, span: Span) -> Result<Vec<Input>, PlanError> {
+        if let Some((_, shards)) = self.tables.iter().find(|(known, _)| *known == span) {
+            return Ok(shards.clone());
+        }
+        let list = add(graph, "list of pixels", &self.pixels)?;
+        let knots = match span {
+            Some((lower, upper)) => Knots::covering(lower, upper, FULL_PER_OCTAVE),
+            None => stage_one_knots(&self.method),
+        };
+        let pixels = (list, self.pixels.len(), FULL_SHARD);
+        let shards = self.add_transport(graph, "in full", pixels, knots, Accuracy::FULL)?;
+        self.tables.push((span, shards.clone()));
+        Ok(shards)
     }
 
     fn view_wire(&self) -> ViewWire {
@@ -297,7 +323,7 @@ impl FitPlanner {
         let points = self.candidates.values().map(|c| &c.parameters[..]);
         self.span = needed_span(self.method.model, points);
         let candidates = self.candidates.values().map(CandidateWire::of).collect();
-        let node = self.add_judging(graph, nodes::SELECT, &SelectParameters { candidates })?;
+        let node = self.add_judging(graph, nodes::SELECT, self.span, &SelectParameters { candidates })?;
         self.step = Step::Selecting(node);
         Ok(())
     }
@@ -318,7 +344,7 @@ impl FitPlanner {
     fn add_polish(&mut self, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
         let left = MAX_EVALUATIONS.saturating_sub(self.polish_evaluations);
         let parameters = PolishParameters { start: self.polish_start.clone(), max_evaluations: index(left) };
-        self.step = Step::Polishing(self.add_judging(graph, nodes::POLISH, &parameters)?);
+        self.step = Step::Polishing(self.add_judging(graph, nodes::POLISH, self.span, &parameters)?);
         Ok(())
     }
 
@@ -342,26 +368,32 @@ impl FitPlanner {
         }
     }
 
+    /// A span around the width where polish stands.
     fn widen_span(&mut self) {
         let Some(entry) = self.method.model.lobes().iter().find_map(|b| b.width) else { return };
         let (lower, upper) = flat_bounds(self.method.model.parameters());
-        if let Some((low, high)) = &mut self.span {
-            let width = self.polish_start[entry];
-            if width * width < *low * *high {
-                *low = (*low / WIDEN).max(lower[entry]);
-            } else {
-                *high = (*high * WIDEN).min(upper[entry]);
-            }
-        }
+        let width = self.polish_start[entry];
+        self.span = Some(((width / AROUND).max(lower[entry]), (width * AROUND).min(upper[entry])));
     }
 
+    /// The pictures: of the candidates on the table that they were judged on, of the match on the table that it was polished on.
     fn add_report(&mut self, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
-        let extra = self.extra_candidates().into_iter().map(|j| j.candidate.parameters.clone());
         let best = winner(&self.judged, self.method.judge).ok_or_else(|| PlanError::new("no candidate was judged"))?;
         let won = self.judged[best].candidate.parameters.clone();
         let last = self.polished.as_ref().map_or(&won, |p| &p.parameters).clone();
-        let parameters = ReportParameters { parameters: extra.chain([won, last]).collect() };
-        self.step = Step::Reporting(self.add_judging(graph, nodes::REPORT, &parameters)?);
+        let extra = self.extra_candidates().into_iter().map(|j| j.candidate.parameters.clone());
+        let candidates: Vec<Vec<f64>> = extra.chain([won]).collect();
+        let judged_on = self.tables.first().map_or(self.span, |(span, _)| *span);
+        let jobs = if judged_on == self.span {
+            vec![(self.span, [candidates, vec![last]].concat())]
+        } else {
+            vec![(judged_on, candidates), (self.span, vec![last])]
+        };
+        for (span, parameters) in jobs {
+            let node = self.add_judging(graph, nodes::REPORT, span, &ReportParameters { parameters })?;
+            self.reports.push(node);
+        }
+        self.step = Step::Reporting;
         Ok(())
     }
 
@@ -371,16 +403,27 @@ impl FitPlanner {
         self.judged.iter().filter(wanted).collect()
     }
 
-    fn reported(&mut self, output: &Blob) -> Result<(), PlanError> {
+    fn reported(&mut self, node: NodeId, output: &Blob) -> Result<(), PlanError> {
         let report: ReportWire = read("report", output).map_err(other)?;
-        let mut images = report.images.into_iter().map(ImageWire::image).collect::<Result<Vec<_>, _>>().map_err(other)?;
+        self.pictures.insert(node, report);
+        if self.pictures.len() < self.reports.len() {
+            return Ok(());
+        }
+        let mut images = Vec::new();
+        let mut error = Vec::new();
+        // In the order of the nodes, which is that of the pictures.
+        for report in std::mem::take(&mut self.pictures).into_values() {
+            let wires = report.images.into_iter().map(ImageWire::image);
+            images.extend(wires.collect::<Result<Vec<_>, _>>().map_err(other)?);
+            error = report.error;
+        }
         let missing = || PlanError::new("the report lacks an image");
         let matched = images.pop().ok_or_else(missing)?;
         let winner_image = images.pop().ok_or_else(missing)?;
         let gammas = self.extra_candidates().into_iter().map(|j| j.candidate.gamma);
         let extra = gammas.zip(images).collect();
         let (width, height) = (matched.width(), matched.height());
-        let error_map = ErrorMap { width, height, error: report.error };
+        let error_map = ErrorMap { width, height, error };
         let best = winner(&self.judged, self.method.judge).ok_or_else(|| PlanError::new("no candidate was judged"))?;
         self.outcome = Some(FitOutcome {
             judged: self.judged.clone(),
@@ -391,7 +434,6 @@ impl FitPlanner {
             error_map,
             extra,
         });
-        self.step = Step::Done;
         Ok(())
     }
 }
@@ -413,7 +455,7 @@ impl Planner for FitPlanner {
         match self.step {
             Step::Selecting(select) if select == node => self.selected(output, graph),
             Step::Polishing(polish) if polish == node => self.polished(output, graph),
-            Step::Reporting(report) if report == node => self.reported(output),
+            Step::Reporting if self.reports.contains(&node) => self.reported(node, output),
             _ => Ok(()),
         }
     }

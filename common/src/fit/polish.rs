@@ -62,10 +62,9 @@ pub fn polish(
     let mut inside = start.to_vec();
     bounds.clamp(&mut inside);
     let minimum = pattern::minimise_observed(objective, &inside, &bounds, &options, observe)?;
-    let score = judge.score(&view.render(&minimum.point)).map_err(|_| SearchError::NotFinite {
-        what: "the CSSIM",
-        point: minimum.point.clone(),
-    })?;
+    let score = judge
+        .score(&view.render(&minimum.point))
+        .map_err(|_| SearchError::NotFinite { what: "the CSSIM", point: minimum.point.clone() })?;
     let at_table_edge = view.model.lobes().iter().filter_map(|b| b.width).any(|entry| {
         let (x, step) = (bounds.to_scaled(entry, minimum.point[entry]), EDGE);
         (table_is_tighter[0] && x < step) || (table_is_tighter[1] && x > 1.0 - step)

@@ -13,12 +13,7 @@ use crate::{
 };
 
 /// All points of the scan, in the order of widths, then scanned values.
-pub(super) fn scan(
-    model: &dyn Model,
-    table: &TransportTable,
-    weights: &[f64],
-    photo: &[[f32; 3]],
-) -> Vec<Vec<f64>> {
+pub(super) fn scan(model: &dyn Model, table: &TransportTable, weights: &[f64], photo: &[[f32; 3]]) -> Vec<Vec<f64>> {
     let grids = grids(model, table);
     let mut terms: Vec<Planes> = (0..term_count(model)).map(|_| table.planes()).collect();
     let mut points = Vec::new();

@@ -64,10 +64,8 @@ pub fn search_gamma(
         Start::Scan => scan(method.model, table, &subset.weights, photo),
     };
     let scanned = starts.len();
-    let starts: Vec<multi_start::Start> = starts
-        .into_iter()
-        .map(|point| multi_start::Start { cost: objective.cost(&point), point })
-        .collect();
+    let starts: Vec<multi_start::Start> =
+        starts.into_iter().map(|point| multi_start::Start { cost: objective.cost(&point), point }).collect();
     let options = MultiStartOptions::default();
     let mut evaluations = scanned;
     let best = match method.search {
@@ -89,7 +87,14 @@ pub fn search_gamma(
         }
     };
     let best = best.map_err(fail)?.into_iter().next().ok_or(SearchFailure::NoStart { gamma })?;
-    Ok(Candidate { gamma, subset: 0, parameters: best.point, cost: best.value, evaluations, termination: best.termination })
+    Ok(Candidate {
+        gamma,
+        subset: 0,
+        parameters: best.point,
+        cost: best.value,
+        evaluations,
+        termination: best.termination,
+    })
 }
 
 #[derive(Debug)]

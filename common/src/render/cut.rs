@@ -52,25 +52,29 @@ pub struct Cut {
 impl Cut {
     /// Refines the pyramid for `point` until no node's error in radiance, for a lobe of unit weight, exceeds `tolerance`.
     pub fn refine(&mut self, pyramid: &LightPyramid, point: &Point, band: Band, tolerance: f64) {
+        let bound = Bound::new(point, band);
         self.lights.clear();
         self.stack.clear();
         self.stack.extend(pyramid.roots());
         while let Some(cell) = self.stack.pop() {
             let node = pyramid.node(cell);
             let centroid = widen(node.centroid);
-            let angles = Angles::new(point.normal, centroid, point.view);
-            if angles.cos_i < -f64::from(node.radius) || strongest(node.energy) == 0.0 {
+            let cos_i = point.normal.dot(centroid);
+            if cos_i < -f64::from(node.radius) || strongest(node.energy) == 0.0 {
                 continue;
             }
-            if error_bound(&node, &angles, band) > tolerance {
+            if bound.error(&node, centroid, cos_i) > tolerance {
                 let before = self.stack.len();
                 self.stack.extend(pyramid.children(cell));
                 if self.stack.len() > before {
                     continue;
                 }
             }
-            if angles.cos_i > 0.0 {
-                self.lights.push(Incident { angles, energy: node.energy.map(f64::from), spread: spread(&node, &angles) });
+            if cos_i > 0.0 {
+                let angles = Angles::new(point.normal, centroid, point.view);
+                let spread = spread(&node, &angles);
+                let angles = Angles { cos_d: fresnel_cosine(angles.cos_d, &spread), ..angles };
+                self.lights.push(Incident { angles, energy: node.energy.map(f64::from), spread });
             }
         }
     }
@@ -83,48 +87,82 @@ fn spread(node: &Node, angles: &Angles) -> Spread {
     Spread { light2, half2: 0.125 * light2 * (1.0 + 1.0 / cos_d2) }
 }
 
-fn error_bound(node: &Node, angles: &Angles, band: Band) -> f64 {
-    let (energy, spread2) = (f64::from(strongest(node.energy)), f64::from(node.spread2));
-    let horizon = angles.cos_i < f64::from(node.radius);
-    match band {
-        Band::Diffuse => {
+/// The `v.h` whose `F5` is the mean of `F5` over the node, to second order.
+///
+/// With `c = v.h` the Laplacian of `F5 = (1 - c)^5` over light directions is `5 (1 - c)^4 (1 + 7 c / 4 - 1 / (4 c))`; a quarter of it
+/// times the mean square distance, divided by the derivative `-5 (1 - c)^4`, is the step. `F5` is convex: without it the
+/// `F5` part is too dark near the rim.
+fn fresnel_cosine(cos_d: f64, spread: &Spread) -> f64 {
+    let c = cos_d.max(0.05);
+    let step = 0.25 * spread.light2 * (1.0 + 1.75 * c - 0.25 / c);
+    cos_d - step.clamp(-0.5 * cos_d, 0.5 * cos_d)
+}
+
+/// Bounds the error of taking a node as a point, for one surface point and band.
+struct Bound<'a> {
+    point: &'a Point,
+    band: Band,
+    /// Bound of `G n.l / (4 n.l n.v)`, which is at most `G1(v) / (4 n.v)`; `1/pi` for the cosine lobe.
+    shading: f64,
+    /// Squares of the band's widths.
+    squares: [f64; 2],
+    lower: f64,
+}
+
+impl<'a> Bound<'a> {
+    fn new(point: &'a Point, band: Band) -> Self {
+        let (lower, upper) = match band {
+            Band::Diffuse => (1.0, 1.0),
+            Band::Glossy(lower, upper) => (lower, upper),
+        };
+        let a2 = lower * lower;
+        let shading = match band {
+            Band::Diffuse => 1.0 / PI,
+            Band::Glossy(..) => 0.5 / (point.cos_o + (a2 + (1.0 - a2) * point.cos_o * point.cos_o).sqrt()),
+        };
+        Self { point, band, shading, squares: [a2, upper * upper], lower }
+    }
+
+    #[inline]
+    fn error(&self, node: &Node, centroid: Vec3, cos_i: f64) -> f64 {
+        let (energy, spread2) = (f64::from(strongest(node.energy)), f64::from(node.spread2));
+        let horizon = cos_i < f64::from(node.radius);
+        let error = match self.band {
             // The cosine has curvature cos; at the horizon it has a kink, a first-order error over the part that is cut off.
-            let smooth = 0.5 * spread2 * angles.cos_i.abs();
-            energy / PI * if horizon { KINK * spread2.sqrt() } else { smooth }
-        }
-        Band::Glossy(lower, upper) => {
-            let (distribution, curvature) = peak_over(node, angles, lower, upper);
-            // G n.l / (4 n.l n.v) is at most G1(v) / (4 n.v).
-            let shading = |alpha: f64| {
-                let a2 = alpha * alpha;
-                0.5 / (angles.cos_o + (a2 + (1.0 - a2) * angles.cos_o * angles.cos_o).sqrt())
-            };
-            let mut error = spread2 * (curvature + distribution);
-            if horizon {
-                error += KINK * distribution * (spread2.sqrt() / lower).min(1.0);
+            Band::Diffuse if horizon => KINK * spread2.sqrt(),
+            Band::Diffuse => 0.5 * spread2 * cos_i.abs(),
+            Band::Glossy(..) => {
+                let (distribution, curvature) = self.peak_over(node, centroid);
+                let kink = if horizon { KINK * (spread2.sqrt() / self.lower).min(1.0) } else { 0.0 };
+                spread2 * (curvature + distribution) + kink * distribution
             }
-            energy * shading(lower) * error
-        }
+        };
+        energy * self.shading * error
+    }
+
+    /// Upper bounds over the node and the band's widths of the distribution `D` and of its curvature along the sphere of light
+    /// directions (per square chord).
+    #[inline]
+    fn peak_over(&self, node: &Node, centroid: Vec3) -> (f64, f64) {
+        let half = centroid + self.point.view;
+        let inverse = 1.0 / half.length_squared().max(f64::MIN_POSITIVE);
+        // A step of light direction moves the half vector by at most 1 / (2 v.h) of it.
+        let turn = inverse.sqrt().min(10.0);
+        let along = self.point.normal.dot(half);
+        let sin2 = (1.0 - along * along * inverse).max(0.0);
+        let nearest = (sin2.sqrt() - f64::from(node.radius) * turn).max(0.0);
+        let t2 = if along > 0.0 { nearest * nearest } else { 1.0 };
+        let d = |a2: f64| {
+            let q = t2 + a2 * (1.0 - t2);
+            (a2 / (PI * q * q), q)
+        };
+        // a^2/q^2 is largest at a = t, a^2/q^3 at a = t / sqrt(2).
+        let [low2, high2] = self.squares;
+        let (distribution, _) = d(t2.clamp(low2, high2));
+        let (sharpest, q) = d((0.5 * t2).clamp(low2, high2));
+        (distribution, 2.0 * turn * turn * sharpest / q)
     }
 }
 
 /// Share of a node's size by which a kink at the horizon can shift its value.
 const KINK: f64 = 0.1;
-
-/// Upper bounds over the node and the band's widths of the distribution `D` and of its curvature along the sphere of light
-/// directions (per square chord).
-fn peak_over(node: &Node, angles: &Angles, lower: f64, upper: f64) -> (f64, f64) {
-    // A step of light direction moves the half vector by at most this factor.
-    let turn = 0.5 / angles.cos_d.max(0.05);
-    let nearest = (angles.sin2_h.sqrt() - f64::from(node.radius) * turn).max(0.0);
-    let t2 = if angles.cos_h > 0.0 { nearest * nearest } else { 1.0 };
-    let d = |a2: f64| {
-        let q = t2 + a2 * (1.0 - t2);
-        (a2 / (PI * q * q), q)
-    };
-    // a^2/q^2 is largest at a = t, a^2/q^3 at a = t / sqrt(2).
-    let (low2, high2) = (lower * lower, upper * upper);
-    let (distribution, _) = d(t2.clamp(low2, high2));
-    let (sharpest, q) = d((0.5 * t2).clamp(low2, high2));
-    (distribution, 2.0 * turn * turn * sharpest / q)
-}

@@ -53,7 +53,13 @@ impl PixelSubset {
     ///
     /// Returns `None` when there is no candidate, or importance sampling finds no light at all.
     #[must_use]
-    pub fn draw(candidates: &[Candidate], count: SampleCount, sampling: Sampling, seed: u64, index: u32) -> Option<Self> {
+    pub fn draw(
+        candidates: &[Candidate],
+        count: SampleCount,
+        sampling: Sampling,
+        seed: u64,
+        index: u32,
+    ) -> Option<Self> {
         if candidates.is_empty() {
             return None;
         }
@@ -67,8 +73,9 @@ impl PixelSubset {
         let mut counts = vec![0u32; ordered.len()];
         let mut pdf = vec![1.0 / ordered.len() as f64; ordered.len()];
         match sampling {
-            Sampling::Uniform => (0..draws)
-                .for_each(|d| counts[crate::math::cell(random(d) * ordered.len() as f64, ordered.len())] += 1),
+            Sampling::Uniform => {
+                (0..draws).for_each(|d| counts[crate::math::cell(random(d) * ordered.len() as f64, ordered.len())] += 1)
+            }
             Sampling::Stratified => {
                 let mut order: Vec<usize> = (0..ordered.len()).collect();
                 order.sort_by_key(|&i| morton(ordered[i].pixel));
@@ -84,7 +91,13 @@ impl PixelSubset {
                 }
                 pdf.iter_mut().zip(&ordered).for_each(|(p, c)| *p = c.intensity / total);
                 let mut running = 0.0;
-                let cumulative: Vec<f64> = ordered.iter().map(|c| { running += c.intensity; running }).collect();
+                let cumulative: Vec<f64> = ordered
+                    .iter()
+                    .map(|c| {
+                        running += c.intensity;
+                        running
+                    })
+                    .collect();
                 for d in 0..draws {
                     let target = random(d) * running;
                     // The first pixel whose cumulative intensity exceeds the target; it has intensity > 0.

@@ -23,13 +23,16 @@ pub type Pixel = [u32; 2];
 pub struct Accuracy {
     /// Largest error of one node of a cut, in units of the map's mean radiance, for a lobe of unit weight.
     pub tolerance: f64,
+    /// Turn of the normal over a pixel, in widths of the sharpest lobe, up to which one position stands for the pixel, as a
+    /// multiple of what keeps the error below 1e-3 of the lobe's peak.
+    pub footprint: f64,
 }
 
 impl Accuracy {
     /// Tables of stage one.
-    pub const SUBSET: Self = Self { tolerance: 1e-5 };
+    pub const SUBSET: Self = Self { tolerance: 3e-5, footprint: 1.0 };
     /// Full-resolution tables of stage two and polish.
-    pub const FULL: Self = Self { tolerance: 4e-5 };
+    pub const FULL: Self = Self { tolerance: 3e-4, footprint: 3.0 };
 }
 
 /// What a table is to hold: lobes of `model`, widths on `knots`.
@@ -46,17 +49,15 @@ pub struct TransportPlan {
 /// Ratio of largest to smallest alpha that share one cut.
 const BAND_RATIO: f64 = 4.0;
 
-/// Positions per axis in pixels that the silhouette cuts.
-const SILHOUETTE_GRID: u32 = 4;
+/// Positions per axis in pixels that the silhouette cuts: the first that sees the object.
+const SILHOUETTE_GRIDS: [u32; 3] = [2, 4, 16];
 
 impl TransportPlan {
     /// Integrates the table of some pixels. A pixel that sees no surface gets zeros.
     #[must_use]
     pub fn integrate(&self, geometry: &Geometry, pyramid: &LightPyramid, pixels: &[Pixel]) -> TransportTable {
-        let columns: Vec<Vec<Vec<f64>>> = pixels
-            .par_iter()
-            .map_init(Cut::default, |cut, &pixel| self.pixel(geometry, pyramid, pixel, cut))
-            .collect();
+        let columns: Vec<Vec<Vec<f64>>> =
+            pixels.par_iter().map_init(Cut::default, |cut, &pixel| self.pixel(geometry, pyramid, pixel, cut)).collect();
         let lobes = self.model.lobes().iter().enumerate().map(|(l, basis)| {
             let knots = basis.width.map(|_| self.knots);
             let terms = lobe_terms(basis.lobe);
@@ -106,7 +107,7 @@ impl TransportPlan {
     ) -> Vec<f64> {
         let tolerance = self.accuracy.tolerance * pyramid.mean_radiance();
         let mut sums = vec![0.0; lobe_terms(lobe) * 3 * widths.len()];
-        let (points, total) = points(geometry, pixel, band);
+        let (points, total) = self.points(geometry, pixel, band);
         for (point, weight) in points {
             cut.refine(pyramid, &point, band, tolerance);
             for light in &mut cut.lights {
@@ -116,27 +117,29 @@ impl TransportPlan {
         }
         sums
     }
-}
 
-/// Surface points of a pixel with their weights, and the sum of these.
-fn points(geometry: &Geometry, [column, row]: Pixel, band: Band) -> (Vec<(Point, f64)>, f64) {
-    let sharpest = match band {
-        Band::Diffuse => 1.0,
-        Band::Glossy(lower, _) => lower,
-    };
-    let at = |p: &Position| {
-        let surface = geometry.point(f64::from(column) + p.x, f64::from(row) + p.y)?;
-        Some((Point::new(surface.normal, surface.view)?, p.weight))
-    };
-    let (c, r) = (column as usize, row as usize);
-    let positions = if geometry.coverage(c, r) < 1.0 {
-        footprint::grid(SILHOUETTE_GRID)
-    } else {
-        footprint::positions(geometry.normal_spread(c, r), sharpest)
-    };
-    let points: Vec<(Point, f64)> = positions.iter().filter_map(at).collect();
-    let total = points.iter().map(|(_, w)| w).sum();
-    (points, total)
+    /// Surface points of a pixel with their weights, and the sum of these.
+    fn points(&self, geometry: &Geometry, [column, row]: Pixel, band: Band) -> (Vec<(Point, f64)>, f64) {
+        let sharpest = match band {
+            Band::Diffuse => 1.0,
+            Band::Glossy(lower, _) => lower,
+        };
+        let at = |p: &Position| {
+            let surface = geometry.point(f64::from(column) + p.x, f64::from(row) + p.y)?;
+            Some((Point::new(surface.normal, surface.view)?, p.weight))
+        };
+        let seen = |positions: &[Position]| positions.iter().filter_map(at).collect::<Vec<_>>();
+        let (c, r) = (column as usize, row as usize);
+        let points = if geometry.coverage(c, r) < 1.0 {
+            // Where the coarse grid misses the object, a finer one may see its edge.
+            SILHOUETTE_GRIDS.iter().map(|&n| seen(&footprint::grid(n))).find(|p| !p.is_empty()).unwrap_or_default()
+        } else {
+            let spread = geometry.normal_spread(c, r) / self.accuracy.footprint;
+            seen(&footprint::positions(spread, sharpest))
+        };
+        let total = points.iter().map(|(_, w)| w).sum();
+        (points, total)
+    }
 }
 
 /// Splits ascending widths into runs that share a cut.

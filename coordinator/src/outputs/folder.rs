@@ -27,7 +27,8 @@ impl OutFolder {
 
     /// Makes the folder, or takes an existing one and forgets the run in it.
     pub(crate) fn overwrite(path: &Path) -> anyhow::Result<Self> {
-        let cannot = || format!("cannot write results to {}: choose a folder you may write to with --out", path.display());
+        let cannot =
+            || format!("cannot write results to {}: choose a folder you may write to with --out", path.display());
         if path.exists() && !path.is_dir() {
             bail!("{} is a file: --out takes a folder, which is made if it is not there", path.display());
         }

@@ -65,7 +65,8 @@ pub(crate) fn write_pictures(
     };
     png("match.png", &pictures.displayed(&pictures.matched), None)?;
     png("reference.png", &pictures.displayed(&pictures.reference), None)?;
-    let scale = format!("black 0, pale yellow {} and above: 1 - product of the five features", pictures.difference_scale);
+    let scale =
+        format!("black 0, pale yellow {} and above: 1 - product of the five features", pictures.difference_scale);
     png("difference.png", &pictures.difference, Some((metadata::COMMENTS, scale)))
 }
 

@@ -20,6 +20,7 @@ pub(in crate::fit) struct TransportParameters {
     pub(in crate::fit) geometry: GeometrySpec,
     pub(in crate::fit) knots: KnotsWire,
     pub(in crate::fit) tolerance: f64,
+    pub(in crate::fit) footprint: f64,
     /// First pixel of the list, and how many.
     pub(in crate::fit) range: (u32, u32),
 }
@@ -58,7 +59,7 @@ impl NodeType for Transport {
         if let Some(pixel) = shard.iter().find(outside) {
             return Err(NodeFailure::new(format!("pixel {pixel:?} lies outside the image")));
         }
-        let accuracy = Accuracy { tolerance: parameters.tolerance };
+        let accuracy = Accuracy { tolerance: parameters.tolerance, footprint: parameters.footprint };
         let plan = TransportPlan { model, knots: parameters.knots.knots()?, accuracy };
         write("transport table", &TableWire::of(plan.integrate(&geometry, &pyramid, shard)))
     }
