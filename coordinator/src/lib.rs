@@ -6,6 +6,7 @@ use std::process::ExitCode;
 mod cli;
 mod commands;
 pub mod demo;
+pub mod inputs;
 pub mod settings;
 
 pub use cli::Exit;

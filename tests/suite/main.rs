@@ -1,3 +1,8 @@
 //! One test binary of modules, so that the suite links once.
 
+mod bad_input;
 mod cli;
+mod compare;
+mod network;
+mod program;
+mod render;
