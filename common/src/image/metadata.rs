@@ -15,6 +15,8 @@ pub const DISPLAY_EXPOSURE: &str = "lookalike.displayExposure";
 pub const MODEL: &str = "lookalike.model";
 /// The model's parameters, as `name=value` pairs.
 pub const PARAMETERS: &str = "lookalike.parameters";
+/// The measured BRDF: its file and the hash of its content.
+pub const BRDF: &str = "lookalike.brdf";
 /// The gamma of the winning candidate.
 pub const GAMMA: &str = "lookalike.gamma";
 /// The gain between photo and map.
@@ -25,3 +27,5 @@ pub const ENVIRONMENT: &str = "lookalike.environment";
 pub const CAMERA: &str = "lookalike.camera";
 /// The seed of all randomness.
 pub const SEED: &str = "lookalike.seed";
+/// Samples per pixel of a rendering.
+pub const SAMPLES: &str = "lookalike.samples";

@@ -2,7 +2,7 @@
 //!
 //! - [`decode`] reads a photograph or a light probe: OpenEXR, Radiance HDR, PFM, PNG or JPEG, told apart by content;
 //! - [`decode_mask`] reads a coverage mask, [`decode_normals`] a normal map;
-//! - [`openexr::write`] and [`png::write`] write results; [`metadata`] names what is written beside the pixels;
+//! - [`openexr::write`], [`pfm::write`] and [`png::write`] write results; [`metadata`] names what is written beside the pixels;
 //! - [`content_hash`] names an image by its decoded pixels.
 //!
 //! Whatever the file holds becomes linear Rec. 709, top left first. What could not be taken over exactly is said in
@@ -18,7 +18,7 @@ mod mask;
 pub mod metadata;
 mod normals;
 pub mod openexr;
-mod pfm;
+pub mod pfm;
 mod plane;
 pub mod png;
 mod primaries;

@@ -37,6 +37,23 @@ pub(super) fn decode(source: &Source<'_>) -> Result<Decoded, ImageError> {
     })
 }
 
+/// The bytes of a colour map of `image`: little-endian, scale 1. NaN and infinities are kept; there is no room for metadata.
+///
+/// # Errors
+/// If the image is empty.
+pub fn write(image: &Image) -> Result<Vec<u8>, ImageError> {
+    let (width, height) = (image.width(), image.height());
+    if width == 0 || height == 0 {
+        let (expected, found) = ("at least one pixel".to_owned(), format!("{width} x {height}"));
+        return Err(ImageError::Unwritable { format: FORMAT, expected, found });
+    }
+    let mut bytes = format!("PF\n{width} {height}\n-1.0\n").into_bytes();
+    for row in image.pixels().chunks_exact(width).rev() {
+        bytes.extend(row.iter().flatten().flat_map(|value| value.to_le_bytes()));
+    }
+    Ok(bytes)
+}
+
 #[derive(Debug)]
 struct Header<'a> {
     channels: usize,

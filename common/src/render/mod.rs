@@ -8,6 +8,7 @@
 
 pub mod cut;
 pub mod footprint;
+pub mod image;
 pub mod integrator;
 pub mod knots;
 pub mod pyramid;

@@ -4,5 +4,6 @@
 pub(crate) mod compare;
 pub(crate) mod demo;
 pub(crate) mod fit;
+mod output;
 pub(crate) mod render;
 pub(crate) mod worker;

@@ -18,7 +18,7 @@ pub struct RenderSettings {
     pub samples: NonZeroUsize,
     /// The seed of the directions.
     pub seed: u64,
-    /// The image to write, OpenEXR.
+    /// The image to write; its extension is the format.
     pub out: PathBuf,
 }
 

@@ -1,4 +1,4 @@
-use crate::image::{ImageError, decode};
+use crate::image::{Image, ImageError, decode, pfm};
 
 /// A map of `samples`, bottom row first.
 pub(super) fn map(header: &str, samples: &[f32], little_endian: bool) -> Vec<u8> {
@@ -43,4 +43,11 @@ fn broken_headers_are_refused() {
     }
     let error = decode("a.pfm", &map("PF\n2 2\n-1\n", &[1.0; 3], true)).unwrap_err().to_string();
     assert!(error.contains("expected 48 bytes of samples, found 12"), "{error}");
+}
+
+#[test]
+fn written_maps_are_read_back_bit_for_bit() {
+    let image = Image::from_pixels(2, 3, (0..6).map(|i| [i as f32 / 7.0, -1e-30, f32::INFINITY]).collect());
+    assert_eq!(decode("a.pfm", &pfm::write(&image).unwrap()).unwrap().image, image);
+    assert!(pfm::write(&Image::new(0, 3)).unwrap_err().to_string().contains("at least one pixel, found 0 x 3"));
 }

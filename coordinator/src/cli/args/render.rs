@@ -52,17 +52,13 @@ struct QualityArgs {
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Output")]
 struct OutputArgs {
-    /// Image to write, OpenEXR
+    /// Image to write: .exr (radiance, coverage, metadata), .pfm (radiance) or .png (as shown at automatic exposure)
     #[arg(long, short, value_name = "OUT.exr")]
     out: PathBuf,
 }
 
 impl RenderArgs {
     pub(crate) fn into_settings(self) -> anyhow::Result<RenderSettings> {
-        let out = self.output.out;
-        if out.extension().is_none_or(|extension| extension != "exr") {
-            bail!("the rendering is written as OpenEXR; expected a path that ends in .exr, found {}", out.display());
-        }
         Ok(RenderSettings {
             material: self.material.into_settings()?,
             environment: self.environment.into_settings(),
@@ -70,7 +66,7 @@ impl RenderArgs {
             size_px: self.quality.size,
             samples: self.quality.samples,
             seed: self.quality.seed,
-            out,
+            out: self.output.out,
         })
     }
 }

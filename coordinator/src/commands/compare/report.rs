@@ -1,0 +1,106 @@
+//! The outcome of a comparison on stdout: a table for people, or JSON.
+
+use super::{
+    coverage::{Coverage, Object},
+    exposure_source,
+};
+use crate::{
+    inputs::{LoadedMask, LoadedPhoto},
+    settings::{CompareSettings, MetricKind},
+};
+use anyhow::Context;
+use serde_json::{Map, Value, json};
+use std::io::{self, ErrorKind, Write};
+
+/// The numbers.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Outcome {
+    /// Over the whole image.
+    pub(super) score: f64,
+    /// Over the windows centred on the object.
+    pub(super) score_object: f64,
+    /// Means of l_L, c_L, s_L, l_C, l_H over the image and over the object; CSSIM only.
+    pub(super) features: Option<[[f64; 5]; 2]>,
+}
+
+/// Everything that is told.
+#[derive(Debug)]
+pub(super) struct Report<'a> {
+    pub(super) settings: &'a CompareSettings,
+    pub(super) reference: &'a LoadedPhoto,
+    pub(super) image: &'a LoadedPhoto,
+    pub(super) mask: Option<&'a LoadedMask>,
+    pub(super) coverage: &'a Coverage,
+    pub(super) exposure: f64,
+    pub(super) outcome: Outcome,
+}
+
+impl Report<'_> {
+    /// Writes the report to stdout.
+    pub(super) fn print(&self) -> anyhow::Result<()> {
+        let text = if self.settings.json { format!("{:#}\n", self.json()) } else { self.table() };
+        match io::stdout().write_all(text.as_bytes()) {
+            // As behind `| head`.
+            Err(error) if error.kind() == ErrorKind::BrokenPipe => Ok(()),
+            written => written.context("cannot write to stdout"),
+        }
+    }
+
+    fn json(&self) -> Value {
+        let Outcome { score, score_object, features } = self.outcome;
+        let by_name = |values: [f64; 5]| -> Map<String, Value> {
+            FEATURES.iter().zip(values).map(|(name, value)| ((*name).to_owned(), json!(value))).collect()
+        };
+        json!({
+            "metric": self.metric(),
+            "score": score,
+            "score_object": score_object,
+            "features": features.map(|[image, _]| by_name(image)),
+            "features_object": features.map(|[_, object]| by_name(object)),
+            "display_exposure": self.exposure,
+            "object": self.coverage.object.word(),
+            "width": self.reference.image.width(),
+            "height": self.reference.image.height(),
+            "reference": self.reference.source.to_json(),
+            "image": self.image.source.to_json(),
+            "mask": self.mask.map(|mask| mask.source.to_json()),
+            "map": self.settings.map.as_ref().map(|path| path.to_string_lossy()),
+        })
+    }
+
+    fn table(&self) -> String {
+        let Outcome { score, score_object, features } = self.outcome;
+        let object = match self.coverage.object {
+            Object::Mask => "what the mask covers",
+            Object::Alpha => "what the alpha channel covers",
+            Object::Image => "the whole image: no mask, no alpha channel over black",
+        };
+        let metric = self.metric();
+        let (reference, image) = (self.settings.reference.display(), self.settings.image.display());
+        let mut text = format!("{metric} of {image} against {reference}: 0 is equal, larger is worse\n\n");
+        let mut row = |name: &str, [a, b]: [f64; 2]| text.push_str(&format!("{name:<10} {a:>10.6} {b:>10.6}\n"));
+        row(metric, [score, score_object]);
+        if let Some([image, object]) = features {
+            for (i, name) in FEATURES.iter().enumerate() {
+                row(name, [image[i], object[i]]);
+            }
+        }
+        let heading = format!("{:<10} {:>10} {:>10}\n", "", "image", "object");
+        text.insert_str(text.find("\n\n").map_or(0, |end| end + 2), &heading);
+        text.push_str(&format!("\nobject: {object}\n"));
+        if features.is_some() {
+            text.push_str("features: 1 is equal; the score is 1 minus their product\n");
+        }
+        text + &format!("display exposure: {} ({})\n", self.exposure, exposure_source(&self.settings.display_exposure))
+    }
+
+    fn metric(&self) -> &'static str {
+        match self.settings.metric {
+            MetricKind::Cssim => "cssim",
+            MetricKind::Icid => "icid",
+        }
+    }
+}
+
+/// l_L, c_L, s_L, l_C, l_H.
+const FEATURES: [&str; 5] = ["lightness", "contrast", "structure", "chroma", "hue"];

@@ -1,0 +1,138 @@
+//! Everything a fit knows about its photo.
+
+use super::{
+    InputFile, LoadedEnvironment, LoadedGeometry, LoadedMask, LoadedPhoto, file::cannot_use, load_environment,
+    load_mask, load_normals, load_photo, sphere_geometry,
+};
+use crate::settings::{self, EnvironmentSettings, FitSettings, ViewSettings};
+use anyhow::Context;
+use lookalike::{
+    image::Encoding,
+    light::Mapping,
+    scene::{Capture, CaptureInput, Circle, CircleSource, Geometry, Mask, Placement, SceneError},
+};
+use std::path::Path;
+
+/// The files of a capture and how to see them: the part of [`FitSettings`] that this needs.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CaptureFiles<'a> {
+    /// The photo.
+    pub photo: &'a Path,
+    /// Which pixels show the object; none means all that the silhouette covers.
+    pub mask: Option<&'a Path>,
+    /// The light.
+    pub environment: &'a EnvironmentSettings,
+    /// Camera and shape.
+    pub view: &'a ViewSettings,
+    /// Where the sphere lies; none means fitted to the mask, else the inscribed circle.
+    pub sphere: Option<settings::Circle>,
+}
+
+impl<'a> From<&'a FitSettings> for CaptureFiles<'a> {
+    fn from(settings: &'a FitSettings) -> Self {
+        Self {
+            photo: &settings.photo,
+            mask: settings.mask.as_deref(),
+            environment: &settings.environment,
+            view: &settings.view,
+            sphere: settings.sphere,
+        }
+    }
+}
+
+/// A checked capture with the origins of its parts.
+#[derive(Debug, Clone)]
+pub struct LoadedCapture {
+    /// Photo, geometry and light.
+    pub capture: Capture,
+    /// The photo's file.
+    pub photo: InputFile,
+    /// Whether the photo held radiance or display values.
+    pub encoding: Encoding,
+    /// The map's file.
+    pub environment: InputFile,
+    /// The map's layout, given or recognised.
+    pub mapping: Mapping,
+    /// The mask's file.
+    pub mask: Option<InputFile>,
+    /// The normal map's file.
+    pub normals: Option<InputFile>,
+    /// Where the sphere's circle came from; none for a normal map.
+    pub circle_source: Option<CircleSource>,
+    /// What the user should know, of all files and of the whole.
+    pub warnings: Vec<String>,
+}
+
+/// Reads the photo of a fit with its mask, its shape and its light, and checks them against each other.
+///
+/// # Errors
+/// Those of the loaders, and of [`Capture::new`] when the parts do not fit each other or nothing can be fitted to.
+pub fn load_capture(files: &CaptureFiles<'_>) -> anyhow::Result<LoadedCapture> {
+    let LoadedPhoto { image, clipped, encoding, source, mut warnings, .. } = load_photo(files.photo)?;
+    let (width, height) = (image.width(), image.height());
+    let mask = files.mask.map(|path| same_size(path, width, height)).transpose()?;
+    let mask_values = mask.as_ref().map(|loaded| &loaded.mask);
+    let (shape, placement) = shape(files, mask_values, width, height)?;
+    let LoadedEnvironment { environment, mapping, source: map, warnings: of_map } =
+        load_environment(files.environment)?;
+
+    warnings.extend(of_map);
+    warnings.extend(shape.warnings);
+    warnings.extend(placement.iter().filter_map(|placement| placement.warning.clone()));
+    let (mask_source, mask) = mask.map(|loaded| (loaded.source, loaded.mask)).unzip();
+    let input = CaptureInput { photo: image, clipped, mask, geometry: shape.geometry, environment };
+    let capture = Capture::new(input).with_context(|| cannot_use(files.photo, "photo"))?;
+    // Those of the normal map are there already, with its name.
+    let of_normals = capture.geometry().normal_map().map_or(&[][..], |map| map.warnings());
+    warnings.extend(capture.warnings().iter().filter(|text| !of_normals.contains(text)).cloned());
+    Ok(LoadedCapture {
+        capture,
+        photo: source,
+        encoding,
+        environment: map,
+        mapping,
+        mask: mask_source,
+        normals: shape.normals,
+        circle_source: placement.map(|placement| placement.source),
+        warnings,
+    })
+}
+
+fn same_size(path: &Path, width: usize, height: usize) -> anyhow::Result<LoadedMask> {
+    let loaded = load_mask(path)?;
+    let (found_width, found_height) = (loaded.mask.width(), loaded.mask.height());
+    if (found_width, found_height) != (width, height) {
+        let error = SceneError::Size { what: "mask", width, height, found_width, found_height };
+        return Err(error).with_context(|| cannot_use(path, "mask"));
+    }
+    Ok(loaded)
+}
+
+/// The sphere of the photo, or the shape of a normal map of the photo's size.
+fn shape(
+    files: &CaptureFiles<'_>,
+    mask: Option<&Mask>,
+    width: usize,
+    height: usize,
+) -> anyhow::Result<(LoadedGeometry, Option<Placement>)> {
+    let Some(path) = &files.view.normals else {
+        let place = || -> Result<(Geometry, Placement), SceneError> {
+            let placement = Placement::choose(files.sphere.map(circle), mask, width, height)?;
+            Ok((sphere_geometry(width, height, placement.circle, files.view)?, placement))
+        };
+        let (geometry, placement) = place().context("cannot place the sphere in the photo")?;
+        let loaded = LoadedGeometry { geometry, normals: None, warnings: Vec::new() };
+        return Ok((loaded, Some(placement)));
+    };
+    let loaded = load_normals(path, files.view.camera)?;
+    let (found_width, found_height) = (loaded.geometry.width(), loaded.geometry.height());
+    if (found_width, found_height) != (width, height) {
+        let error = SceneError::Size { what: "normal map", width, height, found_width, found_height };
+        return Err(error).with_context(|| cannot_use(path, "normal map"));
+    }
+    Ok((loaded, None))
+}
+
+fn circle(given: settings::Circle) -> Circle {
+    Circle { x: given.center_x_px, y: given.center_y_px, radius: given.radius_px }
+}

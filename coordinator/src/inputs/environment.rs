@@ -1,0 +1,69 @@
+//! The environment map.
+
+use super::file::{InputFile, cannot_use, read_with};
+use crate::settings::{EnvMapping, EnvironmentSettings};
+use anyhow::{Context, bail};
+use lookalike::{
+    image::{Decoded, Encoding, decode},
+    light::{Environment, Mapping, to_lat_long},
+};
+use std::sync::Arc;
+
+/// An environment map with its origin.
+#[derive(Debug, Clone)]
+pub struct LoadedEnvironment {
+    /// The light, canonical and rotated as asked for.
+    pub environment: Arc<Environment>,
+    /// The layout of the file, given or recognised.
+    pub mapping: Mapping,
+    /// The file, with the hash of its pixels before any conversion of layout or rotation.
+    pub source: InputFile,
+    /// What the user should know.
+    pub warnings: Vec<String>,
+}
+
+/// Reads the environment map: OpenEXR, Radiance HDR or PFM, in the layout that was asked for or that its shape tells.
+///
+/// # Errors
+/// If the file cannot be read or decoded, holds display values (PNG, JPEG), has no known layout, a texel that is negative or
+/// not finite, or no light.
+pub fn load_environment(settings: &EnvironmentSettings) -> anyhow::Result<LoadedEnvironment> {
+    let path = &settings.path;
+    let decoded = read_with(path, ROLE, |name, bytes| radiance(decode(name, bytes)?))?;
+    let source = InputFile::of_image(path, &decoded.image);
+    let (width, height) = (decoded.image.width(), decoded.image.height());
+    let mapping = match settings.mapping {
+        Some(mapping) => Ok(self::mapping(mapping)),
+        None => Mapping::recognise(width, height),
+    };
+    let mapping = mapping.with_context(|| cannot_use(path, ROLE))?;
+    let environment = to_lat_long(decoded.image, mapping).with_context(|| cannot_use(path, ROLE))?;
+    let environment = Arc::new(environment.rotated(settings.rotation_deg));
+    let warnings = decoded.warnings.iter().map(|text| format!("{}: {text}", path.display())).collect();
+    Ok(LoadedEnvironment { environment, mapping, source, warnings })
+}
+
+/// Refuses display values.
+fn radiance(decoded: Decoded) -> anyhow::Result<Decoded> {
+    if decoded.encoding == Encoding::Srgb {
+        bail!(
+            "expected radiance (OpenEXR, Radiance HDR or PFM), found display values ({}): they end at white, so a lamp or \
+             the sun in them is clipped to the brightness of a white wall and no highlight could be explained; use the HDR \
+             file that the image was made from, or, if nothing in the scene was brighter than white, convert the image \
+             to linear OpenEXR",
+            decoded.format
+        );
+    }
+    Ok(decoded)
+}
+
+fn mapping(name: EnvMapping) -> Mapping {
+    match name {
+        EnvMapping::Latlong => Mapping::LatLong,
+        EnvMapping::Cross => Mapping::Cross,
+        EnvMapping::Angular => Mapping::Angular,
+        EnvMapping::MirrorBall => Mapping::MirrorBall,
+    }
+}
+
+const ROLE: &str = "environment map";

@@ -1,0 +1,59 @@
+//! `--display-exposure`: from what was asked for to a number.
+
+use super::file::read_with;
+use crate::settings::DisplayExposure;
+use anyhow::{Context, bail};
+use lookalike::{
+    image::{Format, Image, decode, metadata},
+    metric::auto_exposure,
+};
+use serde_json::Value;
+use std::path::Path;
+
+/// The factor of the display transform. `reference` is the image that decides an automatic exposure, over its pixels of
+/// `coverage` 1 (one value per pixel).
+///
+/// # Errors
+/// If there is no light to expose for, or the file that holds the factor cannot be used.
+pub fn resolve_display_exposure(asked: &DisplayExposure, reference: &Image, coverage: &[f32]) -> anyhow::Result<f64> {
+    match asked {
+        DisplayExposure::Auto => auto_exposure(reference, coverage).context("--display-exposure auto"),
+        DisplayExposure::Value(value) => Ok(*value),
+        DisplayExposure::From(path) => load_display_exposure(path),
+    }
+}
+
+/// The factor that an earlier run used, from its `fit.json` or the metadata of one of its images.
+///
+/// # Errors
+/// If the file cannot be read, is neither, or holds no such number.
+pub fn load_display_exposure(path: &Path) -> anyhow::Result<f64> {
+    read_with(path, "source of the display exposure", |name, bytes| {
+        if Format::sniff(bytes).is_some() { of_image(name, bytes) } else { of_json(bytes) }
+    })
+}
+
+fn of_image(name: &str, bytes: &[u8]) -> anyhow::Result<f64> {
+    let decoded = decode(name, bytes)?;
+    let entry = decoded.metadata.iter().find(|(key, _)| key == metadata::DISPLAY_EXPOSURE);
+    let Some((_, text)) = entry else {
+        bail!(
+            "expected {} in the image's metadata, found none; use an image that lookalike wrote, its fit.json, or a number",
+            metadata::DISPLAY_EXPOSURE
+        );
+    };
+    text.parse().ok().and_then(factor).with_context(|| format!("expected an exposure above 0, found `{text}`"))
+}
+
+fn of_json(bytes: &[u8]) -> anyhow::Result<f64> {
+    let json: Value = serde_json::from_slice(bytes).context("expected a fit.json or an image of an earlier run")?;
+    let field = &json["display_exposure"];
+    field
+        .as_f64()
+        .and_then(factor)
+        .with_context(|| format!("expected a \"display_exposure\" above 0, found {field}; use the fit.json of a run"))
+}
+
+fn factor(value: f64) -> Option<f64> {
+    (value > 0.0 && value.is_finite()).then_some(value)
+}

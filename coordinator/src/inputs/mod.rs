@@ -1,0 +1,25 @@
+//! From settings to the objects of the science: the files a user names are read, decoded and checked here, once.
+//!
+//! Every error says which file was to serve as what, what was expected and found, and what to do. What can be used but should be known
+//! comes back as warnings, which the caller shows ([`show_warnings`]). Every file that shapes a result comes with the
+//! hash of its decoded content ([`InputFile`]), for `fit.json` and the metadata of images.
+//!
+//! What is deliberately absent: nothing here renders, scores or writes a file.
+
+mod capture;
+mod environment;
+mod exposure;
+mod file;
+mod geometry;
+mod material;
+mod photo;
+mod warnings;
+
+pub use capture::{CaptureFiles, LoadedCapture, load_capture};
+pub use environment::{LoadedEnvironment, load_environment};
+pub use exposure::{load_display_exposure, resolve_display_exposure};
+pub use file::InputFile;
+pub use geometry::{LoadedGeometry, camera, load_normals, sphere_geometry};
+pub use material::{LoadedTable, flat_parameters, load_table};
+pub use photo::{LoadedMask, LoadedPhoto, load_image, load_mask, load_photo};
+pub use warnings::show_warnings;
