@@ -27,7 +27,7 @@ use crate::{
     render::{
         knots::{Knots, PER_OCTAVE},
         subset::{self, PixelSubset},
-        transport::{Accuracy, Pixel},
+        transport::{Accuracy, Pixel, TILE},
     },
     scene::Capture,
 };
@@ -479,12 +479,14 @@ fn intensities(capture: &Capture) -> Vec<subset::Candidate> {
     capture.usable().map(candidate).collect()
 }
 
-/// The pixels that count for the score, in raster order.
+/// The pixels that count for the score, tile by tile, so that neighbours share cuts of the light.
 fn covered_pixels(capture: &Capture) -> Vec<Pixel> {
     let width = capture.photo().width();
     let coverage = capture.scoring_coverage();
     let covered = coverage.iter().enumerate().filter(|(_, c)| **c > 0.0);
-    covered.map(|(i, _)| [index(i % width), index(i / width)]).collect()
+    let mut pixels: Vec<Pixel> = covered.map(|(i, _)| [index(i % width), index(i / width)]).collect();
+    pixels.sort_by_key(|[column, row]| (row / TILE, column / TILE, *row, *column));
+    pixels
 }
 
 fn add<T: Serialize>(graph: &mut GraphEdit<'_>, what: &str, value: &T) -> Result<BlobHash, PlanError> {

@@ -21,6 +21,17 @@ pub enum Band {
     Glossy(f64, f64),
 }
 
+impl Band {
+    /// The width of the sharpest lobe; 1 for the cosine.
+    #[must_use]
+    pub fn sharpest(self) -> f64 {
+        match self {
+            Self::Diffuse => 1.0,
+            Self::Glossy(lower, _) => lower,
+        }
+    }
+}
+
 /// A surface point: unit normal and direction to the viewer, world space.
 #[derive(Debug, Clone, Copy)]
 pub struct Point {
@@ -45,22 +56,24 @@ impl Point {
 #[derive(Debug, Default)]
 pub struct Cut {
     stack: Vec<Cell>,
-    /// The nodes of the last cut, as incident light.
-    pub lights: Vec<Incident>,
+    nodes: Vec<Node>,
+    lights: Vec<Incident>,
 }
 
 impl Cut {
-    /// Refines the pyramid for `point` until no node's error in radiance, for a lobe of unit weight, exceeds `tolerance`.
-    pub fn refine(&mut self, pyramid: &LightPyramid, point: &Point, band: Band, tolerance: f64) {
-        let bound = Bound::new(point, band);
-        self.lights.clear();
+    /// Refines the pyramid until no node's error in radiance, for a lobe of unit weight, exceeds `tolerance` at any surface point
+    /// whose normal and view lie within `reach` (chords of the unit sphere, added) of those of `point`; `point.cos_o` is the lowest
+    /// of them.
+    pub fn refine(&mut self, pyramid: &LightPyramid, point: &Point, reach: f64, band: Band, tolerance: f64) {
+        let bound = Bound::new(point, reach, band);
+        self.nodes.clear();
         self.stack.clear();
         self.stack.extend(pyramid.roots());
         while let Some(cell) = self.stack.pop() {
             let node = pyramid.node(cell);
             let centroid = widen(node.centroid);
             let cos_i = point.normal.dot(centroid);
-            if cos_i < -f64::from(node.radius) || strongest(node.energy) == 0.0 {
+            if cos_i < -(f64::from(node.radius) + reach) || strongest(node.energy) == 0.0 {
                 continue;
             }
             if bound.error(&node, centroid, cos_i) > tolerance {
@@ -70,13 +83,35 @@ impl Cut {
                     continue;
                 }
             }
-            if cos_i > 0.0 {
-                let angles = Angles::new(point.normal, centroid, point.view);
-                let spread = spread(&node, &angles);
+            self.nodes.push(node);
+        }
+    }
+
+    /// The nodes of the cut as light that falls on a surface point, their energies times `share`.
+    pub fn lights(&mut self, point: &Point, share: f64) -> &[Incident] {
+        self.lights.clear();
+        for node in &self.nodes {
+            let angles = Angles::new(point.normal, widen(node.centroid), point.view);
+            if angles.cos_i > 0.0 {
+                let spread = spread(node, &angles);
                 let angles = Angles { cos_d: fresnel_cosine(angles.cos_d, &spread), ..angles };
-                self.lights.push(Incident { angles, energy: node.energy.map(f64::from), spread });
+                let energy = node.energy.map(|e| f64::from(e) * share);
+                self.lights.push(Incident { angles, energy, spread });
             }
         }
+        &self.lights
+    }
+
+    /// Number of nodes of the last cut.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.nodes.len()
+    }
+
+    /// Whether the last cut has no node.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.nodes.is_empty()
     }
 }
 
@@ -98,9 +133,10 @@ fn fresnel_cosine(cos_d: f64, spread: &Spread) -> f64 {
     cos_d - step.clamp(-0.5 * cos_d, 0.5 * cos_d)
 }
 
-/// Bounds the error of taking a node as a point, for one surface point and band.
+/// Bounds the error of taking a node as a point, for the surface points around one and a band.
 struct Bound<'a> {
     point: &'a Point,
+    reach: f64,
     band: Band,
     /// Bound of `G n.l / (4 n.l n.v)`, which is at most `G1(v) / (4 n.v)`; `1/pi` for the cosine lobe.
     shading: f64,
@@ -110,7 +146,7 @@ struct Bound<'a> {
 }
 
 impl<'a> Bound<'a> {
-    fn new(point: &'a Point, band: Band) -> Self {
+    fn new(point: &'a Point, reach: f64, band: Band) -> Self {
         let (lower, upper) = match band {
             Band::Diffuse => (1.0, 1.0),
             Band::Glossy(lower, upper) => (lower, upper),
@@ -120,13 +156,13 @@ impl<'a> Bound<'a> {
             Band::Diffuse => 1.0 / PI,
             Band::Glossy(..) => 0.5 / (point.cos_o + (a2 + (1.0 - a2) * point.cos_o * point.cos_o).sqrt()),
         };
-        Self { point, band, shading, squares: [a2, upper * upper], lower }
+        Self { point, reach, band, shading, squares: [a2, upper * upper], lower }
     }
 
     #[inline]
     fn error(&self, node: &Node, centroid: Vec3, cos_i: f64) -> f64 {
         let (energy, spread2) = (f64::from(strongest(node.energy)), f64::from(node.spread2));
-        let horizon = cos_i < f64::from(node.radius);
+        let horizon = cos_i < f64::from(node.radius) + self.reach;
         let error = match self.band {
             // The cosine has curvature cos; at the horizon it has a kink, a first-order error over the part that is cut off.
             Band::Diffuse if horizon => KINK * spread2.sqrt(),
@@ -150,7 +186,7 @@ impl<'a> Bound<'a> {
         let turn = inverse.sqrt().min(10.0);
         let along = self.point.normal.dot(half);
         let sin2 = (1.0 - along * along * inverse).max(0.0);
-        let nearest = (sin2.sqrt() - f64::from(node.radius) * turn).max(0.0);
+        let nearest = (sin2.sqrt() - f64::from(node.radius) * turn - self.reach).max(0.0);
         let t2 = if along > 0.0 { nearest * nearest } else { 1.0 };
         let d = |a2: f64| {
             let q = t2 + a2 * (1.0 - t2);
