@@ -8,7 +8,7 @@
 use super::pyramid::{Cell, LightPyramid, Node, strongest};
 use crate::{
     brdf::{Angles, Incident, Spread},
-    math::{Vec3, widen},
+    math::{Rgb, Vec3, widen},
 };
 use std::f64::consts::PI;
 
@@ -100,6 +100,12 @@ impl Cut {
             }
         }
         &self.lights
+    }
+
+    /// The nodes of the cut: direction of the energy's centroid (world, unit up to a rounding) and energy, for reflectances that
+    /// are no basis lobes.
+    pub fn directions(&self) -> impl Iterator<Item = (Vec3, Rgb)> + '_ {
+        self.nodes.iter().map(|node| (widen(node.centroid), widen(node.energy)))
     }
 
     /// Number of nodes of the last cut.

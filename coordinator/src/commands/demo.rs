@@ -18,7 +18,7 @@ use serde_json::{Value, json};
 use std::{process::ExitCode, sync::Arc, time::Instant};
 
 /// Columns and rows of the photo.
-const SIZE: usize = 256;
+const SIZE: usize = 192;
 /// Rows of the environment map.
 const MAP_ROWS: usize = 256;
 /// The gammas that the strip shows beside the winner.
