@@ -33,7 +33,7 @@ impl Bars {
         bar.set_length(count.planned * 1000);
         bar.set_position((count.done * 1000 + count.permille).min(count.planned * 1000));
         let best = self.best.get().map(|score| format!("best CSSIM {score:.4}"));
-        let best = best.filter(|_| matches!(stage, Stage::StageTwo | Stage::Polish)).unwrap_or_default();
+        let best = best.filter(|_| matches!(stage, Stage::Judging | Stage::Polish)).unwrap_or_default();
         let nodes = if count.planned > 1 { format!("{} of {}  ", count.done, count.planned) } else { String::new() };
         bar.set_message(format!("{nodes}{best}"));
         if count.is_complete() {
