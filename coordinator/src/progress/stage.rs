@@ -106,7 +106,7 @@ mod tests {
             label: label.to_owned(),
         };
         let mut tally = Tally::default();
-        let mut added = |tally: &mut Tally, n, kind, label| {
+        let added = |tally: &mut Tally, n, kind, label| {
             tally.note(&RunEvent::NodeAdded { name: name(n, kind, label) }).unwrap()
         };
         assert_eq!(added(&mut tally, 0, "transport", "transport of the subset, pixels 0 to 31").0, Stage::SubsetTables);
