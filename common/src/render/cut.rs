@@ -70,18 +70,32 @@ impl Cut {
                 }
             }
             if angles.cos_i > 0.0 {
-                self.lights.push(Incident { angles, energy: node.energy.map(f64::from), spread: spread(&node, &angles) });
+                self.lights.push(Incident {
+                    angles,
+                    energy: node.energy.map(f64::from),
+                    spread: spread(&node, point, centroid, &angles),
+                });
             }
         }
     }
 }
 
-/// The half vector turns by half of the light's step in the plane of reflection, by `1/(2 v.h)` of it across.
-fn spread(node: &Node, angles: &Angles) -> Spread {
+/// The half vector turns by half of the light's step in the plane of reflection, by `1/(2 v.h)` of it across: at grazing view far more
+/// across than along. How much of that lies along the half vector's offset from the normal follows from the share of the
+/// offset that is across the plane.
+fn spread(node: &Node, point: &Point, light: Vec3, angles: &Angles) -> Spread {
     let light2 = f64::from(node.spread2);
-    let cos_d2 = (angles.cos_d * angles.cos_d).max(0.05);
-    Spread { light2, half2: 0.125 * light2 * (1.0 + 1.0 / cos_d2) }
+    let cos_d2 = (angles.cos_d * angles.cos_d).max(LEAST_COS_D * LEAST_COS_D);
+    let across = light.cross(point.view);
+    let offset = point.normal.dot(across);
+    let square = across.length_squared() * angles.sin2_h;
+    let share = if square > 0.0 { (offset * offset / square).min(1.0) } else { 0.5 };
+    let radial = (cos_d2 * (1.0 - share) + share) / (1.0 + cos_d2);
+    Spread { light2, half2: 0.125 * light2 * (1.0 + 1.0 / cos_d2), radial }
 }
+
+/// `v.h` below this is taken as this: light that comes from straight behind the surface turns the half vector without bound.
+const LEAST_COS_D: f64 = 0.05;
 
 fn error_bound(node: &Node, angles: &Angles, band: Band) -> f64 {
     let (energy, spread2) = (f64::from(strongest(node.energy)), f64::from(node.spread2));
@@ -115,7 +129,7 @@ const KINK: f64 = 0.1;
 /// directions (per square chord).
 fn peak_over(node: &Node, angles: &Angles, lower: f64, upper: f64) -> (f64, f64) {
     // A step of light direction moves the half vector by at most this factor.
-    let turn = 0.5 / angles.cos_d.max(0.05);
+    let turn = 0.5 / angles.cos_d.max(LEAST_COS_D);
     let nearest = (angles.sin2_h.sqrt() - f64::from(node.radius) * turn).max(0.0);
     let t2 = if angles.cos_h > 0.0 { nearest * nearest } else { 1.0 };
     let d = |a2: f64| {
