@@ -93,9 +93,8 @@ impl Cut {
         for node in &self.nodes {
             let angles = Angles::new(point.normal, widen(node.centroid), point.view);
             if angles.cos_i > 0.0 {
-                let spread = spread(node, &angles);
-                let angles = Angles { cos_d: fresnel_cosine(angles.cos_d, &spread), ..angles };
                 let energy = node.energy.map(|e| f64::from(e) * share);
+                let spread = spread(node, point, widen(node.centroid), &angles);
                 self.lights.push(Incident { angles, energy, spread });
             }
         }
@@ -121,23 +120,22 @@ impl Cut {
     }
 }
 
-/// The half vector turns by half of the light's step in the plane of reflection, by `1/(2 v.h)` of it across.
-fn spread(node: &Node, angles: &Angles) -> Spread {
+/// The half vector turns by half of the light's step in the plane of reflection, by `1/(2 v.h)` of it across: at grazing view far more
+/// across than along. How much of that lies along the half vector's offset from the normal follows from the share of the
+/// offset that is across the plane.
+fn spread(node: &Node, point: &Point, light: Vec3, angles: &Angles) -> Spread {
     let light2 = f64::from(node.spread2);
-    let cos_d2 = (angles.cos_d * angles.cos_d).max(0.05);
-    Spread { light2, half2: 0.125 * light2 * (1.0 + 1.0 / cos_d2) }
+    let cos_d2 = (angles.cos_d * angles.cos_d).max(LEAST_COS_D * LEAST_COS_D);
+    let across = light.cross(point.view);
+    let offset = point.normal.dot(across);
+    let square = across.length_squared() * angles.sin2_h;
+    let share = if square > 0.0 { (offset * offset / square).min(1.0) } else { 0.5 };
+    let radial = (cos_d2 * (1.0 - share) + share) / (1.0 + cos_d2);
+    Spread { light2, half2: 0.125 * light2 * (1.0 + 1.0 / cos_d2), radial }
 }
 
-/// The `v.h` whose `F5` is the mean of `F5` over the node, to second order.
-///
-/// With `c = v.h` the Laplacian of `F5 = (1 - c)^5` over light directions is `5 (1 - c)^4 (1 + 7 c / 4 - 1 / (4 c))`; a quarter of it
-/// times the mean square distance, divided by the derivative `-5 (1 - c)^4`, is the step. `F5` is convex: without it the
-/// `F5` part is too dark near the rim.
-fn fresnel_cosine(cos_d: f64, spread: &Spread) -> f64 {
-    let c = cos_d.max(0.05);
-    let step = 0.25 * spread.light2 * (1.0 + 1.75 * c - 0.25 / c);
-    cos_d - step.clamp(-0.5 * cos_d, 0.5 * cos_d)
-}
+/// `v.h` below this is taken as this: light that comes from straight behind the surface turns the half vector without bound.
+const LEAST_COS_D: f64 = 0.05;
 
 /// Bounds the error of taking a node as a point, for the surface points around one and a band.
 struct Bound<'a> {

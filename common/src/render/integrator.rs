@@ -50,7 +50,7 @@ impl Integrator<'_> {
         for (t, &(technique, count)) in techniques.iter().enumerate() {
             let stream = PointStream::new(key(&[self.seed, u64::from(row), u64::from(column), t as u64]));
             for index in 0..count {
-                let [x, y, u, v] = stream.point(index);
+                let [u, v, x, y] = stream.point(index);
                 let position = (f64::from(column) + x, f64::from(row) + y);
                 let Some(surface) = self.geometry.point(position.0, position.1) else { continue };
                 hits += 1;
