@@ -66,7 +66,7 @@ pub trait Lobe: Debug + Sync {
 }
 
 /// Widths handled in one pass; longer lists go through in chunks.
-const LANES: usize = 12;
+const LANES: usize = 8;
 
 /// The generic loop behind every [`Lobe::accumulate`]: directions outside, widths inside, so that the widths fill SIMD lanes.
 ///

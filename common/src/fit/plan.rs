@@ -27,7 +27,7 @@ use crate::{
     render::{
         knots::{Knots, PER_OCTAVE},
         subset::{self, PixelSubset},
-        transport::{Accuracy, Pixel, TILE},
+        transport::{Accuracy, Pixel, tile_order},
     },
     scene::Capture,
 };
@@ -485,7 +485,7 @@ fn covered_pixels(capture: &Capture) -> Vec<Pixel> {
     let coverage = capture.scoring_coverage();
     let covered = coverage.iter().enumerate().filter(|(_, c)| **c > 0.0);
     let mut pixels: Vec<Pixel> = covered.map(|(i, _)| [index(i % width), index(i / width)]).collect();
-    pixels.sort_by_key(|[column, row]| (row / TILE, column / TILE, *row, *column));
+    pixels.sort_by_key(|pixel| tile_order(*pixel));
     pixels
 }
 

@@ -90,11 +90,12 @@ impl Cut {
     /// The nodes of the cut as light that falls on a surface point, their energies times `share`.
     pub fn lights(&mut self, point: &Point, share: f64) -> &[Incident] {
         self.lights.clear();
+        let side = point.view.cross(point.normal);
         for node in &self.nodes {
             let angles = Angles::new(point.normal, widen(node.centroid), point.view);
             if angles.cos_i > 0.0 {
                 let energy = node.energy.map(|e| f64::from(e) * share);
-                let spread = spread(node, point, widen(node.centroid), &angles);
+                let spread = spread(node, side, widen(node.centroid), &angles);
                 self.lights.push(Incident { angles, energy, spread });
             }
         }
@@ -123,12 +124,13 @@ impl Cut {
 /// The half vector turns by half of the light's step in the plane of reflection, by `1/(2 v.h)` of it across: at grazing view far more
 /// across than along. How much of that lies along the half vector's offset from the normal follows from the share of the
 /// offset that is across the plane.
-fn spread(node: &Node, point: &Point, light: Vec3, angles: &Angles) -> Spread {
+///
+/// `side` is `v x n`. With `l.v = 2 (v.h)^2 - 1`, `|l x v|^2 = 4 (v.h)^2 (1 - (v.h)^2)`.
+fn spread(node: &Node, side: Vec3, light: Vec3, angles: &Angles) -> Spread {
     let light2 = f64::from(node.spread2);
     let cos_d2 = (angles.cos_d * angles.cos_d).max(LEAST_COS_D * LEAST_COS_D);
-    let across = light.cross(point.view);
-    let offset = point.normal.dot(across);
-    let square = across.length_squared() * angles.sin2_h;
+    let offset = light.dot(side);
+    let square = 4.0 * cos_d2 * (1.0 - cos_d2) * angles.sin2_h;
     let share = if square > 0.0 { (offset * offset / square).min(1.0) } else { 0.5 };
     let radial = (cos_d2 * (1.0 - share) + share) / (1.0 + cos_d2);
     Spread { light2, half2: 0.125 * light2 * (1.0 + 1.0 / cos_d2), radial }
