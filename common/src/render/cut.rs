@@ -107,18 +107,6 @@ impl Cut {
     pub fn directions(&self) -> impl Iterator<Item = (Vec3, Rgb)> + '_ {
         self.nodes.iter().map(|node| (widen(node.centroid), widen(node.energy)))
     }
-
-    /// Number of nodes of the last cut.
-    #[must_use]
-    pub fn len(&self) -> usize {
-        self.nodes.len()
-    }
-
-    /// Whether the last cut has no node.
-    #[must_use]
-    pub fn is_empty(&self) -> bool {
-        self.nodes.is_empty()
-    }
 }
 
 /// The half vector turns by half of the light's step in the plane of reflection, by `1/(2 v.h)` of it across: at grazing view far more
@@ -171,8 +159,8 @@ impl<'a> Bound<'a> {
         let horizon = cos_i < f64::from(node.radius) + self.reach;
         let error = match self.band {
             // The cosine has curvature cos; at the horizon it has a kink, a first-order error over the part that is cut off.
-            Band::Diffuse if horizon => KINK * spread2.sqrt(),
-            Band::Diffuse => 0.5 * spread2 * cos_i.abs(),
+            Band::Diffuse if horizon => DIFFUSE_CARE * KINK * spread2.sqrt(),
+            Band::Diffuse => DIFFUSE_CARE * 0.5 * spread2 * cos_i.abs(),
             Band::Glossy(..) => {
                 let (distribution, curvature) = self.peak_over(node, centroid);
                 let kink = if horizon { KINK * (spread2.sqrt() / self.lower).min(1.0) } else { 0.0 };
@@ -192,8 +180,10 @@ impl<'a> Bound<'a> {
         let turn = inverse.sqrt().min(10.0);
         let along = self.point.normal.dot(half);
         let sin2 = (1.0 - along * along * inverse).max(0.0);
-        let nearest = (sin2.sqrt() - f64::from(node.radius) * turn - self.reach).max(0.0);
-        let t2 = if along > 0.0 { nearest * nearest } else { 1.0 };
+        // A half vector below the surface counts as one in it; the node may still hold the mirror direction.
+        let sin = if along > 0.0 { sin2.sqrt() } else { 1.0 };
+        let nearest = (sin - f64::from(node.radius) * turn - self.reach).max(0.0);
+        let t2 = nearest * nearest;
         let d = |a2: f64| {
             let q = t2 + a2 * (1.0 - t2);
             (a2 / (PI * q * q), q)
@@ -205,6 +195,9 @@ impl<'a> Bound<'a> {
         (distribution, 2.0 * turn * turn * sharpest / q)
     }
 }
+
+/// The cosine lobe needs few nodes, whose errors average less: it gets a tighter tolerance.
+const DIFFUSE_CARE: f64 = 6.0;
 
 /// Share of a node's size by which a kink at the horizon can shift its value.
 const KINK: f64 = 0.1;

@@ -24,7 +24,7 @@ pub struct Accuracy {
     /// Largest error of one node of a cut, in units of the map's mean radiance, for a lobe of unit weight.
     pub tolerance: f64,
     /// Turn of the normal over a pixel, in widths of the sharpest lobe, up to which one position stands for the pixel, as a
-    /// multiple of what keeps the error below 1e-3 of the lobe's peak.
+    /// multiple of what keeps the error below 2e-3 of the lobe's peak.
     pub footprint: f64,
 }
 
@@ -32,7 +32,7 @@ impl Accuracy {
     /// Tables of stage one.
     pub const SUBSET: Self = Self { tolerance: 1e-4, footprint: 1.0 };
     /// Full-resolution tables of stage two and polish.
-    pub const FULL: Self = Self { tolerance: 3e-4, footprint: 3.0 };
+    pub const FULL: Self = Self { tolerance: 1e-3, footprint: 3.0 };
 }
 
 /// What a table is to hold: lobes of `model`, widths on `knots`.
@@ -50,7 +50,7 @@ pub struct TransportPlan {
 const BAND_RATIO: f64 = 4.0;
 
 /// Positions per axis in pixels that the silhouette cuts: the first that sees the object.
-const SILHOUETTE_GRIDS: [u32; 3] = [2, 4, 16];
+const SILHOUETTE_GRIDS: [u32; 2] = [4, 16];
 
 /// Neighbouring pixels within squares of this side may share a cut.
 const TILE: u32 = 4;

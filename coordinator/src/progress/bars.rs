@@ -17,8 +17,10 @@ pub(super) struct Bars {
 }
 
 impl Bars {
-    pub(super) fn new(best: Arc<BestScore>) -> Self {
-        Self { all: MultiProgress::new(), bars: BTreeMap::new(), tally: Tally::default(), best }
+    /// Bars on stderr; `None` where they cannot be drawn.
+    pub(super) fn new(best: Arc<BestScore>) -> Option<Self> {
+        let all = MultiProgress::new();
+        (!all.is_hidden()).then(|| Self { all, bars: BTreeMap::new(), tally: Tally::default(), best })
     }
 
     fn show(&mut self, stage: Stage, count: Count) {
@@ -59,7 +61,7 @@ impl Display for Bars {
         }
     }
 
-    fn finish(&mut self) {
+    fn finish(&mut self, _outcome: Result<(), &str>) {
         for bar in self.bars.values() {
             bar.disable_steady_tick();
             bar.abandon();
