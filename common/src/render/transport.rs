@@ -10,7 +10,7 @@ use super::{
 };
 use crate::{
     brdf::{Lobe, Model, lobe_terms},
-    math::to_f32,
+    math::{Vec3, to_f32},
     scene::Geometry,
 };
 use rayon::prelude::*;
@@ -24,15 +24,15 @@ pub struct Accuracy {
     /// Largest error of one node of a cut, in units of the map's mean radiance, for a lobe of unit weight.
     pub tolerance: f64,
     /// Turn of the normal over a pixel, in widths of the sharpest lobe, up to which one position stands for the pixel, as a
-    /// multiple of what keeps the error below 1e-3 of the lobe's peak.
+    /// multiple of what keeps the error below 2e-3 of the lobe's peak.
     pub footprint: f64,
 }
 
 impl Accuracy {
     /// Tables of stage one.
-    pub const SUBSET: Self = Self { tolerance: 3e-5, footprint: 1.0 };
+    pub const SUBSET: Self = Self { tolerance: 1e-4, footprint: 1.0 };
     /// Full-resolution tables of stage two and polish.
-    pub const FULL: Self = Self { tolerance: 3e-4, footprint: 3.0 };
+    pub const FULL: Self = Self { tolerance: 1e-3, footprint: 3.0 };
 }
 
 /// What a table is to hold: lobes of `model`, widths on `knots`.
@@ -50,14 +50,38 @@ pub struct TransportPlan {
 const BAND_RATIO: f64 = 4.0;
 
 /// Positions per axis in pixels that the silhouette cuts: the first that sees the object.
-const SILHOUETTE_GRIDS: [u32; 3] = [2, 4, 16];
+const SILHOUETTE_GRIDS: [u32; 2] = [4, 16];
+
+/// Neighbouring pixels within squares of this side may share a cut.
+const TILE: u32 = 4;
+
+/// Points share a cut while their normals turn by no more than this share of the sharpest lobe's width.
+const REACH: f64 = 1.0;
+
+/// A surface point of a pixel with its share of the pixel's mean.
+#[derive(Debug, Clone, Copy)]
+struct Seen {
+    /// Index of the pixel in its tile.
+    pixel: usize,
+    point: Point,
+    share: f64,
+}
+
+/// Sums of one pixel, per lobe `term x channel x knot`.
+type Sums = Vec<Vec<f64>>;
 
 impl TransportPlan {
     /// Integrates the table of some pixels. A pixel that sees no surface gets zeros.
+    ///
+    /// Consecutive pixels of one tile share cuts where they may, so lists are best ordered by [`tile_order`].
     #[must_use]
     pub fn integrate(&self, geometry: &Geometry, pyramid: &LightPyramid, pixels: &[Pixel]) -> TransportTable {
-        let columns: Vec<Vec<Vec<f64>>> =
-            pixels.par_iter().map_init(Cut::default, |cut, &pixel| self.pixel(geometry, pyramid, pixel, cut)).collect();
+        let tiles: Vec<&[Pixel]> = pixels.chunk_by(|a, b| tile_of(*a) == tile_of(*b)).collect();
+        let columns: Vec<Sums> = tiles
+            .par_iter()
+            .map_init(Cut::default, |cut, tile| self.tile(geometry, pyramid, tile, cut))
+            .flatten_iter()
+            .collect();
         let lobes = self.model.lobes().iter().enumerate().map(|(l, basis)| {
             let knots = basis.width.map(|_| self.knots);
             let terms = lobe_terms(basis.lobe);
@@ -74,72 +98,105 @@ impl TransportPlan {
         TransportTable { pixels: pixels.len(), lobes: lobes.collect() }
     }
 
-    /// Sums of one pixel, per lobe `term x channel x knot`.
-    fn pixel(&self, geometry: &Geometry, pyramid: &LightPyramid, pixel: Pixel, cut: &mut Cut) -> Vec<Vec<f64>> {
-        self.model
-            .lobes()
-            .iter()
-            .map(|basis| {
-                let widths = if basis.width.is_some() { self.knots.widths() } else { vec![0.0] };
-                let mut sums = vec![0.0; lobe_terms(basis.lobe) * 3 * widths.len()];
-                for (band, range) in bands(basis.lobe, &widths) {
-                    let integrals = self.band(geometry, pyramid, pixel, basis.lobe, band, &widths[range.clone()], cut);
-                    let count = range.len();
-                    for (row, part) in integrals.chunks_exact(count).enumerate() {
-                        sums[row * widths.len() + range.start..][..count].copy_from_slice(part);
+    fn tile(&self, geometry: &Geometry, pyramid: &LightPyramid, pixels: &[Pixel], cut: &mut Cut) -> Vec<Sums> {
+        let mut sums: Vec<Sums> = vec![Vec::new(); pixels.len()];
+        for basis in self.model.lobes() {
+            let widths = if basis.width.is_some() { self.knots.widths() } else { vec![0.0] };
+            let rows = lobe_terms(basis.lobe) * 3;
+            sums.iter_mut().for_each(|pixel| pixel.push(vec![0.0; rows * widths.len()]));
+            for (band, range) in bands(basis.lobe, &widths) {
+                let integrals = self.band(geometry, pyramid, pixels, basis.lobe, (band, &widths[range.clone()]), cut);
+                for (pixel, integrals) in sums.iter_mut().zip(integrals) {
+                    let Some(out) = pixel.last_mut() else { continue };
+                    for (row, part) in integrals.chunks_exact(range.len()).enumerate() {
+                        out[row * widths.len() + range.start..][..range.len()].copy_from_slice(part);
                     }
                 }
-                sums
-            })
-            .collect()
-    }
-
-    #[allow(clippy::too_many_arguments, reason = "the inner loop of `pixel`, named for the profiler")]
-    fn band(
-        &self,
-        geometry: &Geometry,
-        pyramid: &LightPyramid,
-        pixel: Pixel,
-        lobe: &dyn Lobe,
-        band: Band,
-        widths: &[f64],
-        cut: &mut Cut,
-    ) -> Vec<f64> {
-        let tolerance = self.accuracy.tolerance * pyramid.mean_radiance();
-        let mut sums = vec![0.0; lobe_terms(lobe) * 3 * widths.len()];
-        let (points, total) = self.points(geometry, pixel, band);
-        for (point, weight) in points {
-            cut.refine(pyramid, &point, band, tolerance);
-            for light in &mut cut.lights {
-                light.energy = light.energy.map(|e| e * weight / total);
             }
-            lobe.accumulate(&cut.lights, point.cos_o, widths, &mut sums);
         }
         sums
     }
 
-    /// Surface points of a pixel with their weights, and the sum of these.
-    fn points(&self, geometry: &Geometry, [column, row]: Pixel, band: Band) -> (Vec<(Point, f64)>, f64) {
-        let sharpest = match band {
-            Band::Diffuse => 1.0,
-            Band::Glossy(lower, _) => lower,
-        };
+    /// Integrals of one lobe over the widths of one band, per pixel `term x channel x width`.
+    fn band(
+        &self,
+        geometry: &Geometry,
+        pyramid: &LightPyramid,
+        pixels: &[Pixel],
+        lobe: &dyn Lobe,
+        (band, widths): (Band, &[f64]),
+        cut: &mut Cut,
+    ) -> Vec<Vec<f64>> {
+        let tolerance = self.accuracy.tolerance * pyramid.mean_radiance();
+        let mut sums = vec![vec![0.0; lobe_terms(lobe) * 3 * widths.len()]; pixels.len()];
+        let points: Vec<Seen> =
+            pixels.iter().enumerate().flat_map(|(i, &pixel)| self.points(geometry, i, pixel, band)).collect();
+        for group in groups(&points, band.sharpest() * REACH) {
+            let (centre, reach) = around(group);
+            cut.refine(pyramid, &centre, reach, band, tolerance);
+            for seen in group {
+                lobe.accumulate(cut.lights(&seen.point, seen.share), seen.point.cos_o, widths, &mut sums[seen.pixel]);
+            }
+        }
+        sums
+    }
+
+    /// Surface points of a pixel.
+    fn points(&self, geometry: &Geometry, pixel: usize, [column, row]: Pixel, band: Band) -> Vec<Seen> {
         let at = |p: &Position| {
             let surface = geometry.point(f64::from(column) + p.x, f64::from(row) + p.y)?;
-            Some((Point::new(surface.normal, surface.view)?, p.weight))
+            Some(Seen { pixel, point: Point::new(surface.normal, surface.view)?, share: p.weight })
         };
         let seen = |positions: &[Position]| positions.iter().filter_map(at).collect::<Vec<_>>();
         let (c, r) = (column as usize, row as usize);
-        let points = if geometry.coverage(c, r) < 1.0 {
+        let mut points = if geometry.coverage(c, r) < 1.0 {
             // Where the coarse grid misses the object, a finer one may see its edge.
             SILHOUETTE_GRIDS.iter().map(|&n| seen(&footprint::grid(n))).find(|p| !p.is_empty()).unwrap_or_default()
         } else {
             let spread = geometry.normal_spread(c, r) / self.accuracy.footprint;
-            seen(&footprint::positions(spread, sharpest))
+            seen(&footprint::positions(spread, band.sharpest()))
         };
-        let total = points.iter().map(|(_, w)| w).sum();
-        (points, total)
+        let total: f64 = points.iter().map(|seen| seen.share).sum();
+        points.iter_mut().for_each(|seen| seen.share /= total);
+        points
     }
+}
+
+/// Sorts pixels so that neighbours may share cuts: by tiles, inside a tile by quarters.
+#[must_use]
+pub fn tile_order([column, row]: Pixel) -> [u32; 6] {
+    let half = TILE / 2;
+    [row / TILE, column / TILE, row / half, column / half, row, column]
+}
+
+fn tile_of([column, row]: Pixel) -> Pixel {
+    [column / TILE, row / TILE]
+}
+
+/// Runs of points that may share a cut: the whole tile, else halves of it as long as they are too wide, else single points.
+fn groups(points: &[Seen], reach: f64) -> Vec<&[Seen]> {
+    if points.is_empty() {
+        return Vec::new();
+    }
+    if points.len() == 1 || around(points).1 <= reach {
+        return vec![points];
+    }
+    let (first, second) = points.split_at(points.len() / 2);
+    [groups(first, reach), groups(second, reach)].concat()
+}
+
+/// The middle of some points, and how far the half vector of a light direction may turn from it to any of them.
+fn around(group: &[Seen]) -> (Point, f64) {
+    if let [only] = group {
+        return (only.point, 0.0);
+    }
+    let mean = |f: fn(&Point) -> Vec3| group.iter().map(|seen| f(&seen.point)).sum::<Vec3>().normalize_or_zero();
+    let (normal, view) = (mean(|p| p.normal), mean(|p| p.view));
+    // The lowest view bounds masking for all.
+    let cos_o = group.iter().map(|seen| seen.point.cos_o).fold(f64::INFINITY, f64::min);
+    let distance = |p: &Point| (p.normal - normal).length() + (p.view - view).length();
+    let reach = group.iter().map(|seen| distance(&seen.point)).fold(0.0, f64::max);
+    (Point { normal, view, cos_o }, reach)
 }
 
 /// Splits ascending widths into runs that share a cut.
