@@ -82,7 +82,7 @@ fn picture(outcome: &FitOutcome, pictures: &Pictures) -> Image {
     let mut panels: Vec<(Image, [String; 2])> =
         vec![(pictures.displayed(&pictures.reference), ["photo".to_owned(), "measured-like noise".to_owned()])];
     for (gamma, image) in outcome.extra.iter().filter(|(gamma, _)| SHOWN.contains(gamma)) {
-        let label = if *gamma == 1.0 { "gamma 1 (least squares)".to_owned() } else { format!("gamma {gamma}") };
+        let label = if *gamma == 1.0 { "gamma 1 (L2)".to_owned() } else { format!("gamma {gamma}") };
         panels.push((pictures.displayed_rendering(image), [label, format!("CSSIM {:.4}", score(*gamma))]));
     }
     let won = [format!("winner: gamma {}", winner.candidate.gamma), format!("CSSIM {:.4}", winner.cssim)];
@@ -91,7 +91,7 @@ fn picture(outcome: &FitOutcome, pictures: &Pictures) -> Image {
         let label = ["polished".to_owned(), format!("CSSIM {:.4}", polished.cssim)];
         panels.push((pictures.displayed(&pictures.matched), label));
     }
-    let label = ["difference to the photo".to_owned(), format!("pale yellow: {} and more", pictures.difference_scale)];
+    let label = ["difference".to_owned(), format!("yellow: {} and up", pictures.difference_scale)];
     panels.push((pictures.difference.clone(), label));
     let panels: Vec<Panel<'_>> = panels.iter().map(|(image, label)| Panel { image, label: label.clone() }).collect();
     strip(&panels)
