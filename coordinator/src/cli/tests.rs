@@ -84,7 +84,7 @@ fn every_group_of_flags_reaches_the_settings() {
     let flags = "--mask m.png --env-mapping angular --env-rotation -30 --camera perspective:30 --sphere -5,6.5,100 \
                  --model cook-torrance --gammas 1:2:0.5 --samples full --sampling uniform --subsets 4 --search pattern \
                  --polish off --judge object --display-exposure from:old.json --seed 7 --max-cssim 0.1 --workers 0 \
-                 --listen 10.0.0.1:4100 --advertise node7:4101 --access a.json --wait-for-workers 90s --grace 1h \
+                 --listen 10.0.0.1:4100 --advertise node7:4101 --wait-for-workers 90s --grace 1h \
                  --progress json";
     let settings = fit(&[&PLAIN[..], &flags.split_whitespace().collect::<Vec<_>>()].concat()).unwrap();
     assert_eq!(settings.mask, Some("m.png".into()));
