@@ -25,6 +25,7 @@ fn folder() -> tempfile::TempDir {
     write_exr(&at("tiny.exr"), &grey(1, 1));
     write_exr(&at("square.exr"), &grey(16, 16));
     write_exr(&at("negative.exr"), &image(16, 8, |c, r| [if (c, r) == (3, 2) { -0.5 } else { 1.0 }; 3]));
+    write_exr(&at("nan24.exr"), &image(24, 24, |c, r| [0.1, if (c, r) == (5, 4) { f32::NAN } else { 1.0 }, 0.1]));
     write_exr(&at("nan.exr"), &image(16, 8, |c, r| [0.1, if (c, r) == (5, 4) { f32::NAN } else { 1.0 }, 0.1]));
     write_png(&at("map.png"), &grey(16, 8));
     write_png(&at("small.png"), &grey(12, 12));
@@ -121,7 +122,7 @@ fn images_to_compare() {
         ("photo.exr half.exr", &["cannot use half.exr as the image", "not a complete OpenEXR file"]),
         ("photo.exr map.exr", &["cannot compare photo.exr and map.exr", "expected 24 x 24 pixels, found 16 x 8"]),
         ("tiny.exr tiny.exr", &["1 x 1 pixels is too small", "at least 11 x 11"]),
-        ("nan.exr nan.exr", &["too small"]),
+        ("nan24.exr nan24.exr", &["found NaN", "column 5, row 4"]),
         ("photo.exr photo.exr --mask small.png", &["cannot use small.png as the mask", "12 x 12", "24 x 24"]),
         ("photo.exr photo.exr --mask coloured.png", &["cannot use coloured.png as the mask", "column 7, row 0"]),
         ("photo.exr photo.exr --mask missing.png", &["cannot use missing.png as the mask", "no such file"]),

@@ -124,6 +124,7 @@ fn what_is_not_there_yet_says_so_and_what_to_do() {
         ("study study.toml --out study".into(), &["lookalike study is not there yet"]),
         ("report run".into(), &["lookalike report is not there yet"]),
         ("access new --address node7:4100 -o a.json".into(), &["lookalike access is not there yet"]),
+        (format!("{fit} --access a.json"), &["--access is not there yet", "OUT/access.json"]),
         (format!("{fit} --resume"), &["--resume is not there yet", "another --out"]),
         (format!("{fit} --exposure-gain rgb"), &["degenerate", "--anchor"]),
         (format!("{fit} --exposure-gain rgb --anchor f0=.04"), &["--anchor is not there yet"]),

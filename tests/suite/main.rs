@@ -1,5 +1,11 @@
 //! One test binary of modules, so that the suite links once.
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::print_stdout,
+    reason = "tests may panic and say what they skip; clippy.toml's exceptions do not reach their helper functions"
+)]
+
 mod bad_input;
 mod cli;
 mod cluster;

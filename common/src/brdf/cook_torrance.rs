@@ -145,8 +145,8 @@ impl Lobe for CookTorranceLobe {
 
 /// `D G / (4 n.v)`; zero below the horizon of the light and for half vectors below the surface.
 ///
-/// Spread: with `u = tan^2(th)` the Laplacian of `exp(-u/m^2)` is `4 (u - m^2) / m^4` times itself; a quarter of it times the mean
-/// square distance is the second-order term.
+/// Spread: with `u = tan^2(th)` and `D = exp(-u / m^2)`, `D'/D = -1 / m^2` and `D''/D = 1 / m^4`. The second-order term
+/// `tr(S) D' + 2 u s_r D''`, `s_r` the spread along the offset from the normal, is the factor below.
 #[inline(always)]
 fn kernel(g: &Angles, spread: &Spread, m: f64) -> f64 {
     let m2 = m * m;
@@ -154,6 +154,6 @@ fn kernel(g: &Angles, spread: &Spread, m: f64) -> f64 {
     let cos_i = g.cos_i.max(0.0);
     let distribution = exp_nonpositive(-g.sin2_h / (cos2 * m2)) / (PI * m2 * cos2 * cos2);
     let masking = (2.0 * g.cos_h.max(0.0) * g.cos_o.min(cos_i) / g.cos_d).min(1.0);
-    let blur = second_order(spread.half2 * (g.sin2_h / cos2 - m2) / (m2 * m2));
+    let blur = second_order(spread.half2 * (2.0 * spread.radial * g.sin2_h / cos2 - m2) / (m2 * m2));
     distribution * masking * blur / (4.0 * g.cos_o)
 }

@@ -18,7 +18,7 @@ use super::{
     lobe::{accumulate, second_order},
 };
 use crate::math::Rgb;
-use std::f64::consts::PI;
+use std::f64::consts::FRAC_1_PI;
 
 /// The model `ggx`.
 #[derive(Debug, Clone, Copy)]
@@ -128,8 +128,8 @@ impl Lobe for GgxLobe {
 /// `D V n.l`: with `d = sin^2(th) + a^2 cos^2(th)` the distribution is `a^2 / (pi d^2)`, and
 /// `V n.l = n.l / (2 (n.l s(n.v) + n.v s(n.l)))`, `s(c) = sqrt(a^2 + (1 - a^2) c^2)`.
 ///
-/// Spread: with `u = sin^2(th)`, `D = a^2 / (pi (u + a^2)^2)` near the peak has the Laplacian `8 D (2u - a^2) / (u + a^2)^2`; a
-/// quarter of it times the mean square distance is the second-order term.
+/// Spread: with `u = sin^2(th)`, `D = a^2 / (pi (u + a^2)^2)` near the peak; `D'/D = -2 / (u + a^2)`, `D''/D = 6 / (u + a^2)^2`. The
+/// second-order term `tr(S) D' + 2 u s_r D''`, `s_r` the spread along the offset from the normal, is the factor below.
 #[inline(always)]
 fn kernel(g: &Angles, spread: &Spread, alpha: f64) -> f64 {
     let a2 = alpha * alpha;
@@ -137,6 +137,9 @@ fn kernel(g: &Angles, spread: &Spread, alpha: f64) -> f64 {
     let cos_i = g.cos_i.max(0.0);
     let s_o = (a2 + (1.0 - a2) * g.cos_o * g.cos_o).sqrt();
     let s_i = (a2 + (1.0 - a2) * cos_i * cos_i).sqrt();
-    let blur = second_order(2.0 * spread.half2 * (2.0 * g.sin2_h - a2) / (d * d));
-    a2 * cos_i * blur / (2.0 * PI * d * d * (cos_i * s_o + g.cos_o * s_i))
+    // One division for both quotients: by d^2, and by d^2 times the denominator of V.
+    let visibility = cos_i * s_o + g.cos_o * s_i;
+    let inverse = 1.0 / (d * d * visibility);
+    let excess = 2.0 * spread.half2 * ((6.0 * spread.radial - 1.0) * g.sin2_h - a2);
+    a2 * cos_i * second_order(excess * visibility * inverse) * inverse * (0.5 * FRAC_1_PI)
 }

@@ -26,14 +26,16 @@ pub struct Incident {
 
 /// Mean square distance of light from its mean direction: total over both axes, as square chords of the unit sphere.
 ///
-/// A lobe adds the second-order term `1/2 tr(H S)` of its mean over the spread, taken as isotropic, so that a quadrature may
-/// use fewer directions.
+/// A lobe adds the second-order term `1/2 tr(H S)` of its mean over the spread, which is isotropic in the light's directions, so
+/// that a quadrature may use fewer of them.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Spread {
     /// Of the light direction.
     pub light2: f64,
     /// Of the half vector that goes with it.
     pub half2: f64,
+    /// Share of `half2` along the half vector's offset from the normal (the rest is across it), in [0, 1]: a half if isotropic.
+    pub radial: f64,
 }
 
 /// The factor `1 + x` of a second-order correction, kept where a second-order expansion means anything.
@@ -65,7 +67,7 @@ pub trait Lobe: Debug + Sync {
 }
 
 /// Widths handled in one pass; longer lists go through in chunks.
-const LANES: usize = 12;
+const LANES: usize = 8;
 
 /// The generic loop behind every [`Lobe::accumulate`]: directions outside, widths inside, so that the widths fill SIMD lanes.
 ///

@@ -108,7 +108,7 @@ impl Reflectance for MerlTable {
         self.eval(wi_local, wo_local) * wi_local.z.max(0.0)
     }
 
-    /// The widths of the GGX lobes whose fall-off passes through that of the table at a few levels, and 1 for the rest.
+    /// A few widths of GGX from the core of the table's lobes to their tails, and 1 for the rest.
     fn sampling_alphas(&self) -> Vec<f64> {
         self.alphas.clone()
     }

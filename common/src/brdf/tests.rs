@@ -221,6 +221,16 @@ fn accumulation_has_the_bits_of_a_scalar_loop() {
     }
 }
 
+/// Tables have one grid of widths. A model with two (such as a clear coat of its own width) needs a grid for each first.
+#[test]
+fn no_model_has_more_than_one_width() {
+    for model in MODELS {
+        let mut widths: Vec<usize> = model.lobes().iter().filter_map(|b| b.width).collect();
+        widths.dedup();
+        assert!(widths.len() <= 1, "{}", model.name());
+    }
+}
+
 #[test]
 fn bad_parameters_are_named() {
     let message = |p: Vec<f64>| Material::new(&Ggx, p).unwrap_err().to_string();

@@ -87,6 +87,9 @@ impl Default for Method {
     }
 }
 
+/// Most searches of one fit: their candidates travel to stage two in one message.
+pub const MOST_SEARCHES: usize = 5000;
+
 /// What is wrong with a method.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
@@ -103,6 +106,20 @@ pub enum MethodError {
     /// Nothing to search.
     #[error("the number of subsets must be at least 1, found 0")]
     NoSubsets,
+    /// All subsets would be the same.
+    #[error(
+        "all pixels taken {subsets} times are {subsets} times the same: leave out the subsets, or give a number of samples"
+    )]
+    SameSubsets {
+        /// The number of subsets.
+        subsets: u32,
+    },
+    /// Gammas times subsets.
+    #[error("{found} searches (gammas times subsets) are more than the {MOST_SEARCHES} that one fit may have")]
+    TooManySearches {
+        /// Gammas times subsets.
+        found: usize,
+    },
 }
 
 impl Method {
@@ -121,6 +138,13 @@ impl Method {
         }
         if self.subsets == 0 {
             return Err(MethodError::NoSubsets);
+        }
+        if self.samples == SampleCount::Full && self.subsets > 1 {
+            return Err(MethodError::SameSubsets { subsets: self.subsets });
+        }
+        let searches = self.gammas.len() * self.subsets as usize;
+        if searches > MOST_SEARCHES {
+            return Err(MethodError::TooManySearches { found: searches });
         }
         Ok(())
     }

@@ -5,6 +5,7 @@
 //! 3. stage two, [`judge_candidates`]: render the candidates in full, keep the one of lowest CSSIM,
 //! 4. stage three, [`polish`]: a short pattern search on CSSIM itself from the winner.
 //!
+//! [`nodes`] wraps these steps as nodes of the job graph, and [`FitPlanner`] joins them.
 
 mod best;
 mod candidate;
@@ -20,7 +21,7 @@ mod wire;
 
 pub use best::BestScore;
 pub use candidate::{Candidate, SAME, distinct, needed_span};
-pub use method::{AtZero, JudgedBy, Method, MethodError, SearchKind, Start, gamma_range};
+pub use method::{AtZero, JudgedBy, MOST_SEARCHES, Method, MethodError, SearchKind, Start, gamma_range};
 pub use objective::Objective;
 pub use plan::{FitError, FitOutcome, FitPlanner};
 pub use polish::{INITIAL_MESH, MAX_EVALUATIONS, Polished, polish};

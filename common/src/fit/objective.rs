@@ -39,7 +39,7 @@ impl<'a> Objective<'a> {
         compression: Compression,
     ) -> Self {
         assert!(table.pixels == subset.pixels.len() && photo.len() == table.pixels, "table, subset and photo differ");
-        let compress = |c: usize| photo.iter().map(|rgb| compression.apply(f64::from(rgb[c]))).collect();
+        let compress = |c: usize| photo.iter().map(|rgb| compression.apply(observed(rgb[c]))).collect();
         let planes = || (0..term_count(model)).map(|_| table.planes()).collect();
         Self {
             model,
@@ -102,6 +102,14 @@ impl LeastSquaresProblem for Objective<'_> {
     }
 }
 
+/// A value of the photo as Eq. 1 sees it. Radiance is not negative; a colour outside the gamut of Rec. 709, or noise around
+/// black, may be. At gamma = 3 the tangent below the knee is so steep (about 1e4 at a mean of 0.2) that one channel at -0.01 would
+/// outweigh all other pixels, so the photo's negative values count as 0 (a deviation from design section 1, which treats A and B
+/// alike; B keeps its order below 0).
+pub(super) fn observed(value: f32) -> f64 {
+    f64::from(value).max(0.0)
+}
+
 /// Pairs (entry of the width, term) of every lobe that has a width.
 fn width_entries(model: &dyn Model) -> Vec<(usize, usize)> {
     let mut pairs = Vec::new();
@@ -148,6 +156,19 @@ mod tests {
             LobeTable { knots, terms, values }
         });
         TransportTable { pixels, lobes: lobes.collect() }
+    }
+
+    #[test]
+    fn a_negative_channel_of_the_photo_weighs_no_more_than_a_black_one() {
+        let model = MODELS[0];
+        let table = table(model, 2);
+        let subset = PixelSubset { pixels: vec![[0, 0], [1, 0]], weights: vec![1.0; 2] };
+        let cost = |red: f32| {
+            let photo = [[red, 0.2, 0.7], [0.4, 0.3, 0.2]];
+            Objective::new(model, &table, &subset, &photo, Compression::new(3.0, 0.2)).cost(&[0.2; 7])
+        };
+        assert_eq!(cost(-0.01).to_bits(), cost(0.0).to_bits());
+        assert!(cost(0.0) < 10.0);
     }
 
     #[test]

@@ -20,14 +20,17 @@ use super::{
 };
 use crate::{
     brdf::flat_bounds,
-    graph::{Blob, BlobHash, GraphEdit, Input, NodeFailure, NodeId, NodeSpec, Placement, PlanError, Planner},
+    graph::{
+        Blob, BlobHash, GraphEdit, Input, MAX_BLOB_BYTES, MAX_INPUTS, NodeFailure, NodeId, NodeSpec, Placement,
+        PlanError, Planner,
+    },
     image::Image,
     math::{luminance, widen},
     metric::ErrorMap,
     render::{
         knots::{Knots, PER_OCTAVE},
-        subset::{self, PixelSubset},
-        transport::{Accuracy, Pixel, TILE},
+        subset::{self, PixelSubset, SampleCount},
+        transport::{Accuracy, Pixel, tile_order},
     },
     scene::Capture,
 };
@@ -60,6 +63,18 @@ pub enum FitError {
     /// The photo has no light to fit to.
     #[error("every usable pixel of the photo is black: check the exposure of the photo and the place of the object")]
     Black,
+    /// More than one message can carry.
+    #[error("{what} has {found} pixels, more than the {limit} that a fit can take: {remedy}")]
+    TooLarge {
+        /// What is too large.
+        what: &'static str,
+        /// Its pixels.
+        found: usize,
+        /// The most there may be.
+        limit: usize,
+        /// What to do.
+        remedy: &'static str,
+    },
 }
 
 /// The outcome of a fit.
@@ -130,6 +145,7 @@ impl FitPlanner {
     /// When a setting is out of range or the photo is black.
     pub fn new(capture: Arc<Capture>, method: Method, exposure: f64) -> Result<Self, FitError> {
         method.check()?;
+        check_sizes(&capture, &method)?;
         let candidates = intensities(&capture);
         let mean_radiance = candidates.iter().map(|c| c.intensity).sum::<f64>() / candidates.len() as f64;
         if mean_radiance.is_nan() || mean_radiance <= 0.0 {
@@ -330,6 +346,10 @@ impl FitPlanner {
 
     fn selected(&mut self, output: &Blob, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
         let ScoresWire(scores) = read("scores", output).map_err(other)?;
+        if scores.len() != self.candidates.len() {
+            let (expected, found) = (self.candidates.len(), scores.len());
+            return Err(PlanError::new(format!("expected {expected} scores, found {found}")));
+        }
         let candidates = std::mem::take(&mut self.candidates).into_values();
         self.judged = candidates
             .zip(scores)
@@ -350,13 +370,15 @@ impl FitPlanner {
 
     /// Polish ends, or goes on with a wider table where it ran into the edge of this one.
     fn polished(&mut self, output: &Blob, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
-        let mut polished = read::<PolishedWire>("polish", output).and_then(PolishedWire::polished).map_err(other)?;
+        let model = self.method.model;
+        let mut polished =
+            read::<PolishedWire>("polish", output).and_then(|wire| wire.polished(model)).map_err(other)?;
         self.polish_rounds += 1;
         self.polish_evaluations += polished.evaluations;
         polished.evaluations = self.polish_evaluations;
-        let goes_on = polished.at_table_edge
-            && self.polish_rounds < MAX_POLISH_ROUNDS
-            && self.polish_evaluations < MAX_EVALUATIONS;
+        // Another table pays only with evaluations left for a poll in every direction.
+        let enough_left = self.polish_evaluations + 2 * polished.parameters.len() < MAX_EVALUATIONS;
+        let goes_on = polished.at_table_edge && self.polish_rounds < MAX_POLISH_ROUNDS && enough_left;
         self.polish_start = polished.parameters.clone();
         self.best.set(self.method.judge.pick(polished.cssim, polished.cssim_object));
         self.polished = Some(polished);
@@ -447,8 +469,17 @@ impl Planner for FitPlanner {
 
     fn completed(&mut self, node: NodeId, output: &Blob, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
         if let Some(place) = self.searches.remove(&node) {
-            let candidate =
-                read::<CandidateWire>("candidate", output).and_then(CandidateWire::candidate).map_err(other)?;
+            let candidate = read::<CandidateWire>("candidate", output)
+                .and_then(|wire| wire.candidate(self.method.model))
+                .map_err(other)?;
+            let gammas = &self.method.gammas;
+            let asked = (gammas[place % gammas.len()], index(place / gammas.len()));
+            if (candidate.gamma, candidate.subset) != asked {
+                let found = (candidate.gamma, candidate.subset);
+                return Err(PlanError::new(format!(
+                    "expected the candidate of gamma and subset {asked:?}, found {found:?}"
+                )));
+            }
             self.candidates.insert(place, candidate);
             return if self.searches.is_empty() { self.searched(graph) } else { Ok(()) };
         }
@@ -460,6 +491,34 @@ impl Planner for FitPlanner {
         }
     }
 }
+
+/// Refuses what would not fit into a blob, or into memory, before any work is done.
+fn check_sizes(capture: &Capture, method: &Method) -> Result<(), FitError> {
+    let size = |image: &Image| image.width() * image.height();
+    let map = capture.environment();
+    let usable = if method.samples == SampleCount::Full { capture.counts().usable } else { 0 };
+    let checks = [
+        ("the photo", size(capture.photo()), MOST_PHOTO, "crop it around the object, or scale it down"),
+        ("the environment map", map.width() * map.height(), MOST_MAP, "scale it down"),
+        ("the full set of samples", usable, MOST_FULL, "scale the photo down, or draw a number of samples"),
+    ];
+    for (what, found, limit, remedy) in checks {
+        if found > limit {
+            return Err(FitError::TooLarge { what, found, limit, remedy });
+        }
+    }
+    Ok(())
+}
+
+/// Most pixels of a photo: its pictures (32 bytes per pixel) travel in one blob, its table in [`MAX_INPUTS`] shards.
+const MOST_PHOTO: usize = 8_000_000;
+/// Most texels of a map, 12 bytes each in one blob.
+const MOST_MAP: usize = 20_000_000;
+/// Most pixels of stage one: their table takes about 1.2 kB each, more than once.
+const MOST_FULL: usize = 200_000;
+
+const _: () = assert!(MOST_PHOTO * 32 < MAX_BLOB_BYTES && MOST_PHOTO / FULL_SHARD + 2 < MAX_INPUTS);
+const _: () = assert!(MOST_MAP * 12 < MAX_BLOB_BYTES);
 
 /// The grid of widths of stage one: the model's whole range.
 fn stage_one_knots(method: &Method) -> Knots {
@@ -485,7 +544,7 @@ fn covered_pixels(capture: &Capture) -> Vec<Pixel> {
     let coverage = capture.scoring_coverage();
     let covered = coverage.iter().enumerate().filter(|(_, c)| **c > 0.0);
     let mut pixels: Vec<Pixel> = covered.map(|(i, _)| [index(i % width), index(i / width)]).collect();
-    pixels.sort_by_key(|[column, row]| (row / TILE, column / TILE, *row, *column));
+    pixels.sort_by_key(|pixel| tile_order(*pixel));
     pixels
 }
 

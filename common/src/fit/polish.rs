@@ -91,8 +91,13 @@ fn polish_bounds(view: &FullView<'_>) -> Result<(Bounds, [bool; 2]), SearchError
     for (entry, role) in flat_roles(view.model).into_iter().enumerate() {
         if let (Role::Width, Some((first, last))) = (role, view.table.span()) {
             tighter = [first > lower[entry] * (1.0 + 1e-9), last < upper[entry] * (1.0 - 1e-9)];
-            lower[entry] = first.max(lower[entry]);
-            upper[entry] = last.min(upper[entry]);
+            // Where the table reaches the model's bound, its outermost knot may miss it by a rounding: the bound counts.
+            if tighter[0] {
+                lower[entry] = first;
+            }
+            if tighter[1] {
+                upper[entry] = last;
+            }
         }
     }
     let scales: Vec<Scale> = model_bounds.scales().to_vec();

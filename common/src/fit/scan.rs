@@ -4,7 +4,7 @@
 //! parameters enter linearly: at gamma = 1 their best values are a small bounded linear least-squares problem per
 //! channel. Terms of fixed weight move to the right-hand side.
 
-use super::objective::flat_roles;
+use super::objective::{flat_roles, observed};
 use crate::{
     brdf::{Channels, Model, Role, flat_bounds, flat_len, term_count},
     math::Rgb,
@@ -74,7 +74,7 @@ fn solve_linear(model: &dyn Model, terms: &[Planes], weights: &[f64], photo: &[[
             for (x, column) in row.iter_mut().zip(&columns) {
                 *x = scale * sum(&|t| column[t][channel] - fixed[t][channel]);
             }
-            normal.add_row(&row, scale * (f64::from(photo[p][channel]) - sum(&|t| fixed[t][channel])));
+            normal.add_row(&row, scale * (observed(photo[p][channel]) - sum(&|t| fixed[t][channel])));
         }
         let bound = |b: &[f64]| entries.iter().map(|&e| b[e]).collect::<Vec<f64>>();
         let Ok(solution) = bvls::solve(&normal, &bound(&lower), &bound(&upper)) else { return false };

@@ -2,6 +2,7 @@
 
 use super::{Candidate, Judged, Polished, SearchFailure};
 use crate::{
+    brdf::{Model, flat_bounds},
     graph::NodeFailure,
     image::Image,
     light::Environment,
@@ -136,10 +137,10 @@ impl TableWire {
         let lobe = |lobe: LobeWire| {
             let knots = lobe.knots.map(KnotsWire::knots).transpose()?;
             let table = LobeTable { knots, terms: lobe.terms as usize, values: lobe.values };
-            let expected = table.slices() * table.terms * 3 * pixels;
-            if table.values.len() != expected {
+            let expected = table.slices().checked_mul(3 * table.terms).and_then(|n| n.checked_mul(pixels));
+            if expected != Some(table.values.len()) {
                 let found = table.values.len();
-                return Err(refused("transport table", format!("expected {expected} values, found {found}")));
+                return Err(refused("transport table", format!("expected {expected:?} values, found {found}")));
             }
             Ok(table)
         };
@@ -170,7 +171,12 @@ impl CandidateWire {
         }
     }
 
-    pub(super) fn candidate(self) -> Result<Candidate, NodeFailure> {
+    /// The candidate, once it is one of `model`: as many parameters as it has, finite and inside their bounds.
+    pub(super) fn candidate(self, model: &dyn Model) -> Result<Candidate, NodeFailure> {
+        check_parameters("candidate", model, &self.parameters)?;
+        if !self.cost.is_finite() {
+            return Err(refused("candidate", format!("a cost of {}", self.cost)));
+        }
         Ok(Candidate {
             gamma: self.gamma,
             subset: self.subset,
@@ -215,7 +221,9 @@ impl PolishedWire {
         }
     }
 
-    pub(super) fn polished(self) -> Result<Polished, NodeFailure> {
+    /// The outcome, once its parameters are some of `model`.
+    pub(super) fn polished(self, model: &dyn Model) -> Result<Polished, NodeFailure> {
+        check_parameters("polish", model, &self.parameters)?;
         Ok(Polished {
             parameters: self.parameters,
             cssim: self.cssim,
@@ -225,6 +233,15 @@ impl PolishedWire {
             at_table_edge: self.at_table_edge,
         })
     }
+}
+
+fn check_parameters(what: &str, model: &dyn Model, parameters: &[f64]) -> Result<(), NodeFailure> {
+    let (lower, upper) = flat_bounds(model.parameters());
+    let inside = parameters.iter().zip(lower.iter().zip(&upper)).all(|(p, (l, u))| (l..=u).contains(&p));
+    if parameters.len() != lower.len() || !inside {
+        return Err(refused(what, format!("parameters {parameters:?} are none of {}", model.name())));
+    }
+    Ok(())
 }
 
 fn termination(name: &str) -> Result<Termination, NodeFailure> {
@@ -240,6 +257,7 @@ impl From<SearchFailure> for NodeFailure {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::brdf::Ggx;
 
     #[test]
     fn a_table_survives_the_wire_and_a_short_one_is_refused() {
@@ -272,6 +290,10 @@ mod tests {
             evaluations: 1,
             termination: "because".to_owned(),
         };
-        assert!(candidate.candidate().unwrap_err().to_string().contains("because"));
+        assert!(candidate.clone().candidate(&Ggx).unwrap_err().to_string().contains("none of ggx"));
+        let inside = CandidateWire { parameters: vec![0.5; 7], ..candidate };
+        assert!(inside.clone().candidate(&Ggx).unwrap_err().to_string().contains("because"));
+        let outside = CandidateWire { parameters: vec![f64::NAN; 7], ..inside };
+        assert!(outside.candidate(&Ggx).unwrap_err().to_string().contains("none of ggx"));
     }
 }

@@ -67,7 +67,7 @@ pub fn fifth_power(x: f64) -> f64 {
 pub fn exp_nonpositive(x: f64) -> f64 {
     // Adding 1.5 * 2^52 leaves the nearest integer in the low mantissa bits.
     const ROUND: f64 = 6_755_399_441_055_744.0;
-    const LN2_HIGH: f64 = 6.931_471_803_691_238_2e-1;
+    const LN2_HIGH: f64 = 6.931_471_803_691_238e-1;
     const LN2_LOW: f64 = 1.908_214_929_270_587_7e-10;
     let x_clamped = if x < -708.0 { -708.0 } else { x };
     let shifted = x_clamped * std::f64::consts::LOG2_E + ROUND;

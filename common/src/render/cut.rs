@@ -8,7 +8,7 @@
 use super::pyramid::{Cell, LightPyramid, Node, strongest};
 use crate::{
     brdf::{Angles, Incident, Spread},
-    math::{Vec3, widen},
+    math::{Rgb, Vec3, widen},
 };
 use std::f64::consts::PI;
 
@@ -90,48 +90,42 @@ impl Cut {
     /// The nodes of the cut as light that falls on a surface point, their energies times `share`.
     pub fn lights(&mut self, point: &Point, share: f64) -> &[Incident] {
         self.lights.clear();
+        let side = point.view.cross(point.normal);
         for node in &self.nodes {
             let angles = Angles::new(point.normal, widen(node.centroid), point.view);
             if angles.cos_i > 0.0 {
-                let spread = spread(node, &angles);
-                let angles = Angles { cos_d: fresnel_cosine(angles.cos_d, &spread), ..angles };
                 let energy = node.energy.map(|e| f64::from(e) * share);
+                let spread = spread(node, side, widen(node.centroid), &angles);
                 self.lights.push(Incident { angles, energy, spread });
             }
         }
         &self.lights
     }
 
-    /// Number of nodes of the last cut.
-    #[must_use]
-    pub fn len(&self) -> usize {
-        self.nodes.len()
-    }
-
-    /// Whether the last cut has no node.
-    #[must_use]
-    pub fn is_empty(&self) -> bool {
-        self.nodes.is_empty()
+    /// The nodes of the cut: direction of the energy's centroid (world, unit up to a rounding) and energy, for reflectances that
+    /// are no basis lobes.
+    pub fn directions(&self) -> impl Iterator<Item = (Vec3, Rgb)> + '_ {
+        self.nodes.iter().map(|node| (widen(node.centroid), widen(node.energy)))
     }
 }
 
-/// The half vector turns by half of the light's step in the plane of reflection, by `1/(2 v.h)` of it across.
-fn spread(node: &Node, angles: &Angles) -> Spread {
-    let light2 = f64::from(node.spread2);
-    let cos_d2 = (angles.cos_d * angles.cos_d).max(0.05);
-    Spread { light2, half2: 0.125 * light2 * (1.0 + 1.0 / cos_d2) }
-}
-
-/// The `v.h` whose `F5` is the mean of `F5` over the node, to second order.
+/// The half vector turns by half of the light's step in the plane of reflection, by `1/(2 v.h)` of it across: at grazing view far more
+/// across than along. How much of that lies along the half vector's offset from the normal follows from the share of the
+/// offset that is across the plane.
 ///
-/// With `c = v.h` the Laplacian of `F5 = (1 - c)^5` over light directions is `5 (1 - c)^4 (1 + 7 c / 4 - 1 / (4 c))`; a quarter of it
-/// times the mean square distance, divided by the derivative `-5 (1 - c)^4`, is the step. `F5` is convex: without it the
-/// `F5` part is too dark near the rim.
-fn fresnel_cosine(cos_d: f64, spread: &Spread) -> f64 {
-    let c = cos_d.max(0.05);
-    let step = 0.25 * spread.light2 * (1.0 + 1.75 * c - 0.25 / c);
-    cos_d - step.clamp(-0.5 * cos_d, 0.5 * cos_d)
+/// `side` is `v x n`. With `l.v = 2 (v.h)^2 - 1`, `|l x v|^2 = 4 (v.h)^2 (1 - (v.h)^2)`.
+fn spread(node: &Node, side: Vec3, light: Vec3, angles: &Angles) -> Spread {
+    let light2 = f64::from(node.spread2);
+    let cos_d2 = (angles.cos_d * angles.cos_d).max(LEAST_COS_D * LEAST_COS_D);
+    let offset = light.dot(side);
+    let square = 4.0 * cos_d2 * (1.0 - cos_d2) * angles.sin2_h;
+    let share = if square > 0.0 { (offset * offset / square).min(1.0) } else { 0.5 };
+    let radial = (cos_d2 * (1.0 - share) + share) / (1.0 + cos_d2);
+    Spread { light2, half2: 0.125 * light2 * (1.0 + 1.0 / cos_d2), radial }
 }
+
+/// `v.h` below this is taken as this: light that comes from straight behind the surface turns the half vector without bound.
+const LEAST_COS_D: f64 = 0.05;
 
 /// Bounds the error of taking a node as a point, for the surface points around one and a band.
 struct Bound<'a> {
@@ -165,8 +159,8 @@ impl<'a> Bound<'a> {
         let horizon = cos_i < f64::from(node.radius) + self.reach;
         let error = match self.band {
             // The cosine has curvature cos; at the horizon it has a kink, a first-order error over the part that is cut off.
-            Band::Diffuse if horizon => KINK * spread2.sqrt(),
-            Band::Diffuse => 0.5 * spread2 * cos_i.abs(),
+            Band::Diffuse if horizon => DIFFUSE_CARE * KINK * spread2.sqrt(),
+            Band::Diffuse => DIFFUSE_CARE * 0.5 * spread2 * cos_i.abs(),
             Band::Glossy(..) => {
                 let (distribution, curvature) = self.peak_over(node, centroid);
                 let kink = if horizon { KINK * (spread2.sqrt() / self.lower).min(1.0) } else { 0.0 };
@@ -186,8 +180,10 @@ impl<'a> Bound<'a> {
         let turn = inverse.sqrt().min(10.0);
         let along = self.point.normal.dot(half);
         let sin2 = (1.0 - along * along * inverse).max(0.0);
-        let nearest = (sin2.sqrt() - f64::from(node.radius) * turn - self.reach).max(0.0);
-        let t2 = if along > 0.0 { nearest * nearest } else { 1.0 };
+        // A half vector below the surface counts as one in it; the node may still hold the mirror direction.
+        let sin = if along > 0.0 { sin2.sqrt() } else { 1.0 };
+        let nearest = (sin - f64::from(node.radius) * turn - self.reach).max(0.0);
+        let t2 = nearest * nearest;
         let d = |a2: f64| {
             let q = t2 + a2 * (1.0 - t2);
             (a2 / (PI * q * q), q)
@@ -199,6 +195,9 @@ impl<'a> Bound<'a> {
         (distribution, 2.0 * turn * turn * sharpest / q)
     }
 }
+
+/// The cosine lobe needs few nodes, whose errors average less: it gets a tighter tolerance.
+const DIFFUSE_CARE: f64 = 6.0;
 
 /// Share of a node's size by which a kink at the horizon can shift its value.
 const KINK: f64 = 0.1;

@@ -29,7 +29,7 @@ pub fn grid(n: u32) -> Vec<Position> {
 }
 
 /// Gauss-Legendre order per axis. With the turn over the pixel in lobe widths, `q`, the error of order `n` falls as `q^(2n)`;
-/// the limits keep it below 1e-3 of the lobe's peak (see the test).
+/// the limits keep it below 2e-3 of the lobe's peak (see the test).
 fn order(spread_rad: f64, alpha: f64) -> usize {
     let q = spread_rad / alpha;
     LIMITS.iter().position(|&limit| q < limit).map_or(RULES.len() - 1, |i| i)

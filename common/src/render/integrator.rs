@@ -7,7 +7,7 @@
 
 use crate::{
     brdf::Reflectance,
-    light::LightDistribution,
+    light::{LightDistribution, LightSample},
     math::{
         Rgb, Vec3,
         frame::Frame,
@@ -50,7 +50,7 @@ impl Integrator<'_> {
         for (t, &(technique, count)) in techniques.iter().enumerate() {
             let stream = PointStream::new(key(&[self.seed, u64::from(row), u64::from(column), t as u64]));
             for index in 0..count {
-                let [x, y, u, v] = stream.point(index);
+                let [u, v, x, y] = stream.point(index);
                 let position = (f64::from(column) + x, f64::from(row) + y);
                 let Some(surface) = self.geometry.point(position.0, position.1) else { continue };
                 hits += 1;
@@ -88,19 +88,24 @@ impl Integrator<'_> {
         techniques: &[(Technique, u32)],
         reflectance: &dyn Reflectance,
     ) -> Rgb {
-        let world = match technique {
-            Technique::Environment => self.light.sample(u).direction,
-            Technique::Cosine => frame.to_world(warp::cosine_hemisphere(u)),
-            Technique::Lobe(alpha) => {
-                let h = warp::ggx_visible_normal(wo, alpha, u);
-                frame.to_world((2.0 * wo.dot(h) * h - wo).normalize())
+        // Radiance and density of the map are looked up once, and only for directions above the surface.
+        let (wi, radiance, light_pdf) = match technique {
+            Technique::Environment => {
+                let LightSample { direction, radiance, pdf } = self.light.sample(u);
+                (frame.to_local(direction), radiance, pdf)
+            }
+            Technique::Cosine | Technique::Lobe(_) => {
+                let wi = proposal(technique, wo, u);
+                if wi.z <= 0.0 {
+                    return Rgb::ZERO;
+                }
+                let (radiance, pdf) = self.light.radiance_and_pdf(frame.to_world(wi));
+                (wi, radiance, pdf)
             }
         };
-        let wi = frame.to_local(world);
         if wi.z <= 0.0 {
             return Rgb::ZERO;
         }
-        let (radiance, light_pdf) = self.light.radiance_and_pdf(world);
         let cos_h = (wi + wo).normalize().z;
         let density: f64 = techniques
             .iter()
@@ -114,5 +119,16 @@ impl Integrator<'_> {
             })
             .sum();
         if density > 0.0 { radiance * reflectance.eval_cos(wi, wo) / density } else { Rgb::ZERO }
+    }
+}
+
+/// The local direction that a technique of the reflectance proposes; may lie below the surface.
+fn proposal(technique: Technique, wo: Vec3, u: [f64; 2]) -> Vec3 {
+    match technique {
+        Technique::Lobe(alpha) => {
+            let h = warp::ggx_visible_normal(wo, alpha, u);
+            (2.0 * wo.dot(h) * h - wo).normalize()
+        }
+        _ => warp::cosine_hemisphere(u),
     }
 }

@@ -62,7 +62,7 @@ impl LightPyramid {
         while let Some(finest) = levels.last().filter(|l| l.rows > TOP_ROWS) {
             levels.push(coarsen(finest));
         }
-        let energy: f64 = levels[levels.len() - 1].nodes.iter().map(|n| f64::from(strongest(n.energy))).sum();
+        let energy: f64 = levels[0].nodes.iter().map(|n| f64::from(strongest(n.energy))).sum();
         Self { environment, levels, mean_radiance: energy / (4.0 * PI) }
     }
 

@@ -24,7 +24,7 @@ pub struct Accuracy {
     /// Largest error of one node of a cut, in units of the map's mean radiance, for a lobe of unit weight.
     pub tolerance: f64,
     /// Turn of the normal over a pixel, in widths of the sharpest lobe, up to which one position stands for the pixel, as a
-    /// multiple of what keeps the error below 1e-3 of the lobe's peak.
+    /// multiple of what keeps the error below 2e-3 of the lobe's peak.
     pub footprint: f64,
 }
 
@@ -32,7 +32,7 @@ impl Accuracy {
     /// Tables of stage one.
     pub const SUBSET: Self = Self { tolerance: 1e-4, footprint: 1.0 };
     /// Full-resolution tables of stage two and polish.
-    pub const FULL: Self = Self { tolerance: 3e-4, footprint: 3.0 };
+    pub const FULL: Self = Self { tolerance: 1e-3, footprint: 3.0 };
 }
 
 /// What a table is to hold: lobes of `model`, widths on `knots`.
@@ -50,13 +50,13 @@ pub struct TransportPlan {
 const BAND_RATIO: f64 = 4.0;
 
 /// Positions per axis in pixels that the silhouette cuts: the first that sees the object.
-const SILHOUETTE_GRIDS: [u32; 3] = [2, 4, 16];
+const SILHOUETTE_GRIDS: [u32; 2] = [4, 16];
 
 /// Neighbouring pixels within squares of this side may share a cut.
-pub const TILE: u32 = 4;
+const TILE: u32 = 4;
 
 /// Points share a cut while their normals turn by no more than this share of the sharpest lobe's width.
-const REACH: f64 = 0.7;
+const REACH: f64 = 1.0;
 
 /// A surface point of a pixel with its share of the pixel's mean.
 #[derive(Debug, Clone, Copy)]
@@ -73,7 +73,7 @@ type Sums = Vec<Vec<f64>>;
 impl TransportPlan {
     /// Integrates the table of some pixels. A pixel that sees no surface gets zeros.
     ///
-    /// Consecutive pixels of one [`TILE`] share cuts where they may, so lists are best ordered by tiles.
+    /// Consecutive pixels of one tile share cuts where they may, so lists are best ordered by [`tile_order`].
     #[must_use]
     pub fn integrate(&self, geometry: &Geometry, pyramid: &LightPyramid, pixels: &[Pixel]) -> TransportTable {
         let tiles: Vec<&[Pixel]> = pixels.chunk_by(|a, b| tile_of(*a) == tile_of(*b)).collect();
@@ -162,21 +162,27 @@ impl TransportPlan {
     }
 }
 
+/// Sorts pixels so that neighbours may share cuts: by tiles, inside a tile by quarters.
+#[must_use]
+pub fn tile_order([column, row]: Pixel) -> [u32; 6] {
+    let half = TILE / 2;
+    [row / TILE, column / TILE, row / half, column / half, row, column]
+}
+
 fn tile_of([column, row]: Pixel) -> Pixel {
     [column / TILE, row / TILE]
 }
 
-/// Runs of points that may share a cut: the whole tile, else each pixel, else each point.
+/// Runs of points that may share a cut: the whole tile, else halves of it as long as they are too wide, else single points.
 fn groups(points: &[Seen], reach: f64) -> Vec<&[Seen]> {
-    let near = |group: &[Seen]| around(group).1 <= reach;
     if points.is_empty() {
         return Vec::new();
     }
-    if near(points) {
+    if points.len() == 1 || around(points).1 <= reach {
         return vec![points];
     }
-    let pixels = points.chunk_by(|a, b| a.pixel == b.pixel);
-    pixels.flat_map(|pixel| if near(pixel) { vec![pixel] } else { pixel.chunks(1).collect() }).collect()
+    let (first, second) = points.split_at(points.len() / 2);
+    [groups(first, reach), groups(second, reach)].concat()
 }
 
 /// The middle of some points, and how far the half vector of a light direction may turn from it to any of them.

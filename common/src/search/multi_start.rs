@@ -64,7 +64,7 @@ impl Refined for least_squares::Minimum {
 /// Refines the best distinct starts in order of cost and returns their distinct minima, the lowest first.
 ///
 /// # Errors
-/// The first error of `refine`.
+/// The first error of `refine`, when it fails for every start.
 pub fn refine_best<M: Refined, E>(
     starts: &[Start],
     bounds: &Bounds,
@@ -72,8 +72,18 @@ pub fn refine_best<M: Refined, E>(
     mut refine: impl FnMut(&Start) -> Result<M, E>,
 ) -> Result<Vec<M>, E> {
     let selected = select_starts(starts, bounds, options);
-    let minima: Vec<M> = selected.into_iter().map(|i| refine(&starts[i])).collect::<Result<_, E>>()?;
-    Ok(merge_minima(minima, bounds, options.merge_distance))
+    let mut minima = Vec::with_capacity(selected.len());
+    let mut failure = None;
+    for i in selected {
+        match refine(&starts[i]) {
+            Ok(minimum) => minima.push(minimum),
+            Err(error) => failure = failure.or(Some(error)),
+        }
+    }
+    match failure {
+        Some(error) if minima.is_empty() => Err(error),
+        _ => Ok(merge_minima(minima, bounds, options.merge_distance)),
+    }
 }
 
 /// Indices of the starts to refine: by ascending cost, equal costs in their order, alike ones passed over.

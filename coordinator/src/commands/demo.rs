@@ -3,7 +3,7 @@
 use crate::{
     demo::{environment, material, photo},
     fitting::{self, FitJob},
-    outputs::{OutFolder, Panel, Pictures, strip},
+    outputs::{OutFolder, Panel, Pictures, print_result, strip},
     settings::{ClusterSettings, DemoSettings, MethodSettings},
 };
 use anyhow::Context;
@@ -18,7 +18,7 @@ use serde_json::{Value, json};
 use std::{process::ExitCode, sync::Arc, time::Instant};
 
 /// Columns and rows of the photo.
-const SIZE: usize = 256;
+const SIZE: usize = 192;
 /// Rows of the environment map.
 const MAP_ROWS: usize = 256;
 /// The gammas that the strip shows beside the winner.
@@ -55,16 +55,12 @@ pub(crate) fn run(settings: DemoSettings) -> anyhow::Result<ExitCode> {
     let finished = fitting::run(job)?;
     let picture = picture(&finished.outcome, &finished.pictures);
     out.write("strip.png", &png::write(&picture, &[]).context("strip.png")?)?;
-    println(&format!(
+    print_result(&format!(
         "\nlook at {out_name}/strip.png; the same fit from its files:\n  \
-         lookalike fit {out_name}/photo.exr --env {out_name}/environment.exr --out again"
-    ))?;
+         lookalike fit {out_name}/photo.exr --env {out_name}/environment.exr --out again\n"
+    ))
+    .context("cannot write to stdout")?;
     Ok(finished.code)
-}
-
-fn println(text: &str) -> anyhow::Result<()> {
-    use std::io::Write;
-    writeln!(std::io::stdout().lock(), "{text}").context("cannot write to stdout")
 }
 
 /// An input that the demo made, as `fit.json` names it.
@@ -86,7 +82,7 @@ fn picture(outcome: &FitOutcome, pictures: &Pictures) -> Image {
     let mut panels: Vec<(Image, [String; 2])> =
         vec![(pictures.displayed(&pictures.reference), ["photo".to_owned(), "measured-like noise".to_owned()])];
     for (gamma, image) in outcome.extra.iter().filter(|(gamma, _)| SHOWN.contains(gamma)) {
-        let label = if *gamma == 1.0 { "gamma 1 (least squares)".to_owned() } else { format!("gamma {gamma}") };
+        let label = if *gamma == 1.0 { "gamma 1 (L2)".to_owned() } else { format!("gamma {gamma}") };
         panels.push((pictures.displayed_rendering(image), [label, format!("CSSIM {:.4}", score(*gamma))]));
     }
     let won = [format!("winner: gamma {}", winner.candidate.gamma), format!("CSSIM {:.4}", winner.cssim)];
@@ -95,7 +91,7 @@ fn picture(outcome: &FitOutcome, pictures: &Pictures) -> Image {
         let label = ["polished".to_owned(), format!("CSSIM {:.4}", polished.cssim)];
         panels.push((pictures.displayed(&pictures.matched), label));
     }
-    let label = ["difference to the photo".to_owned(), format!("pale yellow: {} and more", pictures.difference_scale)];
+    let label = ["difference".to_owned(), format!("yellow: {} and up", pictures.difference_scale)];
     panels.push((pictures.difference.clone(), label));
     let panels: Vec<Panel<'_>> = panels.iter().map(|(image, label)| Panel { image, label: label.clone() }).collect();
     strip(&panels)

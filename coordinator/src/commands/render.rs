@@ -18,7 +18,7 @@ use lookalike::{
     brdf::{self, Material, Reflectance, flat_names},
     light::LightDistribution,
     math::Rgb,
-    render::image::{Rendering, Shot},
+    render::image::{Noise, Rendering, Shot},
     scene::Circle,
 };
 use std::process::ExitCode;
@@ -112,11 +112,12 @@ fn tell(settings: &RenderSettings, light: &LoadedEnvironment, rendering: &Render
     let Rgb { x: r, y: g, z: b } = rendering.mean_radiance;
     eprintln!("light: {} ({})", light.source.path.display(), light.mapping);
     eprintln!("mean radiance over the object: {r:.5} {g:.5} {b:.5} (linear Rec. 709)");
-    match rendering.relative_noise {
-        Some(noise) => eprintln!(
-            "noise: {:.3} % of the mean radiance (standard error of a pixel, root mean square, from two independent halves of {} \
-             samples)",
-            100.0 * noise,
+    match rendering.noise {
+        Some(Noise { typical, rms }) => eprintln!(
+            "noise: {:.2} % of its luminance for a typical pixel, {:.2} % of the mean radiance by root mean square (standard \
+             errors, from two independent halves of {} samples)",
+            100.0 * typical,
+            100.0 * rms,
             settings.samples
         ),
         None => eprintln!("noise: not estimated (needs two samples per pixel and some light)"),

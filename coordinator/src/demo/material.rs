@@ -87,8 +87,8 @@ const COAT_ALPHA: f64 = 0.03;
 const COAT_F0: Rgb = Rgb::splat(0.04);
 /// A narrow golden lobe of flakes and a broad one, magenta.
 const PIGMENT: [Pigment; 2] = [
-    Pigment { weight: 0.35, alpha: 0.14, f0: Rgb::new(0.80, 0.46, 0.17) },
-    Pigment { weight: 0.50, alpha: 0.48, f0: Rgb::new(0.34, 0.07, 0.13) },
+    Pigment { weight: 0.40, alpha: 0.07, f0: Rgb::new(0.80, 0.46, 0.17) },
+    Pigment { weight: 0.50, alpha: 0.40, f0: Rgb::new(0.34, 0.07, 0.13) },
 ];
 const DIFFUSE: Rgb = Rgb::new(0.17, 0.025, 0.03);
 const RETRO: f64 = 1.5;

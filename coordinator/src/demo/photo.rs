@@ -1,23 +1,31 @@
-//! The demo's "photograph": the target material by the direct integrator, with noise like that of a measurement.
+//! The demo's "photograph": the target material under the demo's light, with noise like that of a camera.
+//!
+//! The light is integrated by the adaptive cut of the transport tables, but the material is evaluated as it is, direction by
+//! direction: no table, no basis lobes, no interpolation over widths. One position stands for each pixel.
 
 use super::material::Target;
 use lookalike::{
+    brdf::Reflectance,
     image::Image,
-    light::{Environment, LightDistribution},
+    light::Environment,
     math::{
-        Rgb,
+        Rgb, Vec3,
         elementary::{ln, sin_cos},
+        frame::Frame,
         narrow,
         sampling::{key, uniform},
     },
-    render::integrator::Integrator,
+    render::{
+        cut::{Band, Cut, Point},
+        pyramid::LightPyramid,
+    },
     scene::Geometry,
 };
 use rayon::prelude::*;
-use std::{f64::consts::TAU, sync::Arc};
+use std::f64::consts::TAU;
 
-/// Samples per pixel; what they leave of noise adds to that of the camera.
-const SAMPLES: u32 = 192;
+/// Largest error of a node of the light, in units of the mean radiance, for a lobe that reflects everything.
+const TOLERANCE: f64 = 3e-4;
 /// Camera noise: photon noise at mean radiance, and read noise, as shares of the mean radiance.
 const PHOTON_NOISE: f64 = 0.004;
 const READ_NOISE: f64 = 0.001;
@@ -25,23 +33,38 @@ const SEED: u64 = 2020;
 
 /// Takes the photo: linear, multiplied by coverage at the silhouette, black outside. The same bits on every machine.
 #[must_use]
-pub fn take(geometry: &Geometry, light: &Arc<Environment>) -> Image {
-    let distribution = LightDistribution::new(Arc::clone(light));
-    let integrator = Integrator { geometry, light: &distribution, samples: SAMPLES, seed: SEED };
+pub fn take(geometry: &Geometry, light: &Environment) -> Image {
+    let pyramid = LightPyramid::new(light.clone());
     let (width, height) = (geometry.width(), geometry.height());
-    let target = Target;
     let radiance: Vec<Rgb> = (0..width * height)
         .into_par_iter()
-        .map(|i| {
+        .map_init(Cut::default, |cut, i| {
             let (column, row) = (i % width, i / width);
-            let coverage = f64::from(geometry.coverage(column, row));
-            if coverage > 0.0 { integrator.pixel([index(column), index(row)], &target) * coverage } else { Rgb::ZERO }
+            radiance_at(geometry, &pyramid, column, row, cut) * f64::from(geometry.coverage(column, row))
         })
         .collect();
     let lit = radiance.iter().filter(|r| r.max_element() > 0.0);
     let mean = lit.clone().sum::<Rgb>().element_sum() / (3.0 * lit.count().max(1) as f64);
     let noisy = radiance.iter().enumerate().map(|(i, r)| narrow(with_noise(*r, mean, i as u64)));
     Image::from_pixels(width, height, noisy.collect())
+}
+
+/// Radiance at the middle of a pixel, or at the first of a few positions that see the object.
+fn radiance_at(geometry: &Geometry, pyramid: &LightPyramid, column: usize, row: usize, cut: &mut Cut) -> Rgb {
+    let positions = [(0.5, 0.5), (0.2, 0.2), (0.8, 0.2), (0.2, 0.8), (0.8, 0.8)];
+    let see = |(x, y)| geometry.point(column as f64 + x, row as f64 + y);
+    let Some(point) = positions.into_iter().find_map(see).and_then(|p| Point::new(p.normal, p.view)) else {
+        return Rgb::ZERO;
+    };
+    let alphas = Target.sampling_alphas();
+    let sharpest = alphas.iter().fold(1.0_f64, |least, a| least.min(*a));
+    cut.refine(pyramid, &point, 0.0, Band::Glossy(sharpest, 1.0), TOLERANCE * pyramid.mean_radiance());
+    let frame = Frame::from_normal(point.normal);
+    let wo = frame.to_local(point.view);
+    let reflected = cut
+        .directions()
+        .map(|(direction, energy): (Vec3, Rgb)| energy * Target.eval_cos(frame.to_local(direction).normalize(), wo));
+    reflected.sum()
 }
 
 /// Gaussian noise whose variance is a constant plus a part that grows with radiance.
@@ -61,10 +84,6 @@ fn with_noise(radiance: Rgb, mean: f64, pixel: u64) -> Rgb {
 fn gaussian(key: u64) -> f64 {
     let radius = (-2.0 * ln(1.0 - uniform(key))).sqrt();
     radius * sin_cos(TAU * uniform(key ^ 0x5555_5555_5555_5555)).1
-}
-
-fn index(i: usize) -> u32 {
-    u32::try_from(i).unwrap_or(u32::MAX)
 }
 
 #[cfg(test)]

@@ -7,7 +7,7 @@ mod notes;
 pub(crate) use method::method;
 
 use crate::{
-    cli::{Exit, NotThereYet},
+    cli::Exit,
     outputs::{FitRecord, OutFolder, Pictures, Timing, candidates_csv, parameters_json, print_summary, write_pictures},
     progress::{Display, display},
     runner::{self, RunnerOptions},
@@ -16,7 +16,7 @@ use crate::{
 use anyhow::Context;
 use clock::Clock;
 use lookalike::{
-    fit::{FitOutcome, FitPlanner, Method, nodes},
+    fit::{FitOutcome, FitPlanner, JudgedBy, Method, nodes},
     image::metadata,
     scene::Capture,
 };
@@ -54,13 +54,6 @@ pub(crate) struct Finished {
 
 /// Runs a fit and writes its results.
 pub(crate) fn run(job: FitJob) -> anyhow::Result<Finished> {
-    if job.cluster.access.is_some() {
-        return Err(NotThereYet {
-            what: "--access FILE of an access file made beforehand",
-            instead: "this version writes a new one, OUT/access.json, for workers to take",
-        }
-        .into());
-    }
     let method = method(&job.settings)?;
     let planner = FitPlanner::new(Arc::clone(&job.capture), method.clone(), job.exposure)
         .context("the photo cannot be fitted")?
@@ -68,7 +61,8 @@ pub(crate) fn run(job: FitJob) -> anyhow::Result<Finished> {
     let mut display = display(job.progress, planner.best());
     let mut clock = Clock::start();
     let run = run_graph(&job, planner, &mut *display, &mut clock);
-    display.finish();
+    let problem = run.as_ref().err().map(|error| format!("{error:#}"));
+    display.finish(problem.as_deref().map_or(Ok(()), Err));
     let (planner, summary) = run?;
     let outcome = planner.into_outcome().context("the graph ended without a result: please report this")?;
     let notes = notes::notes(&method, &outcome);
@@ -78,7 +72,7 @@ pub(crate) fn run(job: FitJob) -> anyhow::Result<Finished> {
     let timing = Timing {
         seconds,
         cpu_seconds: clock::cpu_seconds(),
-        workers: job.cluster.workers.count(),
+        workers: usize::try_from(summary.workers_joined).unwrap_or(usize::MAX),
         out: job.out_name.clone(),
         attempts: summary.attempts,
         requeued: summary.requeued_nodes,
@@ -89,7 +83,7 @@ pub(crate) fn run(job: FitJob) -> anyhow::Result<Finished> {
     let best = final_score(&method, &outcome);
     let missed = job.max_cssim.is_some_and(|limit| best > limit);
     if let (true, Some(limit)) = (missed, job.max_cssim) {
-        eprintln!("the match has CSSIM {best:.4}, more than --max-cssim {limit}");
+        eprintln!("the match has a score of {best:.4} (--judge {}), more than --max-cssim {limit}", judge(&method));
     }
     let code = if missed { Exit::MissedMaxCssim } else { Exit::Done };
     Ok(Finished { outcome, pictures, code: code.into() })
@@ -164,6 +158,13 @@ fn write_results(
     let text = serde_json::to_string_pretty(&document).context("fit.json")? + "\n";
     job.out.write("fit.json", text.as_bytes())?;
     Ok(pictures)
+}
+
+fn judge(method: &Method) -> &'static str {
+    match method.judge {
+        JudgedBy::Image => "image",
+        JudgedBy::Object => "object",
+    }
 }
 
 fn final_parameters(outcome: &FitOutcome) -> &[f64] {

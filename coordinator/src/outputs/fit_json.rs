@@ -120,7 +120,8 @@ impl Timing {
             "workers": self.workers,
             "attempts": self.attempts,
             "requeued": self.requeued,
-            "command_line": std::env::args().collect::<Vec<_>>(),
+            // Not `args()`, which panics on what is not UTF-8.
+            "command_line": std::env::args_os().map(|a| a.to_string_lossy().into_owned()).collect::<Vec<_>>(),
             "out": self.out,
             "os": std::env::consts::OS,
             "architecture": std::env::consts::ARCH,

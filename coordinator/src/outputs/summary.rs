@@ -9,8 +9,16 @@ use std::{
 
 /// Prints what was found: winner, parameters, scores, seconds.
 pub(crate) fn print_summary(record: &FitRecord<'_>, timing: &Timing, out: &str) -> io::Result<()> {
-    let text = summary(record, timing, out);
-    io::stdout().lock().write_all(text.as_bytes())
+    print_result(&summary(record, timing, out))
+}
+
+/// Writes a result to stdout. A reader that has gone away (`| head`) is no error.
+pub(crate) fn print_result(text: &str) -> io::Result<()> {
+    let mut stdout = io::stdout().lock();
+    match stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()) {
+        Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),
+        outcome => outcome,
+    }
 }
 
 fn summary(record: &FitRecord<'_>, timing: &Timing, out: &str) -> String {
@@ -36,8 +44,8 @@ fn summary(record: &FitRecord<'_>, timing: &Timing, out: &str) -> String {
     }
     let seconds: Vec<String> = timing.seconds.iter().map(|(stage, s)| format!("{stage} {s:.1}")).collect();
     let workers = match timing.workers {
-        1 => "1 local worker".to_owned(),
-        n => format!("{n} local workers"),
+        1 => "1 worker".to_owned(),
+        n => format!("{n} workers"),
     };
     let _ = writeln!(text, "\nseconds: {} ({workers})", seconds.join(", "));
     let _ = writeln!(text, "results: {out}");

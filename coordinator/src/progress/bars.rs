@@ -17,8 +17,10 @@ pub(super) struct Bars {
 }
 
 impl Bars {
-    pub(super) fn new(best: Arc<BestScore>) -> Self {
-        Self { all: MultiProgress::new(), bars: BTreeMap::new(), tally: Tally::default(), best }
+    /// Bars on stderr; `None` where they cannot be drawn.
+    pub(super) fn new(best: Arc<BestScore>) -> Option<Self> {
+        let all = MultiProgress::new();
+        (!all.is_hidden()).then(|| Self { all, bars: BTreeMap::new(), tally: Tally::default(), best })
     }
 
     fn show(&mut self, stage: Stage, count: Count) {
@@ -33,7 +35,7 @@ impl Bars {
         bar.set_length(count.planned * 1000);
         bar.set_position((count.done * 1000 + count.permille).min(count.planned * 1000));
         let best = self.best.get().map(|score| format!("best CSSIM {score:.4}"));
-        let best = best.filter(|_| matches!(stage, Stage::StageTwo | Stage::Polish)).unwrap_or_default();
+        let best = best.filter(|_| matches!(stage, Stage::Judging | Stage::Polish)).unwrap_or_default();
         let nodes = if count.planned > 1 { format!("{} of {}  ", count.done, count.planned) } else { String::new() };
         bar.set_message(format!("{nodes}{best}"));
         if count.is_complete() {
@@ -59,7 +61,7 @@ impl Display for Bars {
         }
     }
 
-    fn finish(&mut self) {
+    fn finish(&mut self, _outcome: Result<(), &str>) {
         for bar in self.bars.values() {
             bar.disable_steady_tick();
             bar.abandon();

@@ -17,8 +17,12 @@ impl Display for JsonLines {
         eprintln!("{}", json!({ "event": "message", "text": text }));
     }
 
-    fn finish(&mut self) {
-        eprintln!("{}", json!({ "event": "finished" }));
+    fn finish(&mut self, outcome: Result<(), &str>) {
+        let last = match outcome {
+            Ok(()) => json!({ "event": "finished" }),
+            Err(error) => json!({ "event": "failed", "error": error }),
+        };
+        eprintln!("{last}");
     }
 }
 

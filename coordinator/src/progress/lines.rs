@@ -23,7 +23,7 @@ impl Display for Lines {
             && count.is_complete()
             && matches!(event, RunEvent::NodeFinished { .. })
         {
-            let best = self.best.get().filter(|_| stage > Stage::StageTwo);
+            let best = self.best.get().filter(|_| stage >= Stage::Judging);
             let best = best.map(|score| format!(", best CSSIM so far {score:.4}")).unwrap_or_default();
             self.say(&format!("{:6.1} s  {} done{best}", self.began.elapsed().as_secs_f64(), stage.title()));
         }
@@ -36,5 +36,5 @@ impl Display for Lines {
         eprintln!("{text}");
     }
 
-    fn finish(&mut self) {}
+    fn finish(&mut self, _outcome: Result<(), &str>) {}
 }

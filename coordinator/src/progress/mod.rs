@@ -17,16 +17,19 @@ pub(crate) trait Display {
     /// A line of text for people, above any bars.
     fn say(&mut self, text: &str);
 
-    /// The run is over; nothing may be left moving.
-    fn finish(&mut self);
+    /// The run is over, well or with an error; nothing may be left moving.
+    fn finish(&mut self, outcome: Result<(), &str>);
 }
 
 /// The display that the user asked for. `best` holds the best score so far.
 pub(crate) fn display(kind: ProgressKind, best: Arc<BestScore>) -> Box<dyn Display> {
     match kind {
-        ProgressKind::Bar => Box::new(bars::Bars::new(best)),
-        ProgressKind::Auto if std::io::stderr().is_terminal() => Box::new(bars::Bars::new(best)),
-        ProgressKind::Auto => Box::new(lines::Lines::new(best)),
+        ProgressKind::Auto if !std::io::stderr().is_terminal() => Box::new(lines::Lines::new(best)),
+        // Where bars cannot be drawn (a pipe, a dumb terminal) lines must do.
+        ProgressKind::Bar | ProgressKind::Auto => match bars::Bars::new(Arc::clone(&best)) {
+            Some(bars) => Box::new(bars),
+            None => Box::new(lines::Lines::new(best)),
+        },
         ProgressKind::Json => Box::new(json::JsonLines),
         ProgressKind::None => Box::new(Silent),
     }
@@ -41,7 +44,7 @@ impl Display for Silent {
         eprintln!("{text}");
     }
 
-    fn finish(&mut self) {}
+    fn finish(&mut self, _outcome: Result<(), &str>) {}
 }
 
 /// What people should be told about a run beyond the counts; `None` for everything that goes as planned.

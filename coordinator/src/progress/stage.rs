@@ -10,21 +10,21 @@ pub(super) enum Stage {
     SubsetTables,
     Searches,
     FullTables,
-    StageTwo,
+    Judging,
     Polish,
     Pictures,
 }
 
 impl Stage {
     pub(super) const ALL: [Self; 6] =
-        [Self::SubsetTables, Self::Searches, Self::FullTables, Self::StageTwo, Self::Polish, Self::Pictures];
+        [Self::SubsetTables, Self::Searches, Self::FullTables, Self::Judging, Self::Polish, Self::Pictures];
 
     pub(super) fn title(self) -> &'static str {
         match self {
             Self::SubsetTables => "transport of the pixel subset",
             Self::Searches => "stage one: searches",
             Self::FullTables => "transport in full",
-            Self::StageTwo => "stage two: CSSIM of the candidates",
+            Self::Judging => "stage two: CSSIM of the candidates",
             Self::Polish => "stage three: polish",
             Self::Pictures => "pictures",
         }
@@ -36,7 +36,7 @@ impl Stage {
             "transport" if name.label.starts_with("transport in full") => Self::FullTables,
             "transport" => Self::SubsetTables,
             "search" => Self::Searches,
-            "select" => Self::StageTwo,
+            "select" => Self::Judging,
             "polish" => Self::Polish,
             "report" => Self::Pictures,
             _ => return None,
@@ -106,7 +106,7 @@ mod tests {
             label: label.to_owned(),
         };
         let mut tally = Tally::default();
-        let mut added = |tally: &mut Tally, n, kind, label| {
+        let added = |tally: &mut Tally, n, kind, label| {
             tally.note(&RunEvent::NodeAdded { name: name(n, kind, label) }).unwrap()
         };
         assert_eq!(added(&mut tally, 0, "transport", "transport of the subset, pixels 0 to 31").0, Stage::SubsetTables);

@@ -101,7 +101,10 @@ impl RunError {
     #[must_use]
     pub fn exit_code(&self) -> u8 {
         match self {
-            Self::NoWorkersPossible | Self::NothingToAdvertise { .. } | Self::AccessFile { .. } => 2,
+            Self::NoWorkersPossible
+            | Self::NothingToAdvertise { .. }
+            | Self::Listen { .. }
+            | Self::AccessFile { .. } => 2,
             Self::Plan(PlanError::NodeFailed { reason: FailureReason::Application(_), .. }) => 2,
             Self::Interrupted => 130,
             _ => 3,

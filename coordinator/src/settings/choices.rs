@@ -67,7 +67,7 @@ pub enum Preset {
 /// How progress is shown, on stderr.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
 pub enum ProgressKind {
-    /// A bar on a terminal, nothing elsewhere
+    /// Bars on a terminal, a line per stage elsewhere
     #[default]
     Auto,
     /// A bar

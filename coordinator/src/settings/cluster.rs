@@ -1,7 +1,7 @@
 //! Who computes: local worker processes, remote ones, or both (design section 8).
 
 use anyhow::{Context, bail};
-use std::{fmt, net::SocketAddr, num::NonZeroUsize, path::PathBuf, str::FromStr, thread, time::Duration};
+use std::{fmt, net::SocketAddr, num::NonZeroUsize, str::FromStr, thread, time::Duration};
 
 /// Where workers come from and how long a coordinator waits for them.
 #[derive(Debug, Clone, PartialEq)]
@@ -12,8 +12,6 @@ pub struct ClusterSettings {
     pub listen: SocketAddr,
     /// What the access file tells workers to connect to; none means the address listened on.
     pub advertise: Option<Advertise>,
-    /// An access file made beforehand; none means a new one.
-    pub access: Option<PathBuf>,
     /// How long to wait for the first worker.
     pub wait_for_workers: Duration,
     /// How long to wait for another worker after losing the last.
@@ -37,7 +35,6 @@ impl Default for ClusterSettings {
             workers: Workers::PerCore,
             listen: SocketAddr::from(([127, 0, 0, 1], 0)),
             advertise: None,
-            access: None,
             wait_for_workers: Duration::from_mins(10),
             grace: Duration::from_mins(1),
         }

@@ -40,7 +40,8 @@ impl NodeType for Search {
         };
         let subset_wire = context.decoded(subset, |bytes| read::<SubsetWire>("pixel subset", bytes))?;
         let subset = subset_wire.subset()?;
-        let table = concatenated(shards, context)?;
+        let model = brdf::model(&parameters.model).map_err(|error| NodeFailure::new(error.to_string()))?;
+        let table = concatenated(model, shards, context)?;
         if table.pixels != subset.pixels.len() {
             let (expected, found) = (subset.pixels.len(), table.pixels);
             return Err(NodeFailure::new(format!("expected a table of {expected} pixels, found {found}")));
@@ -51,7 +52,7 @@ impl NodeType for Search {
             return Err(NodeFailure::new(format!("gamma {gamma} and mean radiance {mean} must be positive")));
         }
         let method = Method {
-            model: brdf::model(&parameters.model).map_err(|error| NodeFailure::new(error.to_string()))?,
+            model,
             search: if parameters.pattern { SearchKind::Pattern } else { SearchKind::LeastSquares },
             start: if parameters.paper_start { Start::Paper } else { Start::Scan },
             at_zero: if parameters.clamp_at_zero { AtZero::Clamp } else { AtZero::Tangent },

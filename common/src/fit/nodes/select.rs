@@ -25,9 +25,10 @@ impl NodeType for Select {
 
     fn run(&self, parameters: &[u8], inputs: &[Blob], context: &RunContext) -> Result<Vec<u8>, NodeFailure> {
         let parameters: SelectParameters = read("parameters of select", parameters)?;
-        let candidates =
-            parameters.candidates.into_iter().map(CandidateWire::candidate).collect::<Result<Vec<_>, _>>()?;
         let scene = Scene::read(inputs, context)?;
+        let model = scene.view.model;
+        let candidates = parameters.candidates.into_iter().map(|wire| wire.candidate(model));
+        let candidates = candidates.collect::<Result<Vec<_>, _>>()?;
         let judged = judge_candidates(&scene.full(), &scene.view.judge, &candidates)
             .map_err(|error| NodeFailure::new(format!("a candidate cannot be judged: {error}")))?;
         write("scores", &ScoresWire::of(&judged))

@@ -3,7 +3,7 @@
 //! Inputs of all three: the view; the shards of the full-resolution table, in order.
 
 use crate::{
-    brdf::{self, Model},
+    brdf::{self, Model, lobe_terms},
     fit::{
         FullView, JudgedBy,
         wire::{ImageWire, TableWire, read},
@@ -53,7 +53,7 @@ impl Scene {
             return Err(NodeFailure::new("expected a view and a transport table, found no input"));
         };
         let view = context.decoded(view, View::decode)?;
-        let table = concatenated(shards, context)?;
+        let table = concatenated(view.model, shards, context)?;
         if table.pixels != view.pixels.len() {
             let (expected, found) = (view.pixels.len(), table.pixels);
             return Err(NodeFailure::new(format!("expected a table of {expected} pixels, found {found}")));
@@ -83,13 +83,28 @@ impl View {
     }
 }
 
-/// The table of consecutive shards.
-pub(super) fn concatenated(shards: &[Blob], context: &RunContext) -> Result<TransportTable, NodeFailure> {
+/// The table of consecutive shards, made for the lobes of `model`.
+pub(super) fn concatenated(
+    model: &dyn Model,
+    shards: &[Blob],
+    context: &RunContext,
+) -> Result<TransportTable, NodeFailure> {
     let tables = shards
         .iter()
         .map(|shard| context.decoded(shard, |bytes| read::<TableWire>("transport table", bytes)?.table()))
         .collect::<Result<Vec<_>, _>>()?;
     let tables: Vec<&TransportTable> = tables.iter().map(|table| &**table).collect();
-    TransportTable::concatenate(&tables)
-        .ok_or_else(|| NodeFailure::new("the shards of a transport table do not belong together, or there are none"))
+    let fits = |table: &TransportTable| {
+        let lobes = table.lobes.iter().zip(model.lobes());
+        table.lobes.len() == model.lobes().len()
+            && lobes
+                .into_iter()
+                .all(|(t, basis)| t.terms == lobe_terms(basis.lobe) && t.knots.is_some() == basis.width.is_some())
+    };
+    TransportTable::concatenate(&tables).filter(fits).ok_or_else(|| {
+        NodeFailure::new(format!(
+            "the shards of a transport table do not belong together or to {}, or there are none",
+            model.name()
+        ))
+    })
 }

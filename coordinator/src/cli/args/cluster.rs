@@ -1,5 +1,6 @@
 //! Flags of the coordinator: where workers come from and how long it waits for them.
 
+use crate::cli::NotThereYet;
 use crate::settings::{Advertise, ClusterSettings, Workers};
 use anyhow::bail;
 use clap::Args;
@@ -17,7 +18,7 @@ pub(crate) struct ClusterArgs {
     /// What the access file tells workers to connect to: HOST or HOST:PORT [default: the address listened on]
     #[arg(long, value_name = "A")]
     advertise: Option<Advertise>,
-    /// Access file made beforehand [default: a new one, OUT/access.json]
+    /// Access file made beforehand (not there yet) [default: a new one, OUT/access.json]
     #[arg(long, value_name = "FILE")]
     access: Option<PathBuf>,
     /// How long to wait for the first worker, such as 10min or 90s
@@ -30,7 +31,14 @@ pub(crate) struct ClusterArgs {
 
 impl ClusterArgs {
     pub(crate) fn into_settings(self) -> anyhow::Result<ClusterSettings> {
-        if self.listen.ip().is_unspecified() && self.workers == Workers::Count(0) && self.advertise.is_none() {
+        if self.access.is_some() {
+            return Err(NotThereYet {
+                what: "--access",
+                instead: "this version writes a new access file, OUT/access.json, for workers to take",
+            }
+            .into());
+        }
+        if self.listen.ip().is_unspecified() && self.advertise.is_none() {
             bail!(
                 "--listen {} accepts connections on every interface but is no address to connect to; say under which \
                  name workers reach this machine with --advertise HOST",
@@ -41,7 +49,6 @@ impl ClusterArgs {
             workers: self.workers,
             listen: self.listen,
             advertise: self.advertise,
-            access: self.access,
             wait_for_workers: self.wait_for_workers,
             grace: self.grace,
         })
