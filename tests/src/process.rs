@@ -1,5 +1,7 @@
 //! Real processes: to signal them, and to wait for them without ever hanging a test for good.
 
+use serde_json::Value;
+use std::io::{BufRead, BufReader};
 use std::process::{Child, Command, Output, Stdio};
 
 /// A process that is killed when the test forgets it.
@@ -21,6 +23,23 @@ impl Process {
     #[must_use]
     pub fn id(&self) -> u32 {
         self.0.as_ref().map_or(0, Child::id)
+    }
+
+    /// Wait for its end, and for that of all who share its stderr; `watch` is told of each line of it, as part of all lines so far:
+    /// JSON where it is JSON, else a string.
+    ///
+    /// # Panics
+    /// When it cannot be waited for, or says what is not UTF-8.
+    #[must_use]
+    pub fn watch_stderr(mut self, mut watch: impl FnMut(&[Value])) -> (Output, Vec<Value>) {
+        let stderr = self.0.as_mut().and_then(|child| child.stderr.take()).expect("a process that is watched once");
+        let mut lines = Vec::new();
+        for line in BufReader::new(stderr).lines() {
+            let line = line.expect("lines of text");
+            lines.push(serde_json::from_str(&line).unwrap_or(Value::String(line)));
+            watch(&lines);
+        }
+        (self.output(), lines)
     }
 
     /// Wait for its end.

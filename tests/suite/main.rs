@@ -11,6 +11,7 @@ mod cli;
 mod cluster;
 mod cluster_hostile;
 mod compare;
+mod fit;
 mod network;
 mod program;
 mod render;

@@ -1,6 +1,7 @@
 //! One basis lobe, and the loop that integrates it for many widths at once.
 
 use super::Angles;
+use crate::math::simd;
 use std::fmt::Debug;
 
 /// How a lobe's integral splits into basis integrals.
@@ -80,7 +81,7 @@ pub(super) fn accumulate(
     sums: &mut [f64],
     kernel: impl Fn(&Angles, &Spread, f64) -> f64 + Copy,
 ) {
-    pulp::Arch::new().dispatch(Accumulate { split, incident, cos_o, widths, sums, kernel });
+    simd::dispatch(Accumulate { split, incident, cos_o, widths, sums, kernel });
 }
 
 struct Accumulate<'a, K> {

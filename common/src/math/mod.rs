@@ -7,6 +7,7 @@ pub(crate) mod chi_square;
 pub mod elementary;
 pub mod frame;
 pub mod sampling;
+pub mod simd;
 pub mod warp;
 
 /// A direction or position: world space unless the name says otherwise.

@@ -6,10 +6,12 @@
 //! (a test compares whole scores). Bodies are marked `#[inline(always)]`, as are the functions they call: code that is
 //! not inlined would be compiled for the baseline processor.
 
+use crate::math::simd;
+
 /// Which instructions the row loops use. The results are bit-identical.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Lanes {
-    /// The widest this processor has.
+    /// The widest this processor has, as far as [`simd::limit`] lets it.
     #[default]
     Detected,
     /// Those every processor of the target has; for tests and comparisons.
@@ -21,7 +23,7 @@ impl Lanes {
     #[inline(always)]
     pub(super) fn run<R>(self, body: impl FnOnce() -> R) -> R {
         match self {
-            Self::Detected => pulp::Arch::new().dispatch(body),
+            Self::Detected => simd::dispatch(body),
             Self::Plain => body(),
         }
     }

@@ -1,7 +1,7 @@
 //! One JSON object per line on stderr, for programs: `{"event": "node-finished", ...}`.
 
 use super::Display;
-use crate::comm::RunEvent;
+use crate::comm::{RunEvent, Site};
 use serde_json::{Value, json};
 
 pub(super) struct JsonLines;
@@ -44,15 +44,16 @@ fn object(event: &RunEvent) -> Option<Value> {
         RunEvent::NodeAdded { name } => {
             json!({ "event": "node-added", "node": name.node.0, "kind": name.kind, "label": name.label })
         }
-        RunEvent::NodeStarted { name, .. } => {
-            json!({ "event": "node-started", "node": name.node.0, "kind": name.kind, "label": name.label })
+        RunEvent::NodeStarted { name, site } => {
+            let (node, worker) = (name.node.0, worker_of(*site));
+            json!({ "event": "node-started", "node": node, "kind": name.kind, "label": name.label, "worker": worker })
         }
         RunEvent::NodeProgress { node, permille } => {
             json!({ "event": "node-progress", "node": node.0, "permille": permille })
         }
-        RunEvent::NodeFinished { name, bytes, elapsed, .. } => json!({
-            "event": "node-finished", "node": name.node.0, "kind": name.kind, "label": name.label, "bytes": bytes,
-            "seconds": elapsed.as_secs_f64(),
+        RunEvent::NodeFinished { name, site, bytes, elapsed } => json!({
+            "event": "node-finished", "node": name.node.0, "kind": name.kind, "label": name.label,
+            "worker": worker_of(*site), "bytes": bytes, "seconds": elapsed.as_secs_f64(),
         }),
         RunEvent::NodeFailed { name, reason } => json!({
             "event": "node-failed", "node": name.node.0, "kind": name.kind, "label": name.label,
@@ -63,4 +64,12 @@ fn object(event: &RunEvent) -> Option<Value> {
         }),
         _ => return None,
     })
+}
+
+/// The number of the worker; none for the coordinator itself.
+fn worker_of(site: Site) -> Option<u64> {
+    match site {
+        Site::Worker(worker) => Some(worker.0),
+        Site::Coordinator => None,
+    }
 }

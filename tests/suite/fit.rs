@@ -1,0 +1,7 @@
+//! `lookalike fit` from end to end: the real binary, its worker processes, its files, on a small scene that the test makes.
+
+mod ending;
+mod outputs;
+mod same_bits;
+mod scene;
+mod settings;

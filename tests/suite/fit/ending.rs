@@ -1,0 +1,67 @@
+//! How a fit ends when it does not end well: exit codes, messages, no process left behind.
+
+use super::scene::{QUICK, fit, folder};
+use lookalike_tests::process::{Process, signal};
+use serde_json::Value;
+use std::{fs, process::Command};
+
+#[test]
+fn missed_max_cssim_is_exit_code_one_with_all_results() {
+    let folder = folder();
+    let answer = fit(folder.path(), "out", &format!("{QUICK} --max-cssim 0"));
+    assert_eq!(answer.code, Some(1), "{}", answer.stderr);
+    assert!(answer.stderr.contains("more than --max-cssim 0"), "{}", answer.stderr);
+    assert!(answer.stdout.contains("polished") && folder.path().join("out/fit.json").exists());
+    fit(folder.path(), "met", &format!("{QUICK} --max-cssim 1")).done();
+}
+
+#[test]
+fn folder_of_a_finished_fit_is_left_alone() {
+    let folder = folder();
+    fs::create_dir(folder.path().join("out")).unwrap();
+    fs::write(folder.path().join("out/fit.json"), "precious").unwrap();
+    fit(folder.path(), "out", QUICK).refused(&["out already holds a finished fit", "choose another --out"]);
+    assert_eq!(fs::read_to_string(folder.path().join("out/fit.json")).unwrap(), "precious");
+}
+
+#[test]
+fn results_that_cannot_be_written_are_refused_before_any_work() {
+    let folder = folder();
+    // Below a file: not even a superuser can write there.
+    fit(folder.path(), "photo.exr/below", QUICK)
+        .refused(&["cannot write results to photo.exr/below", "choose a folder you may write to with --out"]);
+    fit(folder.path(), "photo.exr", QUICK).refused(&["photo.exr is a file: --out takes a folder"]);
+}
+
+#[test]
+fn unknown_model_is_refused_with_the_known_ones() {
+    let folder = folder();
+    let answer = fit(folder.path(), "out", &format!("{QUICK} --model phong"));
+    answer.refused(&["--model", "phong", "ggx, cook-torrance"]);
+    assert!(!folder.path().join("out").exists());
+}
+
+#[test]
+fn interrupt_ends_every_process_with_code_130() {
+    for (name, kind) in [("INT", "transport"), ("TERM", "search")] {
+        let folder = folder();
+        let mut command = Command::new(env!("CARGO_BIN_EXE_lookalike-under-test"));
+        let line = "fit photo.exr --env map.exr --out out --samples 160 --workers 2 --progress json";
+        let process = Process::start(command.args(line.split_whitespace()).current_dir(folder.path()));
+        let coordinator = process.id();
+        let mut sent = false;
+        // Workers share stderr with the coordinator: it ends when the last of them is gone.
+        let (output, events) = process.watch_stderr(|events| {
+            let started = |e: &Value| e["event"] == "node-started" && e["kind"] == kind;
+            if !sent && events.last().is_some_and(started) {
+                sent = true;
+                signal(coordinator, name);
+            }
+        });
+        assert!(sent, "{events:?}");
+        assert_eq!(output.status.code(), Some(130), "{name}: {events:?}");
+        assert!(output.stdout.is_empty() && !folder.path().join("out/fit.json").exists());
+        let said = events.iter().any(|e| e.as_str().is_some_and(|line| line.contains("interrupted")));
+        assert!(said, "{events:?}");
+    }
+}

@@ -1,0 +1,141 @@
+//! What a fit leaves in its folder and says on its outputs: the contract of design section 10.
+
+use super::scene::{QUICK, SIZE, fit, fit_json, folder, number, picture};
+use lookalike::image::{Encoding, content_hash, metadata as keys};
+use serde_json::{Value, json};
+use std::fs;
+
+const COLOURS: [&str; 2] = ["kd", "f0"];
+
+/// Asserts that these are parameters of `ggx` within their bounds.
+#[track_caller]
+fn check_ggx(parameters: &Value) {
+    for name in COLOURS {
+        let colour = parameters[name].as_array().unwrap();
+        assert_eq!(colour.len(), 3);
+        assert!(colour.iter().all(|x| (0.0..=1.0).contains(&number(x))), "{parameters}");
+    }
+    assert!((0.005..=1.0).contains(&number(&parameters["alpha"])), "{parameters}");
+    assert_eq!(parameters.as_object().unwrap().len(), 3);
+}
+
+#[test]
+fn fit_json_has_the_shape_of_the_contract() {
+    let folder = folder();
+    let answer = fit(folder.path(), "out", "--samples 48 --workers 2 --seed 3 --progress none").done();
+    let json = fit_json(&folder.path().join("out"));
+    for (name, expected) in [
+        ("schema", json!("lookalike.fit/1")),
+        ("model", json!("ggx")),
+        ("samples", json!(48)),
+        ("seed", json!(3)),
+        ("search", json!("least-squares")),
+        ("exposure_gain", json!([1.0, 1.0, 1.0])),
+    ] {
+        assert_eq!(json[name], expected, "{name}");
+    }
+    assert!(number(&json["display_exposure"]) > 0.0);
+    assert!(json["conventions"]["world"].as_str().unwrap().contains("+Y up"));
+    for (role, file) in [("photo", "photo.exr"), ("environment", "map.exr")] {
+        let hash = content_hash(&picture(&folder.path().join(file)).image).to_hex().to_string();
+        assert_eq!((&json["inputs"][role]["path"], &json["inputs"][role]["blake3"]), (&json!(file), &json!(hash)));
+    }
+
+    let candidates = json["candidates"].as_array().unwrap();
+    assert_eq!(candidates.len(), 21);
+    for (i, candidate) in candidates.iter().enumerate() {
+        assert_eq!(number(&candidate["gamma"]), (10 + i) as f64 / 10.0);
+        for name in ["cost", "cssim", "cssim_object"] {
+            assert!(number(&candidate[name]) > 0.0, "{name}: {candidate}");
+        }
+        assert!(candidate["evaluations"].as_u64().unwrap() > 0 && candidate["termination"].is_string());
+        check_ggx(&candidate["parameters"]);
+    }
+    let lowest = candidates.iter().map(|c| number(&c["cssim"])).fold(f64::INFINITY, f64::min);
+    let stage_two = &json["stage_two"];
+    assert_eq!(number(&stage_two["cssim"]), lowest);
+    let won = candidates.iter().find(|c| c["gamma"] == stage_two["gamma"]).unwrap();
+    for name in ["cssim", "cssim_object", "parameters"] {
+        assert_eq!(won[name], stage_two[name]);
+    }
+    let polished = &json["polished"];
+    assert!(number(&polished["cssim"]) <= lowest && number(&polished["cssim_object"]) > 0.0);
+    assert!((1..=300).contains(&polished["evaluations"].as_u64().unwrap()));
+    check_ggx(&polished["parameters"]);
+    for (name, kind) in [("seconds", "inputs"), ("cpu_seconds", "coordinator")] {
+        assert!(number(&json["timing"][name][kind]) >= 0.0, "{}", json["timing"]);
+    }
+    assert_eq!(json["timing"]["workers"], 2);
+
+    for phrase in ["gamma", "stage two", "polished", "alpha", "seconds: inputs", "results: out"] {
+        assert!(answer.stdout.contains(phrase), "{}", answer.stdout);
+    }
+}
+
+#[test]
+fn candidates_csv_has_the_numbers_of_fit_json() {
+    let folder = folder();
+    fit(folder.path(), "out", &format!("{QUICK} --subsets 2")).done();
+    let json = fit_json(&folder.path().join("out"));
+    let text = fs::read_to_string(folder.path().join("out/candidates.csv")).unwrap();
+    let mut lines = text.lines();
+    let header = "gamma,subset,cost,cssim,cssim_object,evaluations,termination,kd.r,kd.g,kd.b,f0.r,f0.g,f0.b,alpha";
+    assert_eq!(lines.next(), Some(header));
+    let rows: Vec<Vec<&str>> = lines.map(|line| line.split(',').collect()).collect();
+    let candidates = json["candidates"].as_array().unwrap();
+    assert_eq!((rows.len(), candidates.len()), (6, 6));
+    for candidate in candidates {
+        let is_of = |row: &str, name: &str| row.parse::<f64>().unwrap() == number(&candidate[name]);
+        let row = rows.iter().find(|row| is_of(row[0], "gamma") && is_of(row[1], "subset")).unwrap();
+        let parameters = &candidate["parameters"];
+        for (column, expected) in
+            [(2, &candidate["cost"]), (3, &candidate["cssim"]), (8, &parameters["kd"][1]), (13, &parameters["alpha"])]
+        {
+            assert_eq!(row[column].parse::<f64>().unwrap(), number(expected), "column {column}");
+        }
+    }
+}
+
+#[test]
+fn pictures_have_the_size_of_the_photo_and_say_what_they_are() {
+    let folder = folder();
+    fit(folder.path(), "out", QUICK).done();
+    let out = folder.path().join("out");
+    for file in ["match.exr", "match.png", "reference.png", "difference.png"] {
+        let decoded = picture(&out.join(file));
+        assert_eq!((decoded.image.width(), decoded.image.height()), (SIZE, SIZE), "{file}");
+    }
+    let matched = picture(&out.join("match.exr"));
+    let json = fit_json(&out);
+    let entry = |key: &str| matched.metadata.iter().find(|(k, _)| k == key).map(|(_, value)| value.clone());
+    assert_eq!(entry(keys::MODEL).as_deref(), Some("ggx"));
+    assert_eq!(entry(keys::DISPLAY_EXPOSURE), Some(json["display_exposure"].to_string()));
+    let parameters: Value = serde_json::from_str(&entry(keys::PARAMETERS).unwrap()).unwrap();
+    assert_eq!(parameters, json["polished"]["parameters"]);
+
+    // The displayed pictures are the linear ones, exposed: up to half a code and the clipping at white.
+    let shown = picture(&out.join("match.png"));
+    assert_eq!(shown.encoding, Encoding::Srgb);
+    let exposure = number(&json["display_exposure"]);
+    for (shown, linear) in shown.image.pixels().iter().flatten().zip(matched.image.pixels().iter().flatten()) {
+        let expected = (f64::from(*linear) * exposure).clamp(0.0, 1.0);
+        assert!((f64::from(*shown) - expected).abs() < 0.005, "{shown} {expected}");
+    }
+    // Outside the object everything is black, inside nothing is.
+    assert_eq!(matched.image.pixel(0, 0), [0.0; 3]);
+    assert!(matched.image.pixel(SIZE / 2, SIZE / 2)[0] > 0.0);
+}
+
+#[test]
+fn score_of_the_files_is_the_score_that_was_reported() {
+    let folder = folder();
+    fit(folder.path(), "out", QUICK).done();
+    let json = fit_json(&folder.path().join("out"));
+    let exposure = &json["display_exposure"];
+    let arguments = format!("compare photo.exr out/match.exr --display-exposure {exposure} --json");
+    let answer = crate::program::lookalike(folder.path(), &arguments).done();
+    let compared: Value = serde_json::from_str(&answer.stdout).unwrap();
+    // The photo's coverage is that of its silhouette; `match.exr` carries it as its alpha.
+    let (found, expected) = (number(&compared["score"]), number(&json["polished"]["cssim"]));
+    assert!((found - expected).abs() < 1e-6, "{found} {expected}");
+}

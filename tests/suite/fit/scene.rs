@@ -1,0 +1,85 @@
+//! A small photo under a small map, and what a fit of them leaves.
+
+use crate::program::{Answer, image, lookalike, write_exr};
+use lookalike::{
+    brdf::{CookTorrance, Material},
+    image::{Decoded, Image, decode},
+    light::{Environment, LightDistribution},
+    render::image::Shot,
+    scene::{Camera, Circle, Geometry},
+};
+use serde_json::Value;
+use std::{
+    fs,
+    path::Path,
+    sync::{Arc, OnceLock},
+};
+use tempfile::TempDir;
+
+/// Columns and rows of the photo.
+pub(super) const SIZE: usize = 64;
+
+/// A cheap fit: few pixels, few gammas, one worker.
+pub(super) const QUICK: &str = "--samples 48 --gammas 1:2:0.5 --workers 1 --progress none";
+
+/// A folder with `photo.exr` and `map.exr`.
+pub(super) fn folder() -> TempDir {
+    static SCENE: OnceLock<(Image, Image)> = OnceLock::new();
+    let (photo, map) = SCENE.get_or_init(|| {
+        let map = map();
+        (photo(&map), map)
+    });
+    let folder = tempfile::tempdir().unwrap();
+    write_exr(&folder.path().join("photo.exr"), photo);
+    write_exr(&folder.path().join("map.exr"), map);
+    folder
+}
+
+/// A sky with a lamp and a darker, warmer ground.
+fn map() -> Image {
+    image(32, 16, |column, row| match (column, row) {
+        (18..20, 4..6) => [40.0, 36.0, 30.0],
+        (_, ..8) => [0.5, 0.6, 0.8 + 0.02 * column as f32],
+        _ => [0.25, 0.2, 0.1],
+    })
+}
+
+/// A plastic whose lobe ggx cannot express, with the noise of 256 samples.
+fn photo(map: &Image) -> Image {
+    let light = LightDistribution::new(Arc::new(Environment::new(map.clone()).unwrap()));
+    let geometry = Geometry::sphere(SIZE, SIZE, Circle::inscribed(SIZE, SIZE), Camera::Orthographic).unwrap();
+    let paint = Material::new(&CookTorrance, vec![0.3, 0.12, 0.08, 0.8, 0.8, 0.8, 0.06, 0.2]).unwrap();
+    Shot { geometry: &geometry, light: &light, reflectance: &paint, samples: 256, seed: 11 }.render(|| ()).image
+}
+
+/// Fits `photo.exr` under `map.exr` into the folder `out`.
+pub(super) fn fit(folder: &Path, out: &str, flags: &str) -> Answer {
+    lookalike(folder, &format!("fit photo.exr --env map.exr --out {out} {flags}"))
+}
+
+/// The results of a fit: those of [`QUICK`] and more flags, which win.
+pub(super) fn quick(flags: &str) -> Value {
+    let folder = folder();
+    fit(folder.path(), "out", &format!("{QUICK} {flags}")).done();
+    fit_json(&folder.path().join("out"))
+}
+
+/// `fit.json` of a folder of results.
+pub(super) fn fit_json(out: &Path) -> Value {
+    serde_json::from_slice(&fs::read(out.join("fit.json")).unwrap()).unwrap()
+}
+
+/// `fit.json` without its `timing`, which must be there, as text.
+pub(super) fn without_timing(out: &Path) -> String {
+    let mut json = fit_json(out);
+    json.as_object_mut().unwrap().remove("timing").expect("a timing block");
+    serde_json::to_string_pretty(&json).unwrap()
+}
+
+pub(super) fn picture(path: &Path) -> Decoded {
+    decode("result", &fs::read(path).unwrap()).unwrap()
+}
+
+pub(super) fn number(value: &Value) -> f64 {
+    value.as_f64().unwrap_or_else(|| panic!("not a number: {value}"))
+}

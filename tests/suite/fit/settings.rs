@@ -1,0 +1,140 @@
+//! Every setting of the method does what it says, as seen in `fit.json`.
+
+use super::scene::{QUICK, fit, folder, number, quick, without_timing};
+use serde_json::{Value, json};
+use std::fs;
+
+fn gammas(json: &Value) -> Vec<f64> {
+    json["candidates"].as_array().unwrap().iter().map(|c| number(&c["gamma"])).collect()
+}
+
+fn names(parameters: &Value) -> Vec<&str> {
+    parameters.as_object().unwrap().keys().map(String::as_str).collect()
+}
+
+#[test]
+fn settings_file_gives_the_result_of_the_flags() {
+    let folder = folder();
+    fit(folder.path(), "flags", "--samples 48 --gammas 1:2:0.5 --seed 9 --polish off --workers 1").done();
+    let text = "photo = \"photo.exr\"\nenv = \"map.exr\"\nout = \"file\"\nsamples = 48\ngammas = \"1:2:0.5\"\nseed = 4\n\
+                polish = \"off\"\nworkers = 2\n";
+    fs::write(folder.path().join("fit.toml"), text).unwrap();
+    // A flag wins over the file.
+    crate::program::lookalike(folder.path(), "fit fit.toml --seed 9").done();
+    assert_eq!(without_timing(&folder.path().join("flags")), without_timing(&folder.path().join("file")));
+}
+
+#[test]
+fn gammas_are_those_asked_for() {
+    let json = quick("--gammas 1:2:0.5");
+    assert_eq!(gammas(&json), [1.0, 1.5, 2.0]);
+    assert_eq!(json["gammas"], json!([1.0, 1.5, 2.0]));
+    assert_eq!(gammas(&quick("--gammas 2.2")), [2.2]);
+}
+
+#[test]
+fn full_samples_use_every_usable_pixel() {
+    let [a, b] = ["1", "2"].map(|seed| quick(&format!("--samples full --gammas 1 --polish off --seed {seed}")));
+    assert_eq!(a["samples"], "full");
+    // Nothing is drawn, so that the seed does not matter; the cost is an estimate of the same sum from a subset.
+    assert_eq!(a["candidates"], b["candidates"]);
+    let subset = quick("--samples 48 --gammas 1 --polish off");
+    let [all, few] = [&a, &subset].map(|json| number(&json["candidates"][0]["cost"]));
+    assert!(few > 0.2 * all && few < 2.0 * all, "{few} of {all}");
+}
+
+#[test]
+fn pattern_search_finds_about_the_minimum_of_least_squares_with_many_more_evaluations() {
+    let (pattern, least_squares) = (quick("--search pattern --gammas 1.5"), quick("--gammas 1.5"));
+    assert_eq!(
+        (pattern["search"].as_str(), least_squares["search"].as_str()),
+        (Some("pattern"), Some("least-squares"))
+    );
+    let [a, b] = [&pattern, &least_squares].map(|json| number(&json["candidates"][0]["cost"]));
+    assert!(b <= a * (1.0 + 1e-6) && a < 1.1 * b, "pattern {a}, least squares {b}");
+    let [a, b] = [&pattern, &least_squares].map(|json| json["candidates"][0]["evaluations"].as_u64().unwrap());
+    assert!(a > 2 * b, "pattern {a}, least squares {b}");
+}
+
+#[test]
+fn preset_paper_is_the_method_of_the_paper() {
+    let json = quick("--preset paper");
+    // Flags given as well win over it: those of the quick fit.
+    assert_eq!((json["samples"].as_u64(), gammas(&json).len()), (Some(48), 3));
+    for (name, expected) in [
+        ("model", "cook-torrance"),
+        ("search", "pattern"),
+        ("start", "paper"),
+        ("at_zero", "clamp"),
+        ("sampling", "importance"),
+        ("judge", "image"),
+    ] {
+        assert_eq!(json[name], expected, "{name}");
+    }
+    assert_eq!(json["polished"], Value::Null);
+    assert_eq!(names(&json["stage_two"]["parameters"]), ["kd", "ks", "f0", "m"]);
+}
+
+#[test]
+fn subsets_multiply_the_candidates() {
+    let json = quick("--subsets 2");
+    assert_eq!(gammas(&json), [1.0, 1.0, 1.5, 1.5, 2.0, 2.0]);
+    let candidates = json["candidates"].as_array().unwrap();
+    assert_eq!(candidates.iter().map(|c| c["subset"].as_u64().unwrap()).collect::<Vec<_>>(), [0, 1, 0, 1, 0, 1]);
+    // Other pixels, another minimum; the first subset is that of a fit with one.
+    assert_ne!(candidates[0]["parameters"], candidates[1]["parameters"]);
+    let alone = &quick("--gammas 1:2:0.5")["candidates"][0];
+    for name in ["cost", "evaluations", "parameters"] {
+        assert_eq!(candidates[0][name], alone[name], "{name}");
+    }
+    let lowest = candidates.iter().map(|c| number(&c["cssim"])).fold(f64::INFINITY, f64::min);
+    assert_eq!(number(&json["stage_two"]["cssim"]), lowest);
+}
+
+#[test]
+fn judge_decides_which_score_selects_and_polishes() {
+    for (judge, score) in [("image", "cssim"), ("object", "cssim_object")] {
+        let json = quick(&format!("--judge {judge}"));
+        assert_eq!(json["judge"], judge);
+        let scores = json["candidates"].as_array().unwrap().iter().map(|c| number(&c[score]));
+        let selected = number(&json["stage_two"][score]);
+        assert_eq!(selected, scores.fold(f64::INFINITY, f64::min));
+        assert!(number(&json["polished"][score]) <= selected);
+    }
+}
+
+#[test]
+fn without_polish_there_is_none() {
+    let (off, on) = (quick("--polish off"), quick("--polish on"));
+    assert_eq!(off["polished"], Value::Null);
+    assert_eq!(off["stage_two"], on["stage_two"]);
+    assert!(number(&on["polished"]["cssim"]) < number(&on["stage_two"]["cssim"]));
+}
+
+#[test]
+fn model_is_the_one_asked_for() {
+    let json = quick("--model cook-torrance");
+    assert_eq!(json["model"], "cook-torrance");
+    for parameters in [&json["candidates"][0]["parameters"], &json["polished"]["parameters"]] {
+        assert_eq!(names(parameters), ["kd", "ks", "f0", "m"]);
+        assert!((0.005..=1.0).contains(&number(&parameters["m"])));
+    }
+    // The photo was made with this model (m = 0.2) and with noise.
+    assert!((number(&json["stage_two"]["parameters"]["m"]) / 0.2 - 1.0).abs() < 0.1, "{}", json["stage_two"]);
+    assert!(number(&json["stage_two"]["cssim"]) < number(&quick("")["stage_two"]["cssim"]));
+}
+
+#[test]
+fn progress_goes_to_stderr_in_the_form_asked_for() {
+    let folder = folder();
+    let flags = QUICK.replace("--progress none", "--polish off");
+    let json = fit(folder.path(), "json", &format!("{flags} --progress json")).done();
+    let events: Vec<Value> = json.stderr.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    let finished = |kind: &str| events.iter().filter(|e| e["event"] == "node-finished" && e["kind"] == kind).count();
+    assert_eq!((finished("search"), finished("select"), finished("polish"), finished("report")), (3, 1, 0, 1));
+    assert_eq!(events.last().unwrap()["event"], "finished");
+    let none = fit(folder.path(), "none", &format!("{flags} --progress none")).done();
+    assert_eq!(none.stderr, "");
+    let lines = fit(folder.path(), "auto", &flags).done();
+    assert!(lines.stderr.contains("stage one: searches done") && !lines.stderr.contains('\x1b'), "{}", lines.stderr);
+}
