@@ -1,1 +1,3 @@
 //! The harness of the suites: scene builders, in-process clusters, real processes.
+
+pub mod scene;

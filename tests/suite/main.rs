@@ -1,3 +1,4 @@
 //! One test binary of modules, so that the suite links once.
 
 mod cli;
+mod physics;

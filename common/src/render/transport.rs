@@ -46,9 +46,6 @@ pub struct TransportPlan {
 /// Ratio of largest to smallest alpha that share one cut.
 const BAND_RATIO: f64 = 4.0;
 
-/// Positions per axis in pixels that the silhouette cuts.
-const SILHOUETTE_GRID: u32 = 4;
-
 impl TransportPlan {
     /// Integrates the table of some pixels. A pixel that sees no surface gets zeros.
     #[must_use]
@@ -130,7 +127,7 @@ fn points(geometry: &Geometry, [column, row]: Pixel, band: Band) -> (Vec<(Point,
     };
     let (c, r) = (column as usize, row as usize);
     let positions = if geometry.coverage(c, r) < 1.0 {
-        footprint::grid(SILHOUETTE_GRID)
+        footprint::on_object(|x, y| geometry.point(f64::from(column) + x, f64::from(row) + y).is_some())
     } else {
         footprint::positions(geometry.normal_spread(c, r), sharpest)
     };
