@@ -50,8 +50,17 @@ pub struct Cut {
 }
 
 impl Cut {
-    /// Refines the pyramid for `point` until no node's error in radiance, for a lobe of unit weight, exceeds `tolerance`.
+    /// Refines the pyramid for `point` until no node's error in radiance, for a lobe of unit weight, exceeds `tolerance`; for glossy
+    /// lobes `tolerance` times `n.v`.
+    ///
+    /// The `F5` part of a lobe has a twentieth of its mean radiance and nearly all of it towards the rim, where `n.v` is small: with
+    /// the same tolerance everywhere its relative error is twenty times that of the lobe. Half of that goes for a fifth
+    /// more terms.
     pub fn refine(&mut self, pyramid: &LightPyramid, point: &Point, band: Band, tolerance: f64) {
+        let tolerance = match band {
+            Band::Diffuse => tolerance,
+            Band::Glossy(..) => tolerance * point.cos_o.max(LEAST_COS_D),
+        };
         self.lights.clear();
         self.stack.clear();
         self.stack.extend(pyramid.roots());

@@ -69,12 +69,19 @@ struct Entry {
 }
 
 impl References {
-    /// Integrates every lobe, those that have a width at each of `widths`.
+    /// Integrates every lobe whose name passes `keep`, those that have a width at each of `widths`.
     #[must_use]
-    pub fn new(scene: &Scene, model: &'static dyn Model, pixels: &[Pixel], widths: &[f64], effort: Effort) -> Self {
+    pub fn new(
+        scene: &Scene,
+        model: &'static dyn Model,
+        pixels: &[Pixel],
+        widths: &[f64],
+        effort: Effort,
+        keep: impl Fn(&str) -> bool,
+    ) -> Self {
         let coarse = coarse_table(scene, model);
         let mut entries = Vec::new();
-        for (lobe, basis) in model.lobes().iter().enumerate() {
+        for (lobe, basis) in model.lobes().iter().enumerate().filter(|(_, basis)| keep(basis.lobe.name())) {
             let widths = if basis.width.is_some() { widths } else { &[0.0] };
             for (w, &width) in widths.iter().enumerate() {
                 let split = SplitLobe { lobe: basis.lobe, width };

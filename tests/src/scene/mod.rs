@@ -2,6 +2,7 @@
 
 pub mod agreement;
 pub mod photograph;
+pub mod prediction;
 pub mod probes;
 pub mod reference;
 pub mod synthetic;
