@@ -6,3 +6,4 @@ pub mod nodes;
 pub mod plan;
 pub mod process;
 pub mod program;
+pub mod scene;

@@ -13,6 +13,8 @@ mod cluster_hostile;
 mod compare;
 mod fit;
 mod network;
+mod physics;
 mod program;
+mod recovery;
 mod render;
 mod tidy;

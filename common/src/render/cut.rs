@@ -61,11 +61,18 @@ pub struct Cut {
 }
 
 impl Cut {
-    /// Refines the pyramid until no node's error in radiance, for a lobe of unit weight, exceeds `tolerance` at any surface point
+    /// Refines the pyramid until no node's error in radiance, for a lobe of unit weight, exceeds `tolerance` (for glossy lobes
+    /// `tolerance` times `n.v`) at any surface point
     /// whose normal and view lie within `reach` (chords of the unit sphere, added) of those of `point`; `point.cos_o` is the lowest
     /// of them.
     pub fn refine(&mut self, pyramid: &LightPyramid, point: &Point, reach: f64, band: Band, tolerance: f64) {
         let bound = Bound::new(point, reach, band);
+        // The `F5` part of a lobe has a twentieth of its mean radiance and nearly all of it towards the rim, where n.v is small: with
+        // the same tolerance everywhere its relative error would be twenty times that of the lobe.
+        let tolerance = match band {
+            Band::Diffuse => tolerance,
+            Band::Glossy(..) => tolerance * point.cos_o.max(LEAST_COS_D),
+        };
         self.nodes.clear();
         self.stack.clear();
         self.stack.extend(pyramid.roots());

@@ -3,6 +3,8 @@
 //! A photo's pixel is a mean over its area. The transport tables take that mean by Gauss-Legendre quadrature whose order
 //! follows how far the normal turns over the pixel, measured in widths of the sharpest lobe.
 
+use crate::math::sampling::PointStream;
+
 /// A position inside a pixel, in [0, 1]^2, and its share of the mean.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Position {
@@ -20,13 +22,27 @@ pub fn positions(spread_rad: f64, alpha: f64) -> Vec<Position> {
     tensor(order(spread_rad, alpha))
 }
 
-/// A regular grid of `n x n` equal positions, for pixels that the silhouette cuts.
+/// Positions for a pixel that the silhouette cuts: the first few points of a low-discrepancy sequence where `hit(x, y)` holds, so
+/// that a sliver gets as many as a pixel that is almost full. None if it misses everywhere.
 #[must_use]
-pub fn grid(n: u32) -> Vec<Position> {
-    let weight = 1.0 / f64::from(n * n);
-    let at = |i: u32| (f64::from(i) + 0.5) / f64::from(n);
-    (0..n).flat_map(|j| (0..n).map(move |i| Position { x: at(i), y: at(j), weight })).collect()
+pub fn on_object(hit: impl Fn(f64, f64) -> bool) -> Vec<Position> {
+    let stream = PointStream::new(SILHOUETTE_STREAM);
+    let points = (0..SILHOUETTE_TRIES).map(|index| stream.point(index)).filter(|&[x, y, ..]| hit(x, y));
+    let mut positions: Vec<Position> =
+        points.take(SILHOUETTE_POSITIONS).map(|[x, y, ..]| Position { x, y, weight: 1.0 }).collect();
+    let weight = 1.0 / positions.len() as f64;
+    positions.iter_mut().for_each(|p| p.weight = weight);
+    positions
 }
+
+/// Positions in a pixel that the silhouette cuts.
+const SILHOUETTE_POSITIONS: usize = 32;
+
+/// Points of the pixel that are tried for them: a sliver of a 256th of the pixel is still found.
+const SILHOUETTE_TRIES: u32 = 1024;
+
+/// The same points in every pixel, so that neighbours differ smoothly.
+const SILHOUETTE_STREAM: u64 = 0;
 
 /// Gauss-Legendre order per axis. With the turn over the pixel in lobe widths, `q`, the error of order `n` falls as `q^(2n)`;
 /// the limits keep it below 2e-3 of the lobe's peak (see the test).

@@ -49,9 +49,6 @@ pub struct TransportPlan {
 /// Ratio of largest to smallest alpha that share one cut.
 const BAND_RATIO: f64 = 4.0;
 
-/// Positions per axis in pixels that the silhouette cuts: the first that sees the object.
-const SILHOUETTE_GRIDS: [u32; 2] = [4, 16];
-
 /// Neighbouring pixels within squares of this side may share a cut.
 const TILE: u32 = 4;
 
@@ -150,8 +147,8 @@ impl TransportPlan {
         let seen = |positions: &[Position]| positions.iter().filter_map(at).collect::<Vec<_>>();
         let (c, r) = (column as usize, row as usize);
         let mut points = if geometry.coverage(c, r) < 1.0 {
-            // Where the coarse grid misses the object, a finer one may see its edge.
-            SILHOUETTE_GRIDS.iter().map(|&n| seen(&footprint::grid(n))).find(|p| !p.is_empty()).unwrap_or_default()
+            let hit = |x: f64, y: f64| geometry.point(f64::from(column) + x, f64::from(row) + y).is_some();
+            seen(&footprint::on_object(hit))
         } else {
             let spread = geometry.normal_spread(c, r) / self.accuracy.footprint;
             seen(&footprint::positions(spread, band.sharpest()))

@@ -1,0 +1,175 @@
+//! How far a transport table is from the direct integrator.
+
+use super::{
+    Scene, covered,
+    reference::{Effort, Reference, SplitLobe},
+};
+use lookalike::{
+    brdf::{Model, flat_bounds, lobe_terms, term_count},
+    math::{Rgb, cell},
+    render::{
+        knots::Knots,
+        table::TransportTable,
+        transport::{Accuracy, Pixel, TransportPlan},
+    },
+    scene::{Circle, Geometry},
+};
+
+/// Deviations of one term of one lobe at one width. All are shares of the term's own mean radiance over the whole object, which is
+/// strict where the term is the small `F5` part.
+#[derive(Debug, Clone, Copy)]
+pub struct Agreement {
+    /// Lobe of the model.
+    pub lobe: usize,
+    /// Channel of the light, and for a lobe that splits also its part: `1 - F5`, `F5`, the whole lobe.
+    pub channel: usize,
+    /// Width; 0 for a lobe of fixed shape.
+    pub width: f64,
+    /// Root mean square over the pixels.
+    pub rms: f64,
+    /// 99th percentile over the pixels of the absolute deviation.
+    pub percentile99: f64,
+    /// Mean over the pixels.
+    pub bias: f64,
+    /// Root mean square over the pixels of the reference's standard error.
+    pub standard_error: f64,
+}
+
+impl std::fmt::Display for Agreement {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self { lobe, channel, width, rms, percentile99, bias, standard_error } = self;
+        write!(
+            f,
+            "lobe {lobe} channel {channel} width {width:.4}: rms {:.4} %, 99th percentile {:.4} %, bias {:+.4} %, reference's \
+             standard error {:.4} %",
+            100.0 * rms,
+            100.0 * percentile99,
+            100.0 * bias,
+            100.0 * standard_error
+        )
+    }
+}
+
+/// References of every lobe of a model at some widths.
+#[derive(Debug)]
+pub struct References {
+    model: &'static dyn Model,
+    pixels: Vec<Pixel>,
+    entries: Vec<Entry>,
+}
+
+/// The reference of one lobe at one width.
+#[derive(Debug)]
+struct Entry {
+    lobe: usize,
+    width: f64,
+    reference: Reference,
+    /// Mean radiance over the object of the parts that the reference's channels hold.
+    level: Rgb,
+}
+
+impl References {
+    /// Integrates every lobe whose name passes `keep`, those that have a width at each of `widths`.
+    #[must_use]
+    pub fn new(
+        scene: &Scene,
+        model: &'static dyn Model,
+        pixels: &[Pixel],
+        widths: &[f64],
+        effort: Effort,
+        keep: impl Fn(&str) -> bool,
+    ) -> Self {
+        let coarse = coarse_table(scene, model);
+        let mut entries = Vec::new();
+        for (lobe, basis) in model.lobes().iter().enumerate().filter(|(_, basis)| keep(basis.lobe.name())) {
+            let widths = if basis.width.is_some() { widths } else { &[0.0] };
+            for (w, &width) in widths.iter().enumerate() {
+                let split = SplitLobe { lobe: basis.lobe, width };
+                let level = Rgb::from_array(std::array::from_fn(|c| mean(&part(model, &coarse, lobe, width, c))));
+                let seed = 1_000 + 100 * lobe as u64 + w as u64;
+                let effort = Effort { level, ..effort };
+                entries.push(Entry {
+                    lobe,
+                    width,
+                    reference: Reference::new(scene, pixels, &split, effort, seed),
+                    level,
+                });
+            }
+        }
+        Self { model, pixels: pixels.to_vec(), entries }
+    }
+
+    /// Integrates a table of `accuracy` on `knots` and compares every term with its reference.
+    #[must_use]
+    pub fn compare(&self, scene: &Scene, knots: Knots, accuracy: Accuracy) -> Vec<Agreement> {
+        let plan = TransportPlan { model: self.model, knots, accuracy };
+        let table = plan.integrate(&scene.geometry, &scene.pyramid, &self.pixels);
+        self.entries.iter().flat_map(|entry| (0..3).map(|channel| self.summary(&table, entry, channel))).collect()
+    }
+
+    fn summary(&self, table: &TransportTable, entry: &Entry, channel: usize) -> Agreement {
+        let values = part(self.model, table, entry.lobe, entry.width, channel);
+        let level = entry.level[channel];
+        let deviation: Vec<f64> =
+            values.iter().zip(&entry.reference.radiance).map(|(value, r)| (value - r[channel]) / level).collect();
+        let mut sizes: Vec<f64> = deviation.iter().map(|d| d.abs()).collect();
+        sizes.sort_by(f64::total_cmp);
+        Agreement {
+            lobe: entry.lobe,
+            channel,
+            width: entry.width,
+            rms: mean(&deviation.iter().map(|d| d * d).collect::<Vec<f64>>()).sqrt(),
+            percentile99: sizes[cell(0.99 * sizes.len() as f64, sizes.len())],
+            bias: mean(&deviation),
+            standard_error: entry.reference.standard_error[channel] / level,
+        }
+    }
+}
+
+/// What one channel of a [`SplitLobe`] reference holds, by a table: the same part of the lobe under the same channel of the light.
+fn part(model: &dyn Model, table: &TransportTable, lobe: usize, width: f64, channel: usize) -> Vec<f64> {
+    let lobes = model.lobes();
+    let first: usize = lobes[..lobe].iter().map(|b| lobe_terms(b.lobe)).sum();
+    let mut planes = vec![table.planes(); term_count(model)];
+    // Terms depend on the widths alone.
+    let (mut parameters, _) = flat_bounds(model.parameters());
+    if let Some(entry) = lobes[lobe].width {
+        parameters[entry] = width;
+    }
+    table.terms(model, &parameters, false, &mut planes);
+    let terms = match (lobe_terms(lobes[lobe].lobe), channel) {
+        (1, _) => first..first + 1,
+        (_, 0 | 1) => first + channel..first + channel + 1,
+        _ => first..first + 2,
+    };
+    (0..table.pixels).map(|p| terms.clone().map(|t| planes[t][channel][p]).sum()).collect()
+}
+
+/// The whole object for mean radiances: a sphere in few pixels, any other shape as it is.
+fn coarse_table(scene: &Scene, model: &'static dyn Model) -> TransportTable {
+    let plan = TransportPlan { model, knots: Knots::covering(0.005, 1.0, 4.0), accuracy: Accuracy { tolerance: 1e-4, footprint: 1.0 } };
+    if scene.geometry.circle().is_none() {
+        return plan.integrate(&scene.geometry, &scene.pyramid, &scene.interior());
+    }
+    let circle = Circle::inscribed(COARSE, COARSE);
+    let small = Geometry::sphere(COARSE, COARSE, circle, scene.geometry.camera()).expect("a coarse sphere is valid");
+    plan.integrate(&small, &scene.pyramid, &covered(&small, |coverage| coverage >= 0.5))
+}
+
+/// Pixels per side of the coarse object: mean radiances to a percent.
+const COARSE: usize = 32;
+
+fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len() as f64
+}
+
+/// The widths half-way (in their logarithm) between neighbouring knots, one for each of the widths asked for: where interpolation is
+/// worst.
+#[must_use]
+pub fn mid_knots(knots: &Knots, near: &[f64]) -> Vec<f64> {
+    let widths = knots.widths();
+    let between: Vec<f64> = widths.windows(2).map(|w| (w[0] * w[1]).sqrt()).collect();
+    let distance = |a: f64, b: f64| (a.ln() - b.ln()).abs();
+    let nearest = |w: f64| between.iter().copied().min_by(|a, b| distance(*a, w).total_cmp(&distance(*b, w)));
+    near.iter().filter_map(|&w| nearest(w)).collect()
+}

@@ -1,0 +1,46 @@
+//! Tables against the direct integrator under real light: minutes, so behind `--features slow`.
+
+use super::{Case, THOROUGH, TOLERANCE};
+use lookalike::{render::transport::Accuracy, scene::Camera};
+use lookalike_tests::scene::{
+    Scene,
+    probes::{GRACE, NOON_GRASS, Probe, RNL, STUDIO, UFFIZI},
+};
+
+/// Root mean square deviation of full-resolution tables: stage two and polish rank images that differ by far more.
+const FULL_TOLERANCE: f64 = 5e-3;
+
+/// Half-way between knots, over the widths that materials have.
+const ALPHAS: [f64; 6] = [0.01, 0.025, 0.06, 0.15, 0.4, 0.95];
+
+fn agree(probe: Probe) {
+    let Some(environment) = probe.load() else { return };
+    let scene = Scene::sphere(256, Camera::Orthographic, environment).unwrap();
+    let accuracies = [(Accuracy::SUBSET, TOLERANCE), (Accuracy::FULL, FULL_TOLERANCE)];
+    Case { name: probe.0, alphas: &ALPHAS, pixels: 64, accuracies: &accuracies, rigour: THOROUGH }.check(&scene);
+}
+
+#[test]
+fn tables_agree_under_grace_cathedral() {
+    agree(GRACE);
+}
+
+#[test]
+fn tables_agree_under_eucalyptus_grove() {
+    agree(RNL);
+}
+
+#[test]
+fn tables_agree_under_the_uffizi_gallery() {
+    agree(UFFIZI);
+}
+
+#[test]
+fn tables_agree_in_a_studio() {
+    agree(STUDIO);
+}
+
+#[test]
+fn tables_agree_under_a_real_sun() {
+    agree(NOON_GRASS);
+}
