@@ -13,8 +13,10 @@ mod cluster_hostile;
 mod compare;
 mod fit;
 mod network;
+#[cfg(feature = "slow")]
 mod physics;
 mod program;
+#[cfg(feature = "slow")]
 mod recovery;
 mod render;
 mod tidy;
