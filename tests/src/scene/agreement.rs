@@ -88,7 +88,12 @@ impl References {
                 let level = Rgb::from_array(std::array::from_fn(|c| mean(&part(model, &coarse, lobe, width, c))));
                 let seed = 1_000 + 100 * lobe as u64 + w as u64;
                 let effort = Effort { level, ..effort };
-                entries.push(Entry { lobe, width, reference: Reference::new(scene, pixels, &split, effort, seed), level });
+                entries.push(Entry {
+                    lobe,
+                    width,
+                    reference: Reference::new(scene, pixels, &split, effort, seed),
+                    level,
+                });
             }
         }
         Self { model, pixels: pixels.to_vec(), entries }
@@ -142,11 +147,7 @@ fn part(model: &dyn Model, table: &TransportTable, lobe: usize, width: f64, chan
 
 /// The whole object for mean radiances: a sphere in few pixels, any other shape as it is.
 fn coarse_table(scene: &Scene, model: &'static dyn Model) -> TransportTable {
-    let plan = TransportPlan {
-        model,
-        knots: Knots::covering(0.005, 1.0, 4.0),
-        accuracy: Accuracy { tolerance: 1e-4 },
-    };
+    let plan = TransportPlan { model, knots: Knots::covering(0.005, 1.0, 4.0), accuracy: Accuracy { tolerance: 1e-4 } };
     if scene.geometry.circle().is_none() {
         return plan.integrate(&scene.geometry, &scene.pyramid, &scene.interior());
     }

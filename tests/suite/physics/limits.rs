@@ -21,7 +21,8 @@ type Surface = Option<f64>;
 
 fn render(scene: &Scene, pixels: &[Pixel], surface: Surface, accuracy: Accuracy) -> Planes {
     // Cook-Torrance without specular colour is purely diffuse; GGX always reflects at grazing angles.
-    let (model, colour): (&'static dyn Model, &str) = if surface.is_some() { (&Ggx, "f0") } else { (&CookTorrance, "kd") };
+    let (model, colour): (&'static dyn Model, &str) =
+        if surface.is_some() { (&Ggx, "f0") } else { (&CookTorrance, "kd") };
     let mut parameters = vec![0.0; flat_len(model.parameters())];
     let first = offset_of(model.parameters(), colour).unwrap();
     parameters[first..first + 3].fill(1.0);
