@@ -6,8 +6,8 @@
     experiments/mitsuba_compare.py MAP.hdr --out DIR [--size 128] [--samples 1024]
 
 For a diffuse sphere and for GGX at F = 1 (Mitsuba: `roughconductor`, material `none`) it prints the relative root mean
-square difference over the sphere, the ratio of the means per channel, and the same difference after every flip and
-quarter turn, where only the unturned image may agree. PNGs of both and of their difference go to DIR.
+square difference over the sphere beside Mitsuba's own noise, the ratio of the means per channel, and the same difference
+after every flip and quarter turn, where the unturned image must agree best. PNGs of both and of their difference go to DIR.
 
 Two conventions differ, and are resolved here:
 - Mitsuba puts the centres of the first and last row of a map on the poles, this project half a texel inside. The map is
@@ -45,7 +45,7 @@ def bsdf(kind, value):
     return {"type": "roughconductor", "distribution": "ggx", "alpha": value, "material": "none"}
 
 
-def mitsuba_image(latlong, kind, value, size, samples):
+def mitsuba_image(latlong, kind, value, size, samples, seed):
     scene = mi.load_dict({
         "type": "scene",
         "integrator": {"type": "direct", "emitter_samples": 1, "bsdf_samples": 1, "hide_emitters": True},
@@ -59,7 +59,7 @@ def mitsuba_image(latlong, kind, value, size, samples):
             "sampler": {"type": "independent", "sample_count": samples},
         },
     })
-    return np.array(mi.render(scene))[..., :3]
+    return np.array(mi.render(scene, seed=seed))[..., :3]
 
 
 def our_image(program, map_path, out, size, samples, kind, value):
@@ -75,6 +75,14 @@ def write_png(path, image, exposure):
 
 def relative_rms(a, b, inside):
     return np.sqrt(np.mean((a - b)[inside] ** 2)) / np.mean(b[inside])
+
+
+def block_means(image, inside, side=8):
+    """Means over the blocks of side x side pixels that lie wholly on the sphere: the noise falls by `side`."""
+    count = image.shape[0] // side
+    split = image[:count * side, :count * side].reshape(count, side, count, side, 3).mean(axis=(1, 3))
+    whole = inside[:count * side, :count * side].reshape(count, side, count, side).all(axis=(1, 3))
+    return split[whole]
 
 
 def orientations(image):
@@ -99,11 +107,17 @@ def main():
     for kind, value in SURFACES:
         ours, latlong = our_image(arguments.program, arguments.map, arguments.out, size, 4 * arguments.samples, kind, value)
         # Two independent halves give Mitsuba's own noise.
-        halves = [mitsuba_image(latlong, kind, value, size, arguments.samples // 2) for _ in range(1)]
-        theirs = halves[0]
+        halves = [mitsuba_image(latlong, kind, value, size, arguments.samples // 2, seed) for seed in (1, 2)]
+        theirs = 0.5 * (halves[0] + halves[1])
+        noise = 0.5 * relative_rms(halves[0], halves[1], inside)
         ratio = ours[inside].mean(axis=0) / theirs[inside].mean(axis=0)
-        print(f"{kind} {value}: relative RMS {100 * relative_rms(ours, theirs, inside):.2f} %, "
+        blocks = [block_means(image, inside) for image in (ours, theirs, *halves)]
+        everything = np.ones(len(blocks[0]), bool)
+        coarse = relative_rms(blocks[0], blocks[1], everything)
+        coarse_noise = 0.5 * relative_rms(blocks[2], blocks[3], everything)
+        print(f"{kind} {value}: relative RMS {100 * relative_rms(ours, theirs, inside):.2f} %, Mitsuba's noise {100 * noise:.2f} %, "
               f"means ours / Mitsuba {ratio.round(5)}")
+        print(f"    over blocks of 8 x 8 pixels {100 * coarse:.2f} %, noise {100 * coarse_noise:.2f} %")
         others = {name: relative_rms(image, theirs, inside) for name, image in orientations(ours)}
         best = min(others, key=others.get)
         runner_up = sorted(others.values())[1]

@@ -1,6 +1,6 @@
 //! Run-time choice of vector instructions, and the switch that limits it.
 //!
-//! A loop given to [`dispatch`] is compiled once per instruction set, and the widest one that the processor has is chosen when it
+//! A loop given to `dispatch` is compiled once per instruction set, and the widest one that the processor has is chosen when it
 //! runs. Only the width of the vectors changes: the loops use plain IEEE operations in a fixed order, without contraction, so that
 //! the results have the same bits at every level (design section 9). The switch exists to show that: a test runs one fit at
 //! both levels.
@@ -8,7 +8,7 @@
 use pulp::{Arch, NullaryFnOnce};
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Which instructions [`dispatch`] uses.
+/// Which instructions `dispatch` uses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Level {
     /// The widest that this processor has.
@@ -20,7 +20,7 @@ pub enum Level {
 
 static BASELINE: AtomicBool = AtomicBool::new(false);
 
-/// Sets the level of every later [`dispatch`] of this process, on any thread.
+/// Sets the level of every later `dispatch` of this process, on any thread.
 pub fn limit(level: Level) {
     BASELINE.store(level == Level::Baseline, Ordering::Relaxed);
 }

@@ -27,9 +27,10 @@ pub struct Photograph {
     pub pixels: Vec<[f32; 3]>,
     /// Mean luminance over the object.
     pub mean_radiance: f64,
-    /// Standard deviation of the noise of every channel of every pixel.
-    pub noise: f64,
-    /// Standard error of the radiance before noise, root mean square over the pixels and the worst channel.
+    /// Variance of every pixel: the noise that was added, and the integrator's own, which matters in pixels that are hundreds of
+    /// times brighter than the mean.
+    pub variance: Vec<Rgb>,
+    /// Median over the pixels of the integrator's standard error, the worst channel.
     pub standard_error: f64,
 }
 
@@ -71,12 +72,14 @@ impl Photograph {
         let reference = Reference::new(scene, &subset.pixels, material, effort, exposure.seed);
         let noise = exposure.noise * mean_radiance;
         let noisy = |(&pixel, &radiance): (&Pixel, &Rgb)| narrow(radiance + gaussian(exposure.seed, pixel) * noise);
+        let mut errors: Vec<f64> = reference.variance.iter().map(|v| v.max_element().sqrt()).collect();
+        errors.sort_by(f64::total_cmp);
         Self {
             pixels: subset.pixels.iter().zip(&reference.radiance).map(noisy).collect(),
             subset,
             mean_radiance,
-            noise,
-            standard_error: reference.standard_error.max_element(),
+            variance: reference.variance.iter().map(|v| *v + Rgb::splat(noise * noise)).collect(),
+            standard_error: errors[errors.len() / 2],
         }
     }
 }

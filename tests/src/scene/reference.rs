@@ -45,6 +45,8 @@ impl Reflectance for SplitLobe {
 pub struct Reference {
     /// Mean over the randomisations, per pixel.
     pub radiance: Vec<Rgb>,
+    /// Variance of `radiance`, per pixel.
+    pub variance: Vec<Rgb>,
     /// Per channel, the root mean square over the pixels of the standard error of `radiance`.
     pub standard_error: Rgb,
 }
@@ -79,6 +81,7 @@ impl Reference {
         let mean_variance = estimates.iter().map(|e| e.variance).sum::<Rgb>() / pixels.len() as f64;
         Self {
             radiance: estimates.iter().map(|e| e.mean).collect(),
+            variance: estimates.iter().map(|e| e.variance).collect(),
             standard_error: Rgb::from_array(mean_variance.to_array().map(f64::sqrt)),
         }
     }

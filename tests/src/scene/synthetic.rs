@@ -9,6 +9,19 @@ use lookalike::{image::Image, light::Environment, math::to_f32};
 /// When `n` is below 16.
 #[must_use]
 pub fn room(n: usize) -> Environment {
+    furnished(n, [500.0, 450.0, 400.0])
+}
+
+/// The same room without the sun, for checks that would need very many samples beside it.
+///
+/// # Panics
+/// When `n` is below 16.
+#[must_use]
+pub fn room_at_dusk(n: usize) -> Environment {
+    furnished(n, [0.1; 3])
+}
+
+fn furnished(n: usize, sun: [f64; 3]) -> Environment {
     assert!(n >= 16, "a room of {n} rows has no place for its windows");
     let texel = |k: usize| {
         let (row, column) = (k / (2 * n), k % (2 * n));
@@ -21,7 +34,7 @@ pub fn room(n: usize) -> Environment {
             }
         }
         if (row, column) == (n * 3 / 10, n * 9 / 10) {
-            rgb = [500.0, 450.0, 400.0];
+            rgb = sun;
         }
         rgb.map(to_f32)
     };

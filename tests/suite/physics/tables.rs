@@ -37,7 +37,7 @@ fn fresnel_part_of_sharp_lobes_agrees_at_the_rim_under_a_sun_of_one_texel() {
 #[test]
 fn tables_agree_with_the_direct_integrator_through_a_perspective_camera() {
     let camera = Camera::perspective(50.0).unwrap();
-    let scene = Scene::sphere(256, camera, synthetic::room(64)).unwrap();
+    let scene = Scene::sphere(256, camera, synthetic::room_at_dusk(64)).unwrap();
     Case { name: "perspective", alphas: &[0.1], pixels: 24, accuracies: SUBSET, rigour: QUICK }.check(&scene);
 }
 

@@ -12,7 +12,7 @@ use lookalike_tests::scene::{
     reference::Effort,
 };
 
-const SLOW: Exposure = Exposure { effort: Effort { most: 1 << 18, ..EXPOSURE.effort }, ..EXPOSURE };
+const SLOW: Exposure = Exposure { effort: Effort { first: 1 << 12, most: 1 << 16, ..EXPOSURE.effort }, ..EXPOSURE };
 
 fn recover(probe: Probe) {
     let Some(environment) = probe.load() else { return };
