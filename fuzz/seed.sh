@@ -2,10 +2,13 @@
 # Fills corpus/ with files to start from.
 set -eu
 cd "$(dirname "$0")"
-mkdir -p corpus/exr corpus/hdr corpus/pfm corpus/png_jpeg
+mkdir -p corpus/exr corpus/hdr corpus/pfm corpus/png_jpeg corpus/codec
 cp ../common/src/image/fixtures/*.exr corpus/exr/
 printf '#?RADIANCE\nEXPOSURE=2\nCOLORCORR=1 1 2\nPRIMARIES=0.64 0.33 0.29 0.60 0.15 0.06 0.333 0.333\nFORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 10\n\002\002\000\012\212\200\212\000\212\000\212\201' > corpus/hdr/new
 printf '#?RGBE\n\n+X 1 -Y 4\n\200\100\040\201\001\001\001\003' > corpus/hdr/old
 printf 'PF\n1 1\n-1.0\n\000\000\200\077\000\000\200\077\000\000\200\077' > corpus/pfm/colour
 printf 'Pf\r\n1 2\r\n2\r\n\077\200\000\000\077\200\000\000' > corpus/pfm/grey
 cp seeds/png_jpeg/* corpus/png_jpeg/
+# The first byte chooses the decoder: a frame of a goodbye, an access file.
+printf '\001\003\002\000\000\000\000\006' > corpus/codec/frame
+printf '\006{ "address": "127.0.0.1:45123", "certificate": null, "secret": "%064d" }' 0 > corpus/codec/access

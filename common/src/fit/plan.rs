@@ -88,7 +88,7 @@ pub struct FitOutcome {
     pub polished: Option<Polished>,
     /// The rendering of the winner of stage two, as [`Self::matched`].
     pub winner_image: Image,
-    /// The rendering of the final parameters at full resolution, linear Rec. 709, not multiplied by coverage.
+    /// The rendering of the final parameters at full resolution, linear Rec. 709, over black.
     pub matched: Image,
     /// The error of the match, per window.
     pub error_map: ErrorMap,

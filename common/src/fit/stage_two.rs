@@ -25,6 +25,8 @@ pub struct FullView<'a> {
     pub table: &'a TransportTable,
     /// The pixels that see the object.
     pub pixels: &'a [Pixel],
+    /// How much of each pixel of the image shows the object, `height x width`.
+    pub coverage: &'a [f32],
     /// Columns of the image.
     pub width: usize,
     /// Rows of the image.
@@ -32,8 +34,8 @@ pub struct FullView<'a> {
 }
 
 impl FullView<'_> {
-    /// The image of a flat parameter vector: mean radiance over the covered part of each pixel, zero outside (not yet multiplied by
-    /// coverage).
+    /// The image of a flat parameter vector over black, as a photo shows it: mean radiance over the covered part of each pixel
+    /// times its coverage.
     #[must_use]
     pub fn render(&self, parameters: &[f64]) -> Image {
         let mut planes: Planes = self.table.planes();
@@ -41,7 +43,9 @@ impl FullView<'_> {
         let mut image = Image::new(self.width, self.height);
         let out = image.pixels_mut();
         for (i, &[column, row]) in self.pixels.iter().enumerate() {
-            out[row as usize * self.width + column as usize] = std::array::from_fn(|c| to_f32(planes[c][i]));
+            let place = row as usize * self.width + column as usize;
+            let coverage = f64::from(self.coverage[place]);
+            out[place] = std::array::from_fn(|c| to_f32(planes[c][i] * coverage));
         }
         image
     }

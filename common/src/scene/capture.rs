@@ -167,8 +167,9 @@ impl Capture {
         self.has_background
     }
 
-    /// What photo and rendering are multiplied by before they are scored (design section 6): the coverage, or, for a photo
-    /// with a background, 1 where the coverage is full and 0 elsewhere, as an edge pixel shows the background too.
+    /// What a rendering is multiplied by before it is scored (design section 6); pixels of value 0 are not scored. It is the
+    /// coverage, which a photo over black holds already, or, for a photo with a background, 1 where the coverage is full and 0
+    /// elsewhere, as an edge pixel shows the background too.
     #[must_use]
     pub fn scoring_coverage(&self) -> Vec<f32> {
         let kept = |&coverage: &f32| if !self.has_background || coverage == 1.0 { coverage } else { 0.0 };

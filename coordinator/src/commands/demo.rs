@@ -83,10 +83,10 @@ fn picture(outcome: &FitOutcome, pictures: &Pictures) -> Image {
         vec![(pictures.displayed(&pictures.reference), ["photo".to_owned(), "measured-like noise".to_owned()])];
     for (gamma, image) in outcome.extra.iter().filter(|(gamma, _)| SHOWN.contains(gamma)) {
         let label = if *gamma == 1.0 { "gamma 1 (L2)".to_owned() } else { format!("gamma {gamma}") };
-        panels.push((pictures.displayed_rendering(image), [label, format!("CSSIM {:.4}", score(*gamma))]));
+        panels.push((pictures.displayed(image), [label, format!("CSSIM {:.4}", score(*gamma))]));
     }
     let won = [format!("winner: gamma {}", winner.candidate.gamma), format!("CSSIM {:.4}", winner.cssim)];
-    panels.push((pictures.displayed_rendering(&outcome.winner_image), won));
+    panels.push((pictures.displayed(&outcome.winner_image), won));
     if let Some(polished) = &outcome.polished {
         let label = ["polished".to_owned(), format!("CSSIM {:.4}", polished.cssim)];
         panels.push((pictures.displayed(&pictures.matched), label));

@@ -9,7 +9,7 @@ use lookalike::{
     scene::Capture,
 };
 
-/// Images ready to be written, linear Rec. 709, multiplied by coverage.
+/// Images ready to be written, linear Rec. 709, over black.
 #[derive(Debug)]
 pub(crate) struct Pictures {
     /// The photo where it is scored.
@@ -30,8 +30,8 @@ impl Pictures {
         let mut errors: Vec<f64> = outcome.error_map.error.clone();
         let difference_scale = full_scale(&mut errors);
         Self {
-            reference: times(capture.photo(), &coverage),
-            matched: times(&outcome.matched, &coverage),
+            reference: scored(capture.photo(), &coverage),
+            matched: outcome.matched.clone(),
             difference: outcome.error_map.picture(difference_scale),
             difference_scale,
             coverage,
@@ -42,11 +42,6 @@ impl Pictures {
     /// A linear image as it looks on a display: exposed; the PNG writer clips and encodes.
     pub(crate) fn displayed(&self, image: &Image) -> Image {
         exposed(image, self.exposure)
-    }
-
-    /// A rendering that is not yet multiplied by coverage, as it looks on a display.
-    pub(crate) fn displayed_rendering(&self, image: &Image) -> Image {
-        exposed(&times(image, &self.coverage), self.exposure)
     }
 }
 
@@ -78,11 +73,11 @@ fn full_scale(errors: &mut Vec<f64>) -> f64 {
     [0.02, 0.05, 0.1, 0.2, 0.5].into_iter().find(|&scale| high <= scale).unwrap_or(1.0)
 }
 
-fn times(image: &Image, coverage: &[f32]) -> Image {
-    let pixels = image.pixels().iter().zip(coverage);
-    // A pixel of no coverage may hold anything, even NaN.
-    let pixels = pixels.map(|(p, &c)| if c > 0.0 { p.map(|x| x * c) } else { [0.0; 3] }).collect();
-    Image::from_pixels(image.width(), image.height(), pixels)
+/// The photo where it is scored, else black.
+fn scored(photo: &Image, coverage: &[f32]) -> Image {
+    let pixels = photo.pixels().iter().zip(coverage);
+    let pixels = pixels.map(|(p, &c)| if c > 0.0 { *p } else { [0.0; 3] }).collect();
+    Image::from_pixels(photo.width(), photo.height(), pixels)
 }
 
 fn exposed(image: &Image, exposure: f64) -> Image {

@@ -29,7 +29,7 @@ fn summary(record: &FitRecord<'_>, timing: &Timing, out: &str) -> String {
     let mut rows = vec![header(model)];
     let first = outcome.judged.iter().find(|j| j.candidate.gamma == 1.0);
     if let Some(j) = first {
-        rows.push(row(model, "least squares (L2)", "1", j.cssim, j.cssim_object, &j.candidate.parameters));
+        rows.push(row(model, "L2 baseline", "1", j.cssim, j.cssim_object, &j.candidate.parameters));
     }
     let winner = &outcome.judged[outcome.winner];
     let gamma = winner.candidate.gamma.to_string();

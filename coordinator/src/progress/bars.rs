@@ -36,8 +36,8 @@ impl Bars {
         bar.set_position((count.done * 1000 + count.permille).min(count.planned * 1000));
         let best = self.best.get().map(|score| format!("best CSSIM {score:.4}"));
         let best = best.filter(|_| matches!(stage, Stage::Judging | Stage::Polish)).unwrap_or_default();
-        let nodes = if count.planned > 1 { format!("{} of {}  ", count.done, count.planned) } else { String::new() };
-        bar.set_message(format!("{nodes}{best}"));
+        let nodes = if count.planned > 1 { format!("{} of {}", count.done, count.planned) } else { String::new() };
+        bar.set_message(if best.is_empty() { nodes } else { best });
         if count.is_complete() {
             bar.disable_steady_tick();
             bar.abandon();
@@ -62,7 +62,8 @@ impl Display for Bars {
     }
 
     fn finish(&mut self, _outcome: Result<(), &str>) {
-        for bar in self.bars.values() {
+        // A bar that is complete keeps the time at which it was: drawing it again would show the time of now.
+        for bar in self.bars.values().filter(|bar| !bar.is_finished()) {
             bar.disable_steady_tick();
             bar.abandon();
         }
@@ -70,7 +71,8 @@ impl Display for Bars {
 }
 
 fn style() -> ProgressStyle {
-    ProgressStyle::with_template("{prefix:<36} {bar:30.cyan/blue} {percent:>3}%  {elapsed:>4}  {msg}")
+    // The bar takes what is left of the line, 11 columns of a terminal with 60.
+    ProgressStyle::with_template("{prefix:<20} {msg:<17} {elapsed:>4} {percent:>3}% {wide_bar:.cyan/blue}")
         .unwrap_or_else(|_| ProgressStyle::default_bar())
         .progress_chars("━━─")
 }

@@ -21,10 +21,10 @@ impl Stage {
 
     pub(super) fn title(self) -> &'static str {
         match self {
-            Self::SubsetTables => "transport of the pixel subset",
+            Self::SubsetTables => "subset transport",
             Self::Searches => "stage one: searches",
-            Self::FullTables => "transport in full",
-            Self::Judging => "stage two: CSSIM of the candidates",
+            Self::FullTables => "full transport",
+            Self::Judging => "stage two: CSSIM",
             Self::Polish => "stage three: polish",
             Self::Pictures => "pictures",
         }

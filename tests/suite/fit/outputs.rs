@@ -22,12 +22,12 @@ fn check_ggx(parameters: &Value) {
 #[test]
 fn fit_json_has_the_shape_of_the_contract() {
     let folder = folder();
-    let answer = fit(folder.path(), "out", "--samples 48 --workers 2 --seed 3 --progress none").done();
+    let answer = fit(folder.path(), "out", "--samples 32 --workers 2 --seed 3 --progress none").done();
     let json = fit_json(&folder.path().join("out"));
     for (name, expected) in [
         ("schema", json!("lookalike.fit/1")),
         ("model", json!("ggx")),
-        ("samples", json!(48)),
+        ("samples", json!(32)),
         ("seed", json!(3)),
         ("search", json!("least-squares")),
         ("exposure_gain", json!([1.0, 1.0, 1.0])),

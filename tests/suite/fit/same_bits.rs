@@ -22,7 +22,7 @@ use std::{
 };
 
 /// Several shards of the subset's table, so that a worker can be killed between them.
-const FLAGS: &str = "--samples 160 --seed 5";
+const FLAGS: &str = "--samples 128 --seed 5";
 
 /// A fit whose first worker at work is killed with SIGKILL; returns its events.
 fn fit_with_a_killed_worker(folder: &Path) -> Vec<Value> {
@@ -91,7 +91,7 @@ fn in_this_process(folder: &Path, level: Level) -> FitOutcome {
     let capture = load_capture(&files).unwrap().capture;
     let coverage = capture.scoring_coverage();
     let exposure = resolve_display_exposure(&DisplayExposure::Auto, capture.photo(), &coverage).unwrap();
-    let method = Method { samples: SampleCount::Draws(160), seed: 5, ..Method::default() };
+    let method = Method { samples: SampleCount::Draws(128), seed: 5, ..Method::default() };
     let planner = FitPlanner::new(Arc::new(capture), method, exposure).unwrap();
     simd::limit(level);
     let planner = run_in_process(planner, &nodes::registry(), Execution::Parallel);

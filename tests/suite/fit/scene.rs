@@ -17,21 +17,26 @@ use std::{
 use tempfile::TempDir;
 
 /// Columns and rows of the photo.
-pub(super) const SIZE: usize = 64;
+pub(super) const SIZE: usize = 48;
 
 /// A cheap fit: few pixels, few gammas, one worker.
-pub(super) const QUICK: &str = "--samples 48 --gammas 1:2:0.5 --workers 1 --progress none";
+pub(super) const QUICK: &str = "--samples 32 --gammas 1:2:0.5 --workers 1 --progress none";
 
 /// A folder with `photo.exr` and `map.exr`.
 pub(super) fn folder() -> TempDir {
-    static SCENE: OnceLock<(Image, Image)> = OnceLock::new();
-    let (photo, map) = SCENE.get_or_init(|| {
-        let map = map();
-        (photo(&map), map)
-    });
+    static PHOTO: OnceLock<Image> = OnceLock::new();
+    folder_with(PHOTO.get_or_init(|| photo(SIZE)))
+}
+
+/// As [`folder`], with a photo of another size.
+pub(super) fn folder_of_size(size: usize) -> TempDir {
+    folder_with(&photo(size))
+}
+
+fn folder_with(photo: &Image) -> TempDir {
     let folder = tempfile::tempdir().unwrap();
     write_exr(&folder.path().join("photo.exr"), photo);
-    write_exr(&folder.path().join("map.exr"), map);
+    write_exr(&folder.path().join("map.exr"), &map());
     folder
 }
 
@@ -45,9 +50,9 @@ fn map() -> Image {
 }
 
 /// A plastic whose lobe ggx cannot express, with the noise of 256 samples.
-fn photo(map: &Image) -> Image {
-    let light = LightDistribution::new(Arc::new(Environment::new(map.clone()).unwrap()));
-    let geometry = Geometry::sphere(SIZE, SIZE, Circle::inscribed(SIZE, SIZE), Camera::Orthographic).unwrap();
+fn photo(size: usize) -> Image {
+    let light = LightDistribution::new(Arc::new(Environment::new(map()).unwrap()));
+    let geometry = Geometry::sphere(size, size, Circle::inscribed(size, size), Camera::Orthographic).unwrap();
     let paint = Material::new(&CookTorrance, vec![0.3, 0.12, 0.08, 0.8, 0.8, 0.8, 0.06, 0.2]).unwrap();
     Shot { geometry: &geometry, light: &light, reflectance: &paint, samples: 256, seed: 11 }.render(|| ()).image
 }

@@ -1,6 +1,6 @@
 //! Every setting of the method does what it says, as seen in `fit.json`.
 
-use super::scene::{QUICK, fit, folder, number, quick, without_timing};
+use super::scene::{QUICK, fit, fit_json, folder, folder_of_size, number, quick, without_timing};
 use serde_json::{Value, json};
 use std::fs;
 
@@ -34,11 +34,16 @@ fn gammas_are_those_asked_for() {
 
 #[test]
 fn full_samples_use_every_usable_pixel() {
-    let [a, b] = ["1", "2"].map(|seed| quick(&format!("--samples full --gammas 1 --polish off --seed {seed}")));
+    let folder = folder_of_size(20);
+    let fitted = |out: &str, flags: &str| {
+        fit(folder.path(), out, &format!("{QUICK} --gammas 1 --polish off {flags}")).done();
+        fit_json(&folder.path().join(out))
+    };
+    let [a, b] = ["1", "2"].map(|seed| fitted(seed, &format!("--samples full --seed {seed}")));
     assert_eq!(a["samples"], "full");
     // Nothing is drawn, so that the seed does not matter; the cost is an estimate of the same sum from a subset.
     assert_eq!(a["candidates"], b["candidates"]);
-    let subset = quick("--samples 48 --gammas 1 --polish off");
+    let subset = fitted("few", "");
     let [all, few] = [&a, &subset].map(|json| number(&json["candidates"][0]["cost"]));
     assert!(few > 0.2 * all && few < 2.0 * all, "{few} of {all}");
 }
@@ -60,7 +65,7 @@ fn pattern_search_finds_about_the_minimum_of_least_squares_with_many_more_evalua
 fn preset_paper_is_the_method_of_the_paper() {
     let json = quick("--preset paper");
     // Flags given as well win over it: those of the quick fit.
-    assert_eq!((json["samples"].as_u64(), gammas(&json).len()), (Some(48), 3));
+    assert_eq!((json["samples"].as_u64(), gammas(&json).len()), (Some(32), 3));
     for (name, expected) in [
         ("model", "cook-torrance"),
         ("search", "pattern"),

@@ -14,7 +14,7 @@ pub(in crate::fit) struct ReportParameters {
 
 #[derive(Debug, Serialize, Deserialize)]
 pub(in crate::fit) struct ReportWire {
-    /// One rendering per parameter vector, not multiplied by coverage.
+    /// One rendering per parameter vector, over black.
     pub(in crate::fit) images: Vec<ImageWire>,
     /// 1 minus the product of the five features at each window of the last image: `(height - 10) x (width - 10)`.
     pub(in crate::fit) error: Vec<f64>,

@@ -21,7 +21,8 @@ use std::sync::Arc;
 pub(in crate::fit) struct ViewWire {
     pub(in crate::fit) model: String,
     pub(in crate::fit) photo: ImageWire,
-    /// One value in [0, 1] per pixel; both images are multiplied by it.
+    /// One value in [0, 1] per pixel: renderings are multiplied by it, and pixels without it are not scored. A photo over black
+    /// holds its coverage already: to multiply it again would darken its edge against that of every rendering.
     pub(in crate::fit) coverage: Vec<f32>,
     pub(in crate::fit) exposure: f64,
     pub(in crate::fit) judge_object: bool,
@@ -36,6 +37,7 @@ pub(super) struct View {
     pub(super) judge: Judge,
     pub(super) by: JudgedBy,
     pixels: Vec<Pixel>,
+    coverage: Vec<f32>,
     width: usize,
     height: usize,
 }
@@ -62,8 +64,8 @@ impl Scene {
     }
 
     pub(super) fn full(&self) -> FullView<'_> {
-        let View { model, pixels, width, height, .. } = &*self.view;
-        FullView { model: *model, table: &self.table, pixels, width: *width, height: *height }
+        let View { model, pixels, coverage, width, height, .. } = &*self.view;
+        FullView { model: *model, table: &self.table, pixels, coverage, width: *width, height: *height }
     }
 }
 
@@ -72,14 +74,15 @@ impl View {
         let wire: ViewWire = read("view", bytes)?;
         let photo: Image = wire.photo.image()?;
         let model = brdf::model(&wire.model).map_err(|error| NodeFailure::new(error.to_string()))?;
-        let judge = Judge::new(&photo, &wire.coverage, wire.exposure, &JudgeOptions::default())
+        let scored: Vec<f32> = wire.coverage.iter().map(|&c| if c > 0.0 { 1.0 } else { 0.0 }).collect();
+        let judge = Judge::new(&photo, &scored, wire.exposure, &JudgeOptions::default())
             .map_err(|error| NodeFailure::new(format!("the photo cannot be judged: {error}")))?;
         let (width, height) = (photo.width(), photo.height());
         if let Some(p) = wire.pixels.iter().find(|p| p[0] as usize >= width || p[1] as usize >= height) {
             return Err(NodeFailure::new(format!("pixel {p:?} lies outside the {width} x {height} photo")));
         }
         let by = if wire.judge_object { JudgedBy::Object } else { JudgedBy::Image };
-        Ok(Self { model, judge, by, pixels: wire.pixels, width, height })
+        Ok(Self { model, judge, by, pixels: wire.pixels, coverage: wire.coverage, width, height })
     }
 }
 
