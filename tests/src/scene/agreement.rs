@@ -147,7 +147,11 @@ fn part(model: &dyn Model, table: &TransportTable, lobe: usize, width: f64, chan
 
 /// The whole object for mean radiances: a sphere in few pixels, any other shape as it is.
 fn coarse_table(scene: &Scene, model: &'static dyn Model) -> TransportTable {
-    let plan = TransportPlan { model, knots: Knots::covering(0.005, 1.0, 4.0), accuracy: Accuracy { tolerance: 1e-4 } };
+    let plan = TransportPlan {
+        model,
+        knots: Knots::covering(0.005, 1.0, 4.0),
+        accuracy: Accuracy { tolerance: 1e-4, footprint: 1.0 },
+    };
     if scene.geometry.circle().is_none() {
         return plan.integrate(&scene.geometry, &scene.pyramid, &scene.interior());
     }

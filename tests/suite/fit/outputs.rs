@@ -125,3 +125,16 @@ fn pictures_have_the_size_of_the_photo_and_say_what_they_are() {
     assert_eq!(matched.image.pixel(0, 0), [0.0; 3]);
     assert!(matched.image.pixel(SIZE / 2, SIZE / 2)[0] > 0.0);
 }
+
+#[test]
+fn score_of_the_files_is_the_score_that_was_reported() {
+    let folder = folder();
+    fit(folder.path(), "out", QUICK).done();
+    let json = fit_json(&folder.path().join("out"));
+    let exposure = &json["display_exposure"];
+    let arguments = format!("compare photo.exr out/match.exr --display-exposure {exposure} --json");
+    let answer = crate::program::lookalike(folder.path(), &arguments).done();
+    let compared: Value = serde_json::from_str(&answer.stdout).unwrap();
+    let (found, expected) = (number(&compared["score"]), number(&json["polished"]["cssim"]));
+    assert!((found - expected).abs() < 1e-6, "{found} {expected}");
+}
