@@ -43,10 +43,11 @@ pub(super) fn seen_from(node: &Node, point: &Point) -> Option<(Angles, Spread)> 
         }
     }
     let light2 = a + c;
-    let scale = 0.5 / angles.cos_d.max(LEAST_COS_D);
-    // `q` and `h` in the tangent plane; the centroid has no part there.
-    let half = (view.0 * scale, view.1 * scale);
+    // `h` and `q` in the tangent plane; the centroid has no part there.
+    let length = 2.0 * angles.cos_d.max(f64::MIN_POSITIVE);
+    let half = (view.0 / length, view.1 / length);
     let offset = (normal.0 - angles.cos_h * half.0, normal.1 - angles.cos_h * half.1);
+    let scale = 0.5 / angles.cos_d.max(LEAST_COS_D);
     let scale2 = scale * scale;
     let along2 = form(offset, offset) * scale2;
     let step2 = (light2 - form(half, half)) * scale2;

@@ -2,7 +2,7 @@
 //!
 //! Taking a node as a point at its energy centroid leaves a second-order error, `1/2 tr(H S)`, with `H` the Hessian of
 //! `f cos` and `S` the energy's covariance over the node. A node is split while that error, bounded from above over
-//! the node and over the widths of a [`Band`], exceeds the tolerance; then most of it is taken away ([`super::blur`]). Nothing is random: neighbouring pixels get neighbouring
+//! the node and over the widths of a [`Band`], exceeds the tolerance; then most of it is taken away (in `render/blur.rs`). Nothing is random: neighbouring pixels get neighbouring
 //! cuts, and the error is smooth instead of noise.
 
 use super::{
