@@ -27,3 +27,6 @@ pub use plan::{FitError, FitOutcome, FitPlanner};
 pub use polish::{INITIAL_MESH, MAX_EVALUATIONS, Polished, polish};
 pub use stage_one::{SearchFailure, search_gamma};
 pub use stage_two::{FullView, Judged, judge_candidates, winner};
+
+#[cfg(test)]
+mod tests;

@@ -6,8 +6,14 @@
 //!
 //! The graph depends on the inputs alone, never on the number of workers or the order in which nodes finish.
 
+mod limits;
+mod verify;
+
+pub use limits::FitError;
+
+use self::{limits::check_sizes, verify::SubsetTables};
 use super::{
-    BestScore, Candidate, Judged, JudgedBy, Method, MethodError, Polished, SearchKind, Start,
+    BestScore, Candidate, Judged, JudgedBy, Method, Polished, SearchKind, Start,
     method::AtZero,
     needed_span,
     nodes::{
@@ -15,28 +21,25 @@ use super::{
         ViewWire,
     },
     polish::MAX_EVALUATIONS,
+    stage_one::objective_of,
     winner,
     wire::{CandidateWire, EnvironmentWire, ImageWire, KnotsWire, PolishedWire, ScoresWire, SubsetWire, read, write},
 };
 use crate::{
     brdf::flat_bounds,
-    graph::{
-        Blob, BlobHash, GraphEdit, Input, MAX_BLOB_BYTES, MAX_INPUTS, NodeFailure, NodeId, NodeSpec, Placement,
-        PlanError, Planner,
-    },
+    graph::{Blob, BlobHash, GraphEdit, Input, NodeFailure, NodeId, NodeSpec, Placement, PlanError, Planner},
     image::Image,
     math::{luminance, widen},
     metric::ErrorMap,
     render::{
         knots::{Knots, PER_OCTAVE},
-        subset::{self, PixelSubset, SampleCount},
+        subset::{self, PixelSubset},
         transport::{Accuracy, Pixel, tile_order},
     },
     scene::Capture,
 };
 use serde::Serialize;
 use std::{collections::BTreeMap, sync::Arc};
-use thiserror::Error;
 
 /// Pixels per shard of a subset's table: small enough to spread over several workers.
 const SUBSET_SHARD: usize = 32;
@@ -52,30 +55,6 @@ const AROUND: f64 = 1.6;
 
 /// Knots per factor of two of width in full-resolution tables (design section 7: at least 5).
 const FULL_PER_OCTAVE: f64 = 5.0;
-
-/// Why a fit cannot be planned.
-#[derive(Debug, Error)]
-#[non_exhaustive]
-pub enum FitError {
-    /// A setting is out of range.
-    #[error(transparent)]
-    Method(#[from] MethodError),
-    /// The photo has no light to fit to.
-    #[error("every usable pixel of the photo is black: check the exposure of the photo and the place of the object")]
-    Black,
-    /// More than one message can carry.
-    #[error("{what} has {found} pixels, more than the {limit} that a fit can take: {remedy}")]
-    TooLarge {
-        /// What is too large.
-        what: &'static str,
-        /// Its pixels.
-        found: usize,
-        /// The most there may be.
-        limit: usize,
-        /// What to do.
-        remedy: &'static str,
-    },
-}
 
 /// The outcome of a fit.
 #[derive(Debug, Clone)]
@@ -109,6 +88,7 @@ pub struct FitPlanner {
     environment: Option<BlobHash>,
     view: Option<BlobHash>,
     searches: BTreeMap<NodeId, usize>,
+    tables_of_subsets: SubsetTables,
     candidates: BTreeMap<usize, Candidate>,
     step: Step,
     /// Widths that the table of the next judging node spans; `None` for a model without widths.
@@ -167,6 +147,7 @@ impl FitPlanner {
             environment: None,
             view: None,
             searches: BTreeMap::new(),
+            tables_of_subsets: SubsetTables::default(),
             candidates: BTreeMap::new(),
             step: Step::Searching,
             span: None,
@@ -251,9 +232,8 @@ impl FitPlanner {
         let model = self.method.model;
         for (s, subset) in self.subsets.clone().into_iter().enumerate() {
             let list = add(graph, "list of pixels", &subset.pixels)?;
-            let photo = subset.pixels.iter().map(|p| self.capture.photo().pixel(p[0] as usize, p[1] as usize));
-            let wire =
-                SubsetWire { photo: photo.collect(), pixels: subset.pixels.clone(), weights: subset.weights.clone() };
+            let photo = photo_at(&self.capture, &subset);
+            let wire = SubsetWire { photo, pixels: subset.pixels.clone(), weights: subset.weights.clone() };
             let mut inputs = vec![Input::Blob(add(graph, "pixel subset", &wire)?)];
             let what = if self.subsets.len() == 1 { "of the subset".to_owned() } else { format!("of subset {s}") };
             let (count, shard) =
@@ -333,6 +313,38 @@ impl FitPlanner {
             judge_object: self.method.judge == JudgedBy::Object,
             pixels: self.pixels.clone(),
         }
+    }
+
+    /// The candidate that a search on a worker claims to have found, once its cost is what this process finds for it.
+    fn checked_candidate(
+        &mut self,
+        node: NodeId,
+        place: usize,
+        output: &Blob,
+        graph: &GraphEdit<'_>,
+    ) -> Result<Candidate, PlanError> {
+        let candidate = read::<CandidateWire>("candidate", output)
+            .and_then(|wire| wire.candidate(self.method.model))
+            .map_err(other)?;
+        let gammas = &self.method.gammas;
+        let asked = (gammas[place % gammas.len()], index(place / gammas.len()));
+        if (candidate.gamma, candidate.subset) != asked {
+            let found = (candidate.gamma, candidate.subset);
+            return Err(PlanError::new(format!(
+                "expected the candidate of gamma and subset {asked:?}, found {found:?}"
+            )));
+        }
+        let s = place / gammas.len();
+        let table = self.tables_of_subsets.get(s, self.method.model, node, graph)?;
+        let photo = photo_at(&self.capture, &self.subsets[s]);
+        let mut objective =
+            objective_of(&self.method, candidate.gamma, table, &self.subsets[s], &photo, self.mean_radiance);
+        verify::check_cost(&candidate, &mut objective)?;
+        // The table has done its duty when no search of its subset is left.
+        if !self.searches.values().any(|other| other / gammas.len() == s) {
+            self.tables_of_subsets.forget(s);
+        }
+        Ok(candidate)
     }
 
     fn searched(&mut self, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
@@ -469,17 +481,7 @@ impl Planner for FitPlanner {
 
     fn completed(&mut self, node: NodeId, output: &Blob, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
         if let Some(place) = self.searches.remove(&node) {
-            let candidate = read::<CandidateWire>("candidate", output)
-                .and_then(|wire| wire.candidate(self.method.model))
-                .map_err(other)?;
-            let gammas = &self.method.gammas;
-            let asked = (gammas[place % gammas.len()], index(place / gammas.len()));
-            if (candidate.gamma, candidate.subset) != asked {
-                let found = (candidate.gamma, candidate.subset);
-                return Err(PlanError::new(format!(
-                    "expected the candidate of gamma and subset {asked:?}, found {found:?}"
-                )));
-            }
+            let candidate = self.checked_candidate(node, place, output, graph)?;
             self.candidates.insert(place, candidate);
             return if self.searches.is_empty() { self.searched(graph) } else { Ok(()) };
         }
@@ -492,40 +494,17 @@ impl Planner for FitPlanner {
     }
 }
 
-/// Refuses what would not fit into a blob, or into memory, before any work is done.
-fn check_sizes(capture: &Capture, method: &Method) -> Result<(), FitError> {
-    let size = |image: &Image| image.width() * image.height();
-    let map = capture.environment();
-    let usable = if method.samples == SampleCount::Full { capture.counts().usable } else { 0 };
-    let checks = [
-        ("the photo", size(capture.photo()), MOST_PHOTO, "crop it around the object, or scale it down"),
-        ("the environment map", map.width() * map.height(), MOST_MAP, "scale it down"),
-        ("the full set of samples", usable, MOST_FULL, "scale the photo down, or draw a number of samples"),
-    ];
-    for (what, found, limit, remedy) in checks {
-        if found > limit {
-            return Err(FitError::TooLarge { what, found, limit, remedy });
-        }
-    }
-    Ok(())
-}
-
-/// Most pixels of a photo: its pictures (32 bytes per pixel) travel in one blob, its table in [`MAX_INPUTS`] shards.
-const MOST_PHOTO: usize = 8_000_000;
-/// Most texels of a map, 12 bytes each in one blob.
-const MOST_MAP: usize = 20_000_000;
-/// Most pixels of stage one: their table takes about 1.2 kB each, more than once.
-const MOST_FULL: usize = 200_000;
-
-const _: () = assert!(MOST_PHOTO * 32 < MAX_BLOB_BYTES && MOST_PHOTO / FULL_SHARD + 2 < MAX_INPUTS);
-const _: () = assert!(MOST_MAP * 12 < MAX_BLOB_BYTES);
-
 /// The grid of widths of stage one: the model's whole range.
 fn stage_one_knots(method: &Method) -> Knots {
     let (lower, upper) = flat_bounds(method.model.parameters());
     let entry = method.model.lobes().iter().find_map(|b| b.width);
     let (low, high) = entry.map_or((0.5, 1.0), |entry| (lower[entry], upper[entry]));
     Knots::covering(low, high, PER_OCTAVE)
+}
+
+/// The photo's values at the pixels of a subset, in its order.
+fn photo_at(capture: &Capture, subset: &PixelSubset) -> Vec<[f32; 3]> {
+    subset.pixels.iter().map(|p| capture.photo().pixel(p[0] as usize, p[1] as usize)).collect()
 }
 
 /// The usable pixels with their luminance.

@@ -52,13 +52,9 @@ pub fn search_gamma(
     photo: &[[f32; 3]],
     mean_radiance: f64,
 ) -> Result<Candidate, SearchFailure> {
-    let compression = match method.at_zero {
-        AtZero::Tangent => Compression::new(gamma, mean_radiance),
-        AtZero::Clamp => Compression::clamped(gamma),
-    };
     let fail = |source| SearchFailure::Search { gamma, source };
     let bounds = search_bounds(method.model, method.search).map_err(fail)?;
-    let mut objective = Objective::new(method.model, table, subset, photo, compression);
+    let mut objective = objective_of(method, gamma, table, subset, photo, mean_radiance);
     let starts = match method.start {
         Start::Paper => vec![paper_start(method.model)],
         Start::Scan => scan(method.model, table, &subset.weights, photo),
@@ -95,6 +91,22 @@ pub fn search_gamma(
         evaluations,
         termination: best.termination,
     })
+}
+
+/// What a search with `gamma` minimises. Coordinator and workers build it here, so that both find the same cost, bit for bit.
+pub(super) fn objective_of<'a>(
+    method: &Method,
+    gamma: f64,
+    table: &'a TransportTable,
+    subset: &'a PixelSubset,
+    photo: &[[f32; 3]],
+    mean_radiance: f64,
+) -> Objective<'a> {
+    let compression = match method.at_zero {
+        AtZero::Tangent => Compression::new(gamma, mean_radiance),
+        AtZero::Clamp => Compression::clamped(gamma),
+    };
+    Objective::new(method.model, table, subset, photo, compression)
 }
 
 #[derive(Debug)]

@@ -87,6 +87,18 @@ pub enum RunError {
         /// The second output.
         second: BlobHash,
     },
+    /// A result is not what its recomputation gives.
+    #[error(
+        "the result of {name} from {site} is wrong: {error}; use the same build everywhere, check the memory of that machine, and report this"
+    )]
+    WrongResult {
+        /// The node.
+        name: Box<NodeName>,
+        /// Where the result came from.
+        site: Site,
+        /// What is wrong with it.
+        error: PlanError,
+    },
     /// The planner cannot go on, by default because a node failed.
     #[error(transparent)]
     Plan(#[from] PlanError),

@@ -1,0 +1,4 @@
+//! The method and its plan on scenes that are small enough for a unit test.
+
+mod planner;
+mod scene;
