@@ -126,7 +126,7 @@ pub fn handle(
         Event::Failed { site, node, attempt, failure } => {
             if answered(core, (site, node, attempt), now, outbox) && core.graph.is_open(node) {
                 retract(core, node, outbox);
-                core.graph.fail(node, FailureReason::Application(failure));
+                core.graph.fail(node, FailureReason::Node(failure));
             }
         }
         Event::BlobRequested { worker, hash } => send_blob(core, worker, hash, now, outbox),

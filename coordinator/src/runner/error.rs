@@ -5,7 +5,7 @@ use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::time::Duration;
 
-use lookalike::graph::{BlobHash, FailureReason, PlanError};
+use lookalike::graph::{BlobHash, FailureReason, NodeFailure, PlanError};
 use thiserror::Error;
 
 use crate::comm::{NodeName, Site};
@@ -117,7 +117,10 @@ impl RunError {
             | Self::NothingToAdvertise { .. }
             | Self::Listen { .. }
             | Self::AccessFile { .. } => 2,
-            Self::Plan(PlanError::NodeFailed { reason: FailureReason::Application(_), .. }) => 2,
+            // What a node says of its inputs is about the user's; a panic or an unknown kind is our own mistake.
+            Self::Plan(PlanError::NodeFailed {
+                reason: FailureReason::Node(NodeFailure::Application { .. }), ..
+            }) => 2,
             Self::Interrupted => 130,
             _ => 3,
         }
