@@ -67,7 +67,7 @@ pub fn search_gamma(
     let best = match method.search {
         SearchKind::LeastSquares => multi_start::refine_best(&starts, &bounds, &options, |start| {
             let m = least_squares::minimise(&mut objective, &start.point, &bounds, &LeastSquaresOptions::default())?;
-            evaluations += m.evaluations;
+            evaluations += beyond_its_start(m.evaluations);
             Ok(Found { point: m.point, value: m.value, termination: m.termination })
         }),
         SearchKind::Pattern => {
@@ -77,7 +77,7 @@ pub fn search_gamma(
                 let n = bounds.dimension();
                 let cost = |x: &[f64]| objective.cost(x);
                 let m = pattern::minimise(cost, &start.point, &bounds, &PatternOptions::matlab(n))?;
-                evaluations += m.evaluations;
+                evaluations += beyond_its_start(m.evaluations);
                 Ok(Found { point: m.point, value: m.value, termination: m.termination })
             })
         }
@@ -107,6 +107,11 @@ pub(super) fn objective_of<'a>(
         AtZero::Clamp => Compression::clamped(gamma),
     };
     Objective::new(method.model, table, subset, photo, compression)
+}
+
+/// A search evaluates its start, which was evaluated and counted before it.
+fn beyond_its_start(evaluations: usize) -> usize {
+    evaluations.saturating_sub(1)
 }
 
 #[derive(Debug)]
