@@ -1,4 +1,5 @@
 //! The method and its plan on scenes that are small enough for a unit test.
 
 mod planner;
+mod recovery;
 mod scene;

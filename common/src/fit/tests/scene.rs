@@ -1,7 +1,7 @@
 //! A sphere of 24 x 24 pixels in a small room, photographed without noise, and a run of a planner in any order.
 
 use crate::{
-    brdf::{Model, model},
+    brdf::{Model, flat_bounds, model},
     fit::{FitPlanner, FullView, Method, nodes},
     graph::{
         Blob, BlobHash, Change, DecodedCache, FailureReason, Graph, GraphEdit, NodeId, NodeSpec, PlanError, Planner,
@@ -13,7 +13,8 @@ use crate::{
     render::{
         knots::{Knots, PER_OCTAVE},
         pyramid::LightPyramid,
-        subset::SampleCount,
+        subset::{PixelSubset, SampleCount},
+        table::TransportTable,
         transport::{Accuracy, Pixel, TransportPlan},
     },
     scene::{Camera, Capture, CaptureInput, Circle, Geometry},
@@ -53,6 +54,34 @@ pub(super) fn capture(name: &str, parameters: &[f64], noise: f64) -> Arc<Capture
     }
     let input = CaptureInput { photo, clipped: None, mask: None, geometry, environment: Arc::new(room()) };
     Arc::new(Capture::new(input).unwrap())
+}
+
+/// The input of a search: every seventh pixel inside the sphere, its table over the model's whole range of widths, and the
+/// values that a material has there, read from this very table.
+#[derive(Debug)]
+pub(super) struct StageOne {
+    pub(super) table: TransportTable,
+    pub(super) subset: PixelSubset,
+    pub(super) photo: Vec<[f32; 3]>,
+}
+
+impl StageOne {
+    pub(super) fn new(name: &str, parameters: &[f64]) -> Self {
+        let geometry = Geometry::sphere(SIZE, SIZE, Circle::inscribed(SIZE, SIZE), Camera::Orthographic).unwrap();
+        let model: &'static dyn Model = model(name).unwrap();
+        let places = (0..SIZE * SIZE).map(|i| [i % SIZE, i / SIZE]).filter(|[c, r]| geometry.coverage(*c, *r) >= 1.0);
+        let pixels: Vec<Pixel> = places.step_by(7).map(|place| place.map(|x| u32::try_from(x).unwrap())).collect();
+        let (lower, upper) = flat_bounds(model.parameters());
+        let width = model.lobes().iter().find_map(|basis| basis.width).unwrap();
+        let knots = Knots::covering(lower[width], upper[width], PER_OCTAVE);
+        let plan = TransportPlan { model, knots, accuracy: Accuracy::FULL };
+        let table = plan.integrate(&geometry, &LightPyramid::new(room()), &pixels);
+        let mut planes = table.planes();
+        table.radiance(model, parameters, &mut planes);
+        let photo = (0..pixels.len()).map(|p| [0, 1, 2].map(|c| to_f32(planes[c][p]))).collect();
+        let subset = PixelSubset { weights: vec![1.0; pixels.len()], pixels };
+        Self { table, subset, photo }
+    }
 }
 
 /// Three gammas, 48 pixels.
