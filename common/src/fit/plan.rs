@@ -98,7 +98,8 @@ pub struct FitPlanner {
     reports: Vec<NodeId>,
     pictures: BTreeMap<NodeId, ReportWire>,
     judged: Vec<Judged>,
-    polish_start: Vec<f64>,
+    /// The winner of stage two and the outcome of every round of polish.
+    polish_starts: Vec<Vec<f64>>,
     polish_rounds: usize,
     polish_evaluations: usize,
     polished: Option<Polished>,
@@ -155,7 +156,7 @@ impl FitPlanner {
             reports: Vec::new(),
             pictures: BTreeMap::new(),
             judged: Vec::new(),
-            polish_start: Vec::new(),
+            polish_starts: Vec::new(),
             polish_rounds: 0,
             polish_evaluations: 0,
             polished: None,
@@ -368,14 +369,14 @@ impl FitPlanner {
             .map(|(candidate, (cssim, cssim_object))| Judged { candidate, cssim, cssim_object })
             .collect();
         let best = winner(&self.judged, self.method.judge).ok_or_else(|| PlanError::new("no candidate was judged"))?;
-        self.polish_start = self.judged[best].candidate.parameters.clone();
+        self.polish_starts = vec![self.judged[best].candidate.parameters.clone()];
         self.best.set(self.method.judge.pick(self.judged[best].cssim, self.judged[best].cssim_object));
         if self.method.polish { self.add_polish(graph) } else { self.add_report(graph) }
     }
 
     fn add_polish(&mut self, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
         let left = MAX_EVALUATIONS.saturating_sub(self.polish_evaluations);
-        let parameters = PolishParameters { start: self.polish_start.clone(), max_evaluations: index(left) };
+        let parameters = PolishParameters { starts: self.polish_starts.clone(), max_evaluations: index(left) };
         self.step = Step::Polishing(self.add_judging(graph, nodes::POLISH, self.span, &parameters)?);
         Ok(())
     }
@@ -391,7 +392,7 @@ impl FitPlanner {
         // Another table pays only with evaluations left for a poll in every direction.
         let enough_left = self.polish_evaluations + 2 * polished.parameters.len() < MAX_EVALUATIONS;
         let goes_on = polished.at_table_edge && self.polish_rounds < MAX_POLISH_ROUNDS && enough_left;
-        self.polish_start = polished.parameters.clone();
+        self.polish_starts.push(polished.parameters.clone());
         self.best.set(self.method.judge.pick(polished.cssim, polished.cssim_object));
         self.polished = Some(polished);
         if goes_on {
@@ -402,12 +403,15 @@ impl FitPlanner {
         }
     }
 
-    /// A span around the width where polish stands.
+    /// A span around the width where polish stands that holds the widths of all earlier rounds: on the next table all of them
+    /// are judged again, and the best goes on.
     fn widen_span(&mut self) {
         let Some(entry) = self.method.model.lobes().iter().find_map(|b| b.width) else { return };
         let (lower, upper) = flat_bounds(self.method.model.parameters());
-        let width = self.polish_start[entry];
-        self.span = Some(((width / AROUND).max(lower[entry]), (width * AROUND).min(upper[entry])));
+        let widths = || self.polish_starts.iter().map(|start| start[entry]);
+        let last = widths().next_back().unwrap_or(upper[entry]);
+        let (low, high) = (widths().fold(last / AROUND, f64::min), widths().fold(last * AROUND, f64::max));
+        self.span = Some((low.max(lower[entry]), high.min(upper[entry])));
     }
 
     /// The pictures: of the candidates on the table that they were judged on, of the match on the table that it was polished on.

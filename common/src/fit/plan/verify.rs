@@ -13,7 +13,7 @@ use crate::{
     graph::{GraphEdit, Input, NodeId, PlanError},
     render::table::TransportTable,
 };
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, btree_map::Entry};
 
 /// The decoded tables of pixel subsets, by the number of the subset.
 #[derive(Debug, Default)]
@@ -28,10 +28,10 @@ impl SubsetTables {
         search: NodeId,
         graph: &GraphEdit<'_>,
     ) -> Result<&TransportTable, PlanError> {
-        if !self.0.contains_key(&s) {
-            self.0.insert(s, table_of(model, search, graph)?);
-        }
-        self.0.get(&s).ok_or_else(missing)
+        Ok(match self.0.entry(s) {
+            Entry::Occupied(known) => known.into_mut(),
+            Entry::Vacant(unknown) => unknown.insert(table_of(model, search, graph)?),
+        })
     }
 
     /// Lets the table of subset `s` go.
