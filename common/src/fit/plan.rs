@@ -13,7 +13,7 @@ pub use limits::FitError;
 
 use self::{limits::check_sizes, verify::SubsetTables};
 use super::{
-    BestScore, Candidate, Judged, JudgedBy, Method, Polished, SearchKind, Start,
+    BestScore, Candidate, Judged, JudgedBy, Method, Objective, Polished, SearchKind, Start,
     method::AtZero,
     needed_span,
     nodes::{
@@ -22,6 +22,7 @@ use super::{
     },
     polish::MAX_EVALUATIONS,
     stage_one::objective_of,
+    uncertainty::{Uncertainty, uncertainties},
     winner,
     wire::{CandidateWire, EnvironmentWire, ImageWire, KnotsWire, PolishedWire, ScoresWire, SubsetWire, read, write},
 };
@@ -63,6 +64,8 @@ pub struct FitOutcome {
     pub judged: Vec<Judged>,
     /// Index of the winner of stage two.
     pub winner: usize,
+    /// How well the photo determines each entry of the winner's flat parameter vector, at its gamma and on its subset.
+    pub uncertainty: Vec<Uncertainty>,
     /// The outcome of stage three, when it ran.
     pub polished: Option<Polished>,
     /// The rendering of the winner of stage two, as [`Self::matched`].
@@ -88,6 +91,8 @@ pub struct FitPlanner {
     environment: Option<BlobHash>,
     view: Option<BlobHash>,
     searches: BTreeMap<NodeId, usize>,
+    /// A search of every subset: it names the subset's table.
+    search_of_subset: Vec<NodeId>,
     tables_of_subsets: SubsetTables,
     candidates: BTreeMap<usize, Candidate>,
     step: Step,
@@ -98,6 +103,7 @@ pub struct FitPlanner {
     reports: Vec<NodeId>,
     pictures: BTreeMap<NodeId, ReportWire>,
     judged: Vec<Judged>,
+    uncertainty: Vec<Uncertainty>,
     /// The winner of stage two and the outcome of every round of polish.
     polish_starts: Vec<Vec<f64>>,
     polish_rounds: usize,
@@ -148,6 +154,7 @@ impl FitPlanner {
             environment: None,
             view: None,
             searches: BTreeMap::new(),
+            search_of_subset: Vec::new(),
             tables_of_subsets: SubsetTables::default(),
             candidates: BTreeMap::new(),
             step: Step::Searching,
@@ -156,6 +163,7 @@ impl FitPlanner {
             reports: Vec::new(),
             pictures: BTreeMap::new(),
             judged: Vec::new(),
+            uncertainty: Vec::new(),
             polish_starts: Vec::new(),
             polish_rounds: 0,
             polish_evaluations: 0,
@@ -260,6 +268,9 @@ impl FitPlanner {
                     placement: Placement::Worker,
                 })?;
                 self.searches.insert(node, s * self.method.gammas.len() + g);
+                if g == 0 {
+                    self.search_of_subset.push(node);
+                }
             }
         }
         Ok(())
@@ -319,7 +330,6 @@ impl FitPlanner {
     /// The candidate that a search on a worker claims to have found, once its cost is what this process finds for it.
     fn checked_candidate(
         &mut self,
-        node: NodeId,
         place: usize,
         output: &Blob,
         graph: &GraphEdit<'_>,
@@ -335,17 +345,27 @@ impl FitPlanner {
                 "expected the candidate of gamma and subset {asked:?}, found {found:?}"
             )));
         }
-        let s = place / gammas.len();
-        let table = self.tables_of_subsets.get(s, self.method.model, node, graph)?;
-        let photo = photo_at(&self.capture, &self.subsets[s]);
-        let mut objective =
-            objective_of(&self.method, candidate.gamma, table, &self.subsets[s], &photo, self.mean_radiance);
-        verify::check_cost(&candidate, &mut objective)?;
+        let (s, gammas) = (place / gammas.len(), gammas.len());
+        self.with_objective(&candidate, graph, |objective| verify::check_cost(&candidate, objective))??;
         // The table has done its duty when no search of its subset is left.
-        if !self.searches.values().any(|other| other / gammas.len() == s) {
+        if !self.searches.values().any(|other| other / gammas == s) {
             self.tables_of_subsets.forget(s);
         }
         Ok(candidate)
+    }
+
+    /// What the search of a candidate minimised.
+    fn with_objective<T>(
+        &mut self,
+        candidate: &Candidate,
+        graph: &GraphEdit<'_>,
+        use_it: impl FnOnce(&mut Objective<'_>) -> T,
+    ) -> Result<T, PlanError> {
+        let s = candidate.subset as usize;
+        let (subset, search) = (&self.subsets[s], self.search_of_subset[s]);
+        let table = self.tables_of_subsets.get(s, self.method.model, search, graph)?;
+        let photo = photo_at(&self.capture, subset);
+        Ok(use_it(&mut objective_of(&self.method, candidate.gamma, table, subset, &photo, self.mean_radiance)))
     }
 
     fn searched(&mut self, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
@@ -369,6 +389,12 @@ impl FitPlanner {
             .map(|(candidate, (cssim, cssim_object))| Judged { candidate, cssim, cssim_object })
             .collect();
         let best = winner(&self.judged, self.method.judge).ok_or_else(|| PlanError::new("no candidate was judged"))?;
+        let winner = self.judged[best].candidate.clone();
+        let model = self.method.model;
+        self.uncertainty = self
+            .with_objective(&winner, graph, |objective| uncertainties(model, objective, &winner.parameters))?
+            .map_err(|error| PlanError::Other(error.into()))?;
+        self.tables_of_subsets.forget(winner.subset as usize);
         self.polish_starts = vec![self.judged[best].candidate.parameters.clone()];
         self.best.set(self.method.judge.pick(self.judged[best].cssim, self.judged[best].cssim_object));
         if self.method.polish { self.add_polish(graph) } else { self.add_report(graph) }
@@ -466,6 +492,7 @@ impl FitPlanner {
         self.outcome = Some(FitOutcome {
             judged: self.judged.clone(),
             winner: best,
+            uncertainty: self.uncertainty.clone(),
             polished: self.polished.clone(),
             winner_image,
             matched,
@@ -485,7 +512,7 @@ impl Planner for FitPlanner {
 
     fn completed(&mut self, node: NodeId, output: &Blob, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
         if let Some(place) = self.searches.remove(&node) {
-            let candidate = self.checked_candidate(node, place, output, graph)?;
+            let candidate = self.checked_candidate(place, output, graph)?;
             self.candidates.insert(place, candidate);
             return if self.searches.is_empty() { self.searched(graph) } else { Ok(()) };
         }

@@ -30,6 +30,7 @@ pub mod least_squares;
 pub mod multi_start;
 pub mod normal_equations;
 pub mod pattern;
+pub mod sandwich;
 mod semidefinite;
 pub mod termination;
 #[cfg(test)]
@@ -38,4 +39,5 @@ mod test_functions;
 pub use bounds::{Bounds, Scale};
 pub use error::SearchError;
 pub use normal_equations::NormalEquations;
+pub use sandwich::Sandwich;
 pub use termination::{Progress, Termination};

@@ -4,3 +4,4 @@ mod planner;
 mod polish;
 mod recovery;
 mod scene;
+mod uncertainty;
