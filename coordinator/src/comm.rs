@@ -192,7 +192,7 @@ pub enum RunEvent {
         /// Where.
         site: Site,
     },
-    /// How much of a running node is done, as far as it says; about once a second.
+    /// How much of a running node is done, as far as it says; a few times a second at most.
     NodeProgress {
         /// The node.
         node: NodeId,

@@ -89,6 +89,8 @@ pub(crate) struct Record {
     pub(crate) crashes: u32,
     pub(crate) holder: Option<Site>,
     pub(crate) started_at: Option<Duration>,
+    /// Where its output came from.
+    pub(crate) finished_by: Option<Site>,
 }
 
 /// A worker that has joined.

@@ -8,8 +8,8 @@
 use std::time::Duration;
 
 use lookalike::graph::{
-    Blob, BlobHash, Change, Completion, FailureReason, GraphEdit, NodeFailure, NodeId, NodeState, Placement, Planner,
-    WorkerId,
+    Blob, BlobHash, Change, Completion, FailureReason, GraphEdit, NodeFailure, NodeId, NodeState, Placement, PlanError,
+    Planner, WorkerId,
 };
 
 use crate::comm::{Action, Departure, Lease, Outbox, RunEvent, Site};
@@ -126,7 +126,7 @@ pub fn handle(
         Event::Failed { site, node, attempt, failure } => {
             if answered(core, (site, node, attempt), now, outbox) && core.graph.is_open(node) {
                 retract(core, node, outbox);
-                core.graph.fail(node, FailureReason::Application(failure));
+                core.graph.fail(node, FailureReason::Node(failure));
             }
         }
         Event::BlobRequested { worker, hash } => send_blob(core, worker, hash, now, outbox),
@@ -154,7 +154,8 @@ fn settle(core: &mut Core, planner: &mut impl Planner, now: Duration, outbox: &m
             Change::Completed(node) => {
                 core.summary.completed_nodes += 1;
                 if let Some(output) = core.graph.output(node).cloned() {
-                    planner.completed(node, &output, &mut GraphEdit::new(&mut core.graph))?;
+                    let outcome = planner.completed(node, &output, &mut GraphEdit::new(&mut core.graph));
+                    outcome.map_err(|error| refused(core, node, error))?;
                 }
             }
             Change::Failed(node) => {
@@ -168,6 +169,15 @@ fn settle(core: &mut Core, planner: &mut impl Planner, now: Duration, outbox: &m
     }
     schedule(core, outbox);
     watch_starvation(core, now, outbox)
+}
+
+/// What the planner says of an output, with the name of whom it came from where that one did wrong.
+fn refused(core: &mut Core, node: NodeId, error: PlanError) -> RunError {
+    if !matches!(error, PlanError::NotVerified { .. }) {
+        return RunError::Plan(error);
+    }
+    let site = core.record(node).and_then(|record| record.finished_by).unwrap_or(Site::Coordinator);
+    RunError::WrongResult { name: Box::new(core.name(node)), site, error }
 }
 
 fn make_ready(core: &mut Core, node: NodeId, now: Duration, outbox: &mut Outbox) {
@@ -271,7 +281,11 @@ fn finished(core: &mut Core, answer: Answer, output: Blob, now: Duration, outbox
     match core.graph.complete(node, output) {
         Completion::Accepted => {
             retract(core, node, outbox);
-            let started_at = core.record(node).and_then(|record| record.started_at);
+            let record = core.record(node);
+            let started_at = record.and_then(|record| {
+                record.finished_by = Some(site);
+                record.started_at
+            });
             let elapsed = started_at.map_or(Duration::ZERO, |started_at| now.saturating_sub(started_at));
             outbox.tell(RunEvent::NodeFinished { name: core.name(node), site, bytes, elapsed });
         }

@@ -10,7 +10,8 @@ use std::time::Duration;
 
 use lookalike::graph::{Blob, BlobHash, NodeFailure, NodeId, WorkerId};
 use lookalike::protocol::{
-    Hello, IncomingBlob, LeaseName, RunName, Secret, ToCoordinator, ToWorker, Welcome, bounded_text,
+    FailureKind, HandshakeError, Hello, IncomingBlob, LeaseName, RunName, Secret, ToCoordinator, ToWorker, Welcome,
+    bounded_text,
 };
 use lookalike_worker::wire::{Incoming, Received, WireError, greet_worker, send_message, send_parts};
 use tokio::io::AsyncWriteExt;
@@ -117,10 +118,16 @@ pub(crate) async fn serve_forever(listener: TcpListener, gate: Gate, stop: Cance
 
 /// A wrong secret or version is worth a word to the user: somebody means us. Anything else is noise of the network.
 fn report_stranger(peer: SocketAddr, error: &WireError) {
-    match error {
-        WireError::Handshake(error) => warn!(%peer, "refused: {error}"),
-        error => debug!(%peer, "no worker: {error}"),
+    if means_us(error) {
+        warn!(%peer, "refused: {error}");
+    } else {
+        debug!(%peer, "no worker: {error}");
     }
+}
+
+/// Whether a connection that failed was a Lookalike's. Port scanners and browsers do not know the greeting.
+fn means_us(error: &WireError) -> bool {
+    matches!(error, WireError::Handshake(why) if *why != HandshakeError::Magic)
 }
 
 type Greeted = (Incoming<OwnedReadHalf>, OwnedWriteHalf, Hello);
@@ -257,8 +264,13 @@ impl Reader {
                 self.output = Some((lease, IncomingBlob::begin(BlobHash(hash), length)?));
                 return self.output_or_life();
             }
-            ToCoordinator::Failed { lease, message } => {
-                let failure = NodeFailure::new(bounded_text(&message));
+            ToCoordinator::Failed { lease, kind, message } => {
+                let message = bounded_text(&message);
+                let failure = match kind {
+                    FailureKind::Application => NodeFailure::Application { message },
+                    FailureKind::Panic => NodeFailure::Panicked { message },
+                    FailureKind::UnknownKind => NodeFailure::UnknownKind { message },
+                };
                 Event::Failed { site, node: NodeId(lease.node), attempt: lease.attempt, failure }
             }
             ToCoordinator::Hello(_) | ToCoordinator::Goodbye => return Err(unexpected("work", "a greeting")),
@@ -277,4 +289,20 @@ impl Reader {
 
 fn unexpected(expected: &'static str, found: &str) -> WireError {
     WireError::Unexpected { expected, found: found.to_owned() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use lookalike::protocol::Refusal;
+
+    #[test]
+    fn only_a_lookalike_that_is_refused_is_worth_a_warning() {
+        let version = HandshakeError::Version { expected: 2, found: 1 };
+        for known in [HandshakeError::Refused(Refusal::WrongSecret), HandshakeError::Impostor, version] {
+            assert!(means_us(&WireError::Handshake(known)));
+        }
+        assert!(!means_us(&WireError::Handshake(HandshakeError::Magic)));
+        assert!(!means_us(&WireError::Ended) && !means_us(&WireError::TimedOut));
+    }
 }

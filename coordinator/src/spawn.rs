@@ -63,6 +63,8 @@ pub(crate) struct LocalWorkers {
     pub(crate) count: usize,
     pub(crate) command: WorkerCommand,
     pub(crate) access: PathBuf,
+    /// The log filter, as `--log` takes it.
+    pub(crate) log: Option<String>,
     /// Where the coordinator listens, as seen from this machine.
     pub(crate) address: String,
     pub(crate) threads: NonZeroUsize,
@@ -137,6 +139,9 @@ impl LocalWorkers {
         command.args(&self.command.arguments).arg("--access").arg(&self.access);
         command.args(["--address", &self.address, "--threads", &self.threads.to_string()]);
         command.args(["--reconnect-for", RECONNECT_FOR, "--leash"]);
+        if let Some(log) = &self.log {
+            command.arg("--log").arg(log);
+        }
         // stdout is for results, and a worker has none.
         command.stdin(Stdio::piped()).stdout(Stdio::null()).stderr(Stdio::inherit()).kill_on_drop(true);
         #[cfg(unix)]

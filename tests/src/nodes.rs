@@ -9,7 +9,7 @@ use lookalike::graph::{Blob, BlobHash, NodeFailure, NodeType, Registry, RunConte
 /// All of them.
 #[must_use]
 pub fn registry() -> Registry {
-    Registry::default().with(Digest).with(Grow).with(Fail).with(Abort).with(Gate)
+    Registry::default().with(Digest).with(Grow).with(Fail).with(Panic).with(Abort).with(Gate)
 }
 
 /// The hash of parameters and inputs: 32 bytes that depend on every bit and on the order.
@@ -59,6 +59,20 @@ impl NodeType for Fail {
     }
 }
 
+/// Panics.
+struct Panic;
+
+impl NodeType for Panic {
+    fn kind(&self) -> &'static str {
+        "panic"
+    }
+
+    #[expect(clippy::panic, reason = "its purpose")]
+    fn run(&self, _: &[u8], _: &[Blob], _: &RunContext) -> Result<Vec<u8>, NodeFailure> {
+        panic!("asked to panic")
+    }
+}
+
 /// Aborts its process, once if the parameters name a file: the file remembers.
 struct Abort;
 
@@ -81,7 +95,7 @@ impl NodeType for Abort {
 }
 
 /// Tells a listener (its address is the parameters) which process it runs in and waits for one byte: a test knows that the
-/// node is executing, decides how it goes on, and sees the death of the process as the end of the stream.
+/// node is executing (and a quarter done), decides how it goes on, and sees the death of the process as the end of the stream.
 struct Gate;
 
 impl NodeType for Gate {
@@ -89,7 +103,8 @@ impl NodeType for Gate {
         "gate"
     }
 
-    fn run(&self, parameters: &[u8], _: &[Blob], _: &RunContext) -> Result<Vec<u8>, NodeFailure> {
+    fn run(&self, parameters: &[u8], _: &[Blob], context: &RunContext) -> Result<Vec<u8>, NodeFailure> {
+        context.report(1, 4);
         let pass = || -> std::io::Result<()> {
             let mut stream = TcpStream::connect(String::from_utf8_lossy(parameters).as_ref())?;
             stream.write_all(&std::process::id().to_le_bytes())?;

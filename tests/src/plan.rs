@@ -34,6 +34,15 @@ pub enum Leaves {
         /// The file.
         marker: String,
     },
+    /// One node that waits at a gate in the coordinator's own process.
+    GateHere {
+        /// Where.
+        address: String,
+    },
+    /// One node that panics.
+    Panic,
+    /// One node of a kind that nobody knows.
+    Unknown,
     /// One node with an application error.
     Fail {
         /// Its message.
@@ -80,12 +89,17 @@ impl Planner for TestPlanner {
             Leaves::Large { bytes } => ("grow", vec![(*bytes as u64).to_le_bytes().to_vec(); 2], *bytes),
             Leaves::Gates { count, address } => ("gate", vec![address.clone().into_bytes(); *count], 0),
             Leaves::Abort { marker } => ("abort", vec![marker.clone().into_bytes()], 0),
+            Leaves::GateHere { address } => ("gate", vec![address.clone().into_bytes()], 0),
+            Leaves::Panic => ("panic", vec![Vec::new()], 0),
+            Leaves::Unknown => ("nonsense", vec![Vec::new()], 0),
             Leaves::Fail { message } => ("fail", vec![message.clone().into_bytes()], 0),
         };
         let shared = graph.add_blob((0..=250_u8).cycle().take(shared_bytes).collect())?;
         for (index, parameters) in parameters.into_iter().enumerate() {
-            let inputs = vec![Input::Blob(shared)];
-            self.nodes.push(graph.add_node(node(kind, &format!("leaf {index}"), parameters, inputs))?);
+            let leaf = node(kind, &format!("leaf {index}"), parameters, vec![Input::Blob(shared)]);
+            let is_here = matches!(self.leaves, Leaves::GateHere { .. });
+            let placement = if is_here { Placement::Coordinator } else { Placement::Worker };
+            self.nodes.push(graph.add_node(NodeSpec { placement, ..leaf })?);
         }
         self.open_leaves = self.nodes.len();
         Ok(())

@@ -116,6 +116,36 @@ fn application_error_ends_the_run_by_name_without_another_attempt() {
 }
 
 #[test]
+fn panic_and_unknown_kind_are_our_own_mistakes_and_no_bad_input() {
+    let cases = [
+        (Leaves::Panic, "panic \"leaf 0\" failed: it panicked: asked to panic; this is a bug in lookalike"),
+        (Leaves::Unknown, "nonsense \"leaf 0\" failed: unknown node kind \"nonsense\""),
+    ];
+    for (leaves, expected) in cases {
+        let error = Cluster::start(leaves, options(PROGRAM, 1)).error();
+        let message = error.to_string();
+        assert!(message.starts_with(expected) && message.contains("a bug in lookalike"), "{message}");
+        assert_eq!(error.exit_code(), 3);
+    }
+}
+
+#[test]
+fn progress_of_a_node_in_the_coordinators_own_process_is_told_while_it_runs() {
+    let gate = Gate::new();
+    let leaves = Leaves::GateHere { address: gate.address().to_string() };
+    let cluster = Cluster::start(leaves, options(PROGRAM, 1));
+    let waiting = gate.next();
+    assert_eq!(waiting.process(), std::process::id());
+    let told = cluster.wait_for(|event| match event {
+        RunEvent::NodeProgress { permille, .. } => Some(*permille),
+        _ => None,
+    });
+    assert_eq!(told, 250);
+    waiting.release();
+    assert!(cluster.finish().0.is_some());
+}
+
+#[test]
 fn worker_that_is_asked_to_end_says_goodbye_and_is_not_held_against_its_node() {
     let gate = Gate::new();
     let cluster = Cluster::start(gates(&gate, 1), options(PROGRAM, 1));

@@ -7,8 +7,8 @@ use std::process::Command;
 use std::time::Duration;
 
 use lookalike::protocol::{
-    Access, CHALLENGE_BYTES, Challenge, FrameTag, Hello, LeaseName, Secret, ToCoordinator, VERDICT_BYTES, Verdict,
-    encode_message, frame_header,
+    Access, CHALLENGE_BYTES, Challenge, FailureKind, FrameTag, Hello, LeaseName, Secret, ToCoordinator, VERDICT_BYTES,
+    Verdict, encode_message, frame_header,
 };
 use lookalike_coordinator::comm::{Departure, RunEvent};
 use lookalike_coordinator::runner::RunnerOptions;
@@ -142,7 +142,7 @@ fn liars_with_the_secret_are_thrown_out() {
 #[test]
 fn answers_to_nothing_and_false_hashes_are_not_believed() {
     let lease = LeaseName { node: 0, attempt: 9, epoch: 1 };
-    let never_asked = ToCoordinator::Failed { lease, message: "I lie".into() };
+    let never_asked = ToCoordinator::Failed { lease, kind: FailureKind::Application, message: "I lie".into() };
     let false_hash = ToCoordinator::Finished { lease, hash: [1; 32], length: 0 };
     let too_long = ToCoordinator::Finished { lease, hash: [1; 32], length: u64::MAX };
     let unknown_blob = ToCoordinator::Fetch { hash: [1; 32] };

@@ -9,7 +9,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use lookalike::graph::{Blob, BlobHash, NodeFailure, RunContext};
-use lookalike::protocol::{Assignment, Executing, LeaseName, RunName, ToCoordinator, bounded_text};
+use lookalike::protocol::{Assignment, Executing, FailureKind, LeaseName, RunName, ToCoordinator, bounded_text};
 
 use crate::cache::BlobCache;
 use crate::execute::{Completed, Job};
@@ -229,8 +229,8 @@ impl Task {
         match &self.stage {
             Stage::Answered(Ok(output)) => Some(Action::SendOutput { lease, output: output.clone() }),
             Stage::Answered(Err(failure)) => {
-                let message = bounded_text(&failure.to_string());
-                Some(Action::Send(ToCoordinator::Failed { lease, message }))
+                let (kind, message) = on_the_wire(failure);
+                Some(Action::Send(ToCoordinator::Failed { lease, kind, message: bounded_text(&message) }))
             }
             _ => None,
         }
@@ -241,5 +241,14 @@ impl Task {
             Stage::Gathering { arrival, .. } => Some((*arrival, self.lease.node)),
             _ => None,
         }
+    }
+}
+
+/// The kind of a failure and its message without what the kind adds to it.
+fn on_the_wire(failure: &NodeFailure) -> (FailureKind, String) {
+    match failure {
+        NodeFailure::Panicked { message } => (FailureKind::Panic, message.clone()),
+        NodeFailure::UnknownKind { message } => (FailureKind::UnknownKind, message.clone()),
+        other => (FailureKind::Application, other.to_string()),
     }
 }

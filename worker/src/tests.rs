@@ -35,7 +35,9 @@ fn said(actions: &[Action]) -> Vec<String> {
     let line = |action: &Action| match action {
         Action::Send(ToCoordinator::Fetch { hash }) => format!("fetch {}", hash[0]),
         Action::Send(ToCoordinator::Started(lease)) => format!("started {}.{}", lease.node, lease.attempt),
-        Action::Send(ToCoordinator::Failed { lease, message }) => format!("failed {}: {message}", lease.node),
+        Action::Send(ToCoordinator::Failed { lease, kind, message }) => {
+            format!("failed {} ({kind:?}): {message}", lease.node)
+        }
         Action::Send(other) => format!("{other:?}"),
         Action::Announce { lease, serial: _ } => format!("announce {}.{}", lease.node, lease.attempt),
         Action::SendOutput { lease, output } => format!("output {}.{} {}", lease.node, lease.attempt, output[0]),
@@ -109,10 +111,10 @@ fn unacknowledged_answers_are_sent_again_on_a_new_connection() {
     actions.extend(tasks.assigned(assignment(lease(2, 1), &[]), context));
     let serials = announce(&mut tasks, &actions);
     tasks.completed(output(serials[0], 10), context);
-    let failure = Err(NodeFailure::new("no"));
+    let failure = Err(NodeFailure::Panicked { message: "no".into() });
     tasks.completed(Completed { serial: serials[1], result: failure }, context);
     tasks.acknowledged(lease(0, 1));
-    assert_eq!(said(&tasks.welcomed(RUN)), ["failed 1: no"]);
+    assert_eq!(said(&tasks.welcomed(RUN)), ["failed 1 (Panic): no"]);
     // Node 2 went on executing; it comes back to us under a new lease.
     assert_eq!(said(&tasks.assigned(assignment(lease(2, 2), &[]), context)), ["started 2.2"]);
     assert_eq!(said(&tasks.completed(output(serials[2], 12), context)), ["output 2.2 12"]);

@@ -27,7 +27,6 @@ use super::Reflectance;
 use crate::math::{Rgb, Vec3, to_f32};
 use coordinates::{HalfDifference, Neighbours};
 
-pub use coordinates::cell_directions;
 pub use error::MerlError;
 
 /// A measured BRDF: 17 MB in memory.

@@ -16,7 +16,7 @@ pub struct Candidate {
     pub parameters: Vec<f64>,
     /// Eq. 1 there.
     pub cost: f64,
-    /// Evaluations of Eq. 1, the scan included.
+    /// Evaluations of Eq. 1, the scan included; a start counts once.
     pub evaluations: usize,
     /// Why the search ended.
     pub termination: Termination,

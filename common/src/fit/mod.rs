@@ -17,6 +17,7 @@ mod polish;
 mod scan;
 mod stage_one;
 mod stage_two;
+mod uncertainty;
 mod wire;
 
 pub use best::BestScore;
@@ -27,3 +28,7 @@ pub use plan::{FitError, FitOutcome, FitPlanner};
 pub use polish::{INITIAL_MESH, MAX_EVALUATIONS, Polished, polish};
 pub use stage_one::{SearchFailure, search_gamma};
 pub use stage_two::{FullView, Judged, judge_candidates, winner};
+pub use uncertainty::{LARGEST_SHARE, Uncertainty};
+
+#[cfg(test)]
+mod tests;

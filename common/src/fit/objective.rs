@@ -58,20 +58,11 @@ impl<'a> Objective<'a> {
         self.table.radiance(self.model, parameters, &mut self.radiance);
         cost(&self.compression, self.weights, &self.reference, &self.radiance)
     }
-}
 
-impl LeastSquaresProblem for Objective<'_> {
-    fn dimension(&self) -> usize {
-        flat_len(self.model.parameters())
-    }
-
-    fn cost(&mut self, point: &[f64]) -> f64 {
-        Objective::cost(self, point)
-    }
-
-    /// Rows are pixels and channels: `sqrt(w) (B^(1/gamma) - A^(1/gamma))` with
+    /// The rows of the linearised problem at a point, pixel by pixel and channel by channel: the pixel's index, the derivatives by
+    /// the parameters, and the residual `sqrt(w) (B^(1/gamma) - A^(1/gamma))`; with
     /// `dB/dx = sum_t dweight_t/dx T_t + weight_t dT_t/dwidth dwidth/dx`.
-    fn linearise(&mut self, point: &[f64], normal: &mut NormalEquations) {
+    pub fn rows(&mut self, point: &[f64], add: &mut dyn FnMut(usize, &[f64], f64)) {
         self.table.radiance(self.model, point, &mut self.radiance);
         self.table.terms(self.model, point, false, &mut self.terms);
         self.table.terms(self.model, point, true, &mut self.slopes);
@@ -96,9 +87,23 @@ impl LeastSquaresProblem for Objective<'_> {
                     row[entry] += weights[term][c] * self.slopes[term][c][p] / point[entry];
                 }
                 row.iter_mut().for_each(|x| *x *= scale * slope);
-                normal.add_row(&row, scale * (value - self.reference[c][p]));
+                add(p, &row, scale * (value - self.reference[c][p]));
             }
         }
+    }
+}
+
+impl LeastSquaresProblem for Objective<'_> {
+    fn dimension(&self) -> usize {
+        flat_len(self.model.parameters())
+    }
+
+    fn cost(&mut self, point: &[f64]) -> f64 {
+        Objective::cost(self, point)
+    }
+
+    fn linearise(&mut self, point: &[f64], normal: &mut NormalEquations) {
+        self.rows(point, &mut |_, row, residual| normal.add_row(row, residual));
     }
 }
 

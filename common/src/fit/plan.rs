@@ -6,8 +6,14 @@
 //!
 //! The graph depends on the inputs alone, never on the number of workers or the order in which nodes finish.
 
+mod limits;
+mod verify;
+
+pub use limits::FitError;
+
+use self::{limits::check_sizes, verify::SubsetTables};
 use super::{
-    BestScore, Candidate, Judged, JudgedBy, Method, MethodError, Polished, SearchKind, Start,
+    BestScore, Candidate, Judged, JudgedBy, Method, Objective, Polished, SearchKind, Start,
     method::AtZero,
     needed_span,
     nodes::{
@@ -15,28 +21,26 @@ use super::{
         ViewWire,
     },
     polish::MAX_EVALUATIONS,
+    stage_one::objective_of,
+    uncertainty::{Uncertainty, uncertainties},
     winner,
     wire::{CandidateWire, EnvironmentWire, ImageWire, KnotsWire, PolishedWire, ScoresWire, SubsetWire, read, write},
 };
 use crate::{
     brdf::flat_bounds,
-    graph::{
-        Blob, BlobHash, GraphEdit, Input, MAX_BLOB_BYTES, MAX_INPUTS, NodeFailure, NodeId, NodeSpec, Placement,
-        PlanError, Planner,
-    },
+    graph::{Blob, BlobHash, GraphEdit, Input, NodeFailure, NodeId, NodeSpec, Placement, PlanError, Planner},
     image::Image,
     math::{luminance, widen},
     metric::ErrorMap,
     render::{
         knots::{Knots, PER_OCTAVE},
-        subset::{self, PixelSubset, SampleCount},
+        subset::{self, PixelSubset},
         transport::{Accuracy, Pixel, tile_order},
     },
     scene::Capture,
 };
 use serde::Serialize;
 use std::{collections::BTreeMap, sync::Arc};
-use thiserror::Error;
 
 /// Pixels per shard of a subset's table: small enough to spread over several workers.
 const SUBSET_SHARD: usize = 32;
@@ -53,30 +57,6 @@ const AROUND: f64 = 1.6;
 /// Knots per factor of two of width in full-resolution tables (design section 7: at least 5).
 const FULL_PER_OCTAVE: f64 = 5.0;
 
-/// Why a fit cannot be planned.
-#[derive(Debug, Error)]
-#[non_exhaustive]
-pub enum FitError {
-    /// A setting is out of range.
-    #[error(transparent)]
-    Method(#[from] MethodError),
-    /// The photo has no light to fit to.
-    #[error("every usable pixel of the photo is black: check the exposure of the photo and the place of the object")]
-    Black,
-    /// More than one message can carry.
-    #[error("{what} has {found} pixels, more than the {limit} that a fit can take: {remedy}")]
-    TooLarge {
-        /// What is too large.
-        what: &'static str,
-        /// Its pixels.
-        found: usize,
-        /// The most there may be.
-        limit: usize,
-        /// What to do.
-        remedy: &'static str,
-    },
-}
-
 /// The outcome of a fit.
 #[derive(Debug, Clone)]
 pub struct FitOutcome {
@@ -84,6 +64,8 @@ pub struct FitOutcome {
     pub judged: Vec<Judged>,
     /// Index of the winner of stage two.
     pub winner: usize,
+    /// How well the photo determines each entry of the winner's flat parameter vector, at its gamma and on its subset.
+    pub uncertainty: Vec<Uncertainty>,
     /// The outcome of stage three, when it ran.
     pub polished: Option<Polished>,
     /// The rendering of the winner of stage two, as [`Self::matched`].
@@ -109,6 +91,9 @@ pub struct FitPlanner {
     environment: Option<BlobHash>,
     view: Option<BlobHash>,
     searches: BTreeMap<NodeId, usize>,
+    /// A search of every subset: it names the subset's table.
+    search_of_subset: Vec<NodeId>,
+    tables_of_subsets: SubsetTables,
     candidates: BTreeMap<usize, Candidate>,
     step: Step,
     /// Widths that the table of the next judging node spans; `None` for a model without widths.
@@ -118,7 +103,9 @@ pub struct FitPlanner {
     reports: Vec<NodeId>,
     pictures: BTreeMap<NodeId, ReportWire>,
     judged: Vec<Judged>,
-    polish_start: Vec<f64>,
+    uncertainty: Vec<Uncertainty>,
+    /// The winner of stage two and the outcome of every round of polish.
+    polish_starts: Vec<Vec<f64>>,
     polish_rounds: usize,
     polish_evaluations: usize,
     polished: Option<Polished>,
@@ -167,6 +154,8 @@ impl FitPlanner {
             environment: None,
             view: None,
             searches: BTreeMap::new(),
+            search_of_subset: Vec::new(),
+            tables_of_subsets: SubsetTables::default(),
             candidates: BTreeMap::new(),
             step: Step::Searching,
             span: None,
@@ -174,7 +163,8 @@ impl FitPlanner {
             reports: Vec::new(),
             pictures: BTreeMap::new(),
             judged: Vec::new(),
-            polish_start: Vec::new(),
+            uncertainty: Vec::new(),
+            polish_starts: Vec::new(),
             polish_rounds: 0,
             polish_evaluations: 0,
             polished: None,
@@ -251,9 +241,8 @@ impl FitPlanner {
         let model = self.method.model;
         for (s, subset) in self.subsets.clone().into_iter().enumerate() {
             let list = add(graph, "list of pixels", &subset.pixels)?;
-            let photo = subset.pixels.iter().map(|p| self.capture.photo().pixel(p[0] as usize, p[1] as usize));
-            let wire =
-                SubsetWire { photo: photo.collect(), pixels: subset.pixels.clone(), weights: subset.weights.clone() };
+            let photo = photo_at(&self.capture, &subset);
+            let wire = SubsetWire { photo, pixels: subset.pixels.clone(), weights: subset.weights.clone() };
             let mut inputs = vec![Input::Blob(add(graph, "pixel subset", &wire)?)];
             let what = if self.subsets.len() == 1 { "of the subset".to_owned() } else { format!("of subset {s}") };
             let (count, shard) =
@@ -279,6 +268,9 @@ impl FitPlanner {
                     placement: Placement::Worker,
                 })?;
                 self.searches.insert(node, s * self.method.gammas.len() + g);
+                if g == 0 {
+                    self.search_of_subset.push(node);
+                }
             }
         }
         Ok(())
@@ -335,6 +327,47 @@ impl FitPlanner {
         }
     }
 
+    /// The candidate that a search on a worker claims to have found, once its cost is what this process finds for it.
+    fn checked_candidate(
+        &mut self,
+        place: usize,
+        output: &Blob,
+        graph: &GraphEdit<'_>,
+    ) -> Result<Candidate, PlanError> {
+        let candidate = read::<CandidateWire>("candidate", output)
+            .and_then(|wire| wire.candidate(self.method.model))
+            .map_err(other)?;
+        let gammas = &self.method.gammas;
+        let asked = (gammas[place % gammas.len()], index(place / gammas.len()));
+        if (candidate.gamma, candidate.subset) != asked {
+            let found = (candidate.gamma, candidate.subset);
+            return Err(PlanError::new(format!(
+                "expected the candidate of gamma and subset {asked:?}, found {found:?}"
+            )));
+        }
+        let (s, gammas) = (place / gammas.len(), gammas.len());
+        self.with_objective(&candidate, graph, |objective| verify::check_cost(&candidate, objective))??;
+        // The table has done its duty when no search of its subset is left.
+        if !self.searches.values().any(|other| other / gammas == s) {
+            self.tables_of_subsets.forget(s);
+        }
+        Ok(candidate)
+    }
+
+    /// What the search of a candidate minimised.
+    fn with_objective<T>(
+        &mut self,
+        candidate: &Candidate,
+        graph: &GraphEdit<'_>,
+        use_it: impl FnOnce(&mut Objective<'_>) -> T,
+    ) -> Result<T, PlanError> {
+        let s = candidate.subset as usize;
+        let (subset, search) = (&self.subsets[s], self.search_of_subset[s]);
+        let table = self.tables_of_subsets.get(s, self.method.model, search, graph)?;
+        let photo = photo_at(&self.capture, subset);
+        Ok(use_it(&mut objective_of(&self.method, candidate.gamma, table, subset, &photo, self.mean_radiance)))
+    }
+
     fn searched(&mut self, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
         let points = self.candidates.values().map(|c| &c.parameters[..]);
         self.span = needed_span(self.method.model, points);
@@ -356,14 +389,20 @@ impl FitPlanner {
             .map(|(candidate, (cssim, cssim_object))| Judged { candidate, cssim, cssim_object })
             .collect();
         let best = winner(&self.judged, self.method.judge).ok_or_else(|| PlanError::new("no candidate was judged"))?;
-        self.polish_start = self.judged[best].candidate.parameters.clone();
+        let winner = self.judged[best].candidate.clone();
+        let model = self.method.model;
+        self.uncertainty = self
+            .with_objective(&winner, graph, |objective| uncertainties(model, objective, &winner.parameters))?
+            .map_err(|error| PlanError::Other(error.into()))?;
+        self.tables_of_subsets.forget(winner.subset as usize);
+        self.polish_starts = vec![self.judged[best].candidate.parameters.clone()];
         self.best.set(self.method.judge.pick(self.judged[best].cssim, self.judged[best].cssim_object));
         if self.method.polish { self.add_polish(graph) } else { self.add_report(graph) }
     }
 
     fn add_polish(&mut self, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
         let left = MAX_EVALUATIONS.saturating_sub(self.polish_evaluations);
-        let parameters = PolishParameters { start: self.polish_start.clone(), max_evaluations: index(left) };
+        let parameters = PolishParameters { starts: self.polish_starts.clone(), max_evaluations: index(left) };
         self.step = Step::Polishing(self.add_judging(graph, nodes::POLISH, self.span, &parameters)?);
         Ok(())
     }
@@ -379,7 +418,7 @@ impl FitPlanner {
         // Another table pays only with evaluations left for a poll in every direction.
         let enough_left = self.polish_evaluations + 2 * polished.parameters.len() < MAX_EVALUATIONS;
         let goes_on = polished.at_table_edge && self.polish_rounds < MAX_POLISH_ROUNDS && enough_left;
-        self.polish_start = polished.parameters.clone();
+        self.polish_starts.push(polished.parameters.clone());
         self.best.set(self.method.judge.pick(polished.cssim, polished.cssim_object));
         self.polished = Some(polished);
         if goes_on {
@@ -390,12 +429,15 @@ impl FitPlanner {
         }
     }
 
-    /// A span around the width where polish stands.
+    /// A span around the width where polish stands that holds the widths of all earlier rounds: on the next table all of them
+    /// are judged again, and the best goes on.
     fn widen_span(&mut self) {
         let Some(entry) = self.method.model.lobes().iter().find_map(|b| b.width) else { return };
         let (lower, upper) = flat_bounds(self.method.model.parameters());
-        let width = self.polish_start[entry];
-        self.span = Some(((width / AROUND).max(lower[entry]), (width * AROUND).min(upper[entry])));
+        let widths = || self.polish_starts.iter().map(|start| start[entry]);
+        let last = widths().next_back().unwrap_or(upper[entry]);
+        let (low, high) = (widths().fold(last / AROUND, f64::min), widths().fold(last * AROUND, f64::max));
+        self.span = Some((low.max(lower[entry]), high.min(upper[entry])));
     }
 
     /// The pictures: of the candidates on the table that they were judged on, of the match on the table that it was polished on.
@@ -450,6 +492,7 @@ impl FitPlanner {
         self.outcome = Some(FitOutcome {
             judged: self.judged.clone(),
             winner: best,
+            uncertainty: self.uncertainty.clone(),
             polished: self.polished.clone(),
             winner_image,
             matched,
@@ -469,17 +512,7 @@ impl Planner for FitPlanner {
 
     fn completed(&mut self, node: NodeId, output: &Blob, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
         if let Some(place) = self.searches.remove(&node) {
-            let candidate = read::<CandidateWire>("candidate", output)
-                .and_then(|wire| wire.candidate(self.method.model))
-                .map_err(other)?;
-            let gammas = &self.method.gammas;
-            let asked = (gammas[place % gammas.len()], index(place / gammas.len()));
-            if (candidate.gamma, candidate.subset) != asked {
-                let found = (candidate.gamma, candidate.subset);
-                return Err(PlanError::new(format!(
-                    "expected the candidate of gamma and subset {asked:?}, found {found:?}"
-                )));
-            }
+            let candidate = self.checked_candidate(place, output, graph)?;
             self.candidates.insert(place, candidate);
             return if self.searches.is_empty() { self.searched(graph) } else { Ok(()) };
         }
@@ -492,40 +525,17 @@ impl Planner for FitPlanner {
     }
 }
 
-/// Refuses what would not fit into a blob, or into memory, before any work is done.
-fn check_sizes(capture: &Capture, method: &Method) -> Result<(), FitError> {
-    let size = |image: &Image| image.width() * image.height();
-    let map = capture.environment();
-    let usable = if method.samples == SampleCount::Full { capture.counts().usable } else { 0 };
-    let checks = [
-        ("the photo", size(capture.photo()), MOST_PHOTO, "crop it around the object, or scale it down"),
-        ("the environment map", map.width() * map.height(), MOST_MAP, "scale it down"),
-        ("the full set of samples", usable, MOST_FULL, "scale the photo down, or draw a number of samples"),
-    ];
-    for (what, found, limit, remedy) in checks {
-        if found > limit {
-            return Err(FitError::TooLarge { what, found, limit, remedy });
-        }
-    }
-    Ok(())
-}
-
-/// Most pixels of a photo: its pictures (32 bytes per pixel) travel in one blob, its table in [`MAX_INPUTS`] shards.
-const MOST_PHOTO: usize = 8_000_000;
-/// Most texels of a map, 12 bytes each in one blob.
-const MOST_MAP: usize = 20_000_000;
-/// Most pixels of stage one: their table takes about 1.2 kB each, more than once.
-const MOST_FULL: usize = 200_000;
-
-const _: () = assert!(MOST_PHOTO * 32 < MAX_BLOB_BYTES && MOST_PHOTO / FULL_SHARD + 2 < MAX_INPUTS);
-const _: () = assert!(MOST_MAP * 12 < MAX_BLOB_BYTES);
-
 /// The grid of widths of stage one: the model's whole range.
 fn stage_one_knots(method: &Method) -> Knots {
     let (lower, upper) = flat_bounds(method.model.parameters());
     let entry = method.model.lobes().iter().find_map(|b| b.width);
     let (low, high) = entry.map_or((0.5, 1.0), |entry| (lower[entry], upper[entry]));
     Knots::covering(low, high, PER_OCTAVE)
+}
+
+/// The photo's values at the pixels of a subset, in its order.
+fn photo_at(capture: &Capture, subset: &PixelSubset) -> Vec<[f32; 3]> {
+    subset.pixels.iter().map(|p| capture.photo().pixel(p[0] as usize, p[1] as usize)).collect()
 }
 
 /// The usable pixels with their luminance.

@@ -40,15 +40,18 @@ pub struct Polished {
     pub at_table_edge: bool,
 }
 
-/// Polishes `start`; `observe` sees every evaluation and may end the search.
+/// Polishes the best of `starts`; `observe` sees every evaluation of the search and may end it.
+///
+/// Scores of different tables cannot be compared, so whoever goes on with another table gives all that was found so far as
+/// starts: the outcome scores no worse than any of them *on this table*.
 ///
 /// # Errors
-/// When the start cannot be rendered or scored.
+/// When there is no start, or none can be rendered and scored.
 pub fn polish(
     view: &FullView<'_>,
     judge: &Judge,
     by: JudgedBy,
-    start: &[f64],
+    starts: &[Vec<f64>],
     max_evaluations: usize,
     observe: &mut dyn FnMut(&Progress<'_>) -> ControlFlow<()>,
 ) -> Result<Polished, SearchError> {
@@ -57,11 +60,11 @@ pub fn polish(
         // A rendering that cannot be scored is a rejected point.
         judge.score(&view.render(point)).map_or(f64::NAN, |s| by.pick(s.cssim, s.cssim_object))
     };
+    let (start, compared) = best_start(starts, &bounds, objective)?;
+    let max_evaluations = max_evaluations.saturating_sub(compared).max(1);
     let options =
         PatternOptions { initial_mesh: INITIAL_MESH, max_evaluations, ..PatternOptions::matlab(bounds.dimension()) };
-    let mut inside = start.to_vec();
-    bounds.clamp(&mut inside);
-    let minimum = pattern::minimise_observed(objective, &inside, &bounds, &options, observe)?;
+    let minimum = pattern::minimise_observed(objective, &start, &bounds, &options, observe)?;
     let score = judge
         .score(&view.render(&minimum.point))
         .map_err(|_| SearchError::NotFinite { what: "the CSSIM", point: minimum.point.clone() })?;
@@ -73,10 +76,30 @@ pub fn polish(
         parameters: minimum.point,
         cssim: score.cssim,
         cssim_object: score.cssim_object,
-        evaluations: minimum.evaluations,
+        evaluations: compared + minimum.evaluations,
         termination: minimum.termination,
         at_table_edge,
     })
+}
+
+/// The start of lowest score, the first of equals, and how many evaluations that took: none where there is no choice.
+fn best_start(
+    starts: &[Vec<f64>],
+    bounds: &Bounds,
+    objective: impl Fn(&[f64]) -> f64,
+) -> Result<(Vec<f64>, usize), SearchError> {
+    let mut inside = starts.to_vec();
+    inside.iter_mut().for_each(|start| bounds.clamp(start));
+    if inside.len() == 1 {
+        return inside.pop().map(|start| (start, 0)).ok_or(SearchError::NoParameters);
+    }
+    let scores: Vec<f64> = inside.iter().map(|start| objective(start)).collect();
+    let best = (0..inside.len()).filter(|&i| scores[i].is_finite()).min_by(|&a, &b| scores[a].total_cmp(&scores[b]));
+    let Some(best) = best else {
+        return Err(SearchError::NotFinite { what: "the CSSIM", point: inside.concat() });
+    };
+    let compared = inside.len();
+    Ok((inside.swap_remove(best), compared))
 }
 
 /// A width in this outermost share of the table's logarithmic span counts as at its edge.

@@ -52,13 +52,9 @@ pub fn search_gamma(
     photo: &[[f32; 3]],
     mean_radiance: f64,
 ) -> Result<Candidate, SearchFailure> {
-    let compression = match method.at_zero {
-        AtZero::Tangent => Compression::new(gamma, mean_radiance),
-        AtZero::Clamp => Compression::clamped(gamma),
-    };
     let fail = |source| SearchFailure::Search { gamma, source };
     let bounds = search_bounds(method.model, method.search).map_err(fail)?;
-    let mut objective = Objective::new(method.model, table, subset, photo, compression);
+    let mut objective = objective_of(method, gamma, table, subset, photo, mean_radiance);
     let starts = match method.start {
         Start::Paper => vec![paper_start(method.model)],
         Start::Scan => scan(method.model, table, &subset.weights, photo),
@@ -71,7 +67,7 @@ pub fn search_gamma(
     let best = match method.search {
         SearchKind::LeastSquares => multi_start::refine_best(&starts, &bounds, &options, |start| {
             let m = least_squares::minimise(&mut objective, &start.point, &bounds, &LeastSquaresOptions::default())?;
-            evaluations += m.evaluations;
+            evaluations += beyond_its_start(m.evaluations);
             Ok(Found { point: m.point, value: m.value, termination: m.termination })
         }),
         SearchKind::Pattern => {
@@ -81,7 +77,7 @@ pub fn search_gamma(
                 let n = bounds.dimension();
                 let cost = |x: &[f64]| objective.cost(x);
                 let m = pattern::minimise(cost, &start.point, &bounds, &PatternOptions::matlab(n))?;
-                evaluations += m.evaluations;
+                evaluations += beyond_its_start(m.evaluations);
                 Ok(Found { point: m.point, value: m.value, termination: m.termination })
             })
         }
@@ -95,6 +91,27 @@ pub fn search_gamma(
         evaluations,
         termination: best.termination,
     })
+}
+
+/// What a search with `gamma` minimises. Coordinator and workers build it here, so that both find the same cost, bit for bit.
+pub(super) fn objective_of<'a>(
+    method: &Method,
+    gamma: f64,
+    table: &'a TransportTable,
+    subset: &'a PixelSubset,
+    photo: &[[f32; 3]],
+    mean_radiance: f64,
+) -> Objective<'a> {
+    let compression = match method.at_zero {
+        AtZero::Tangent => Compression::new(gamma, mean_radiance),
+        AtZero::Clamp => Compression::clamped(gamma),
+    };
+    Objective::new(method.model, table, subset, photo, compression)
+}
+
+/// A search evaluates its start, which was evaluated and counted before it.
+fn beyond_its_start(evaluations: usize) -> usize {
+    evaluations.saturating_sub(1)
 }
 
 #[derive(Debug)]

@@ -49,7 +49,7 @@ pub fn run_in_process<P: Planner>(mut planner: P, registry: &Registry, execution
             match result {
                 // Each node runs once, so it is open here and the output cannot be refused.
                 Ok(output) => _ = graph.complete(node, output),
-                Err(failure) => graph.fail(node, FailureReason::Application(failure)),
+                Err(failure) => graph.fail(node, FailureReason::Node(failure)),
             }
         }
     }

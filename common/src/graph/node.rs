@@ -68,15 +68,28 @@ pub struct NodeSpec {
     pub placement: Placement,
 }
 
-/// The typed application error of a node: its inputs do not allow an output. Nodes are pure functions, so it is never
-/// retried.
+/// Why a node gave no output. Nodes are pure functions, so it is never retried.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum NodeFailure {
-    /// The node cannot compute its output.
+    /// The node cannot compute its output: its inputs do not allow one.
     #[error("{message}")]
     Application {
         /// What is wrong and what to do about it: lower case, no full stop.
+        message: String,
+    },
+    /// The node panicked: a mistake in the program, whatever its inputs are.
+    #[error("it panicked: {message}; this is a bug in lookalike, please report it")]
+    Panicked {
+        /// What the panic said.
+        message: String,
+    },
+    /// The process that should run the node has no node type of its kind: a mistake in the program, or another build.
+    #[error(
+        "{message}; this is a bug in lookalike, please report it, unless coordinator and worker are not of one build"
+    )]
+    UnknownKind {
+        /// Which kind, and which there are.
         message: String,
     },
     /// The node noticed that nobody wants its output any more and gave up. Not a failure of the run.
@@ -96,9 +109,9 @@ impl NodeFailure {
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum FailureReason {
-    /// The node itself said so.
+    /// Its execution ended without an output.
     #[error("{0}")]
-    Application(NodeFailure),
+    Node(NodeFailure),
     /// Worker processes died while they executed it.
     #[error(
         "{crashes} worker processes died while they executed it; see their last lines on stderr, \

@@ -121,6 +121,16 @@ pub enum PlanError {
         /// The largest size allowed.
         limit: usize,
     },
+    /// A number in an output is not what its recomputation gives: the output is wrong, or was made for another input.
+    #[error("{what} is said to be {claimed:?}, but is {recomputed:?}")]
+    NotVerified {
+        /// Which number, such as `the cost of gamma 1.3`.
+        what: String,
+        /// The number in the output.
+        claimed: f64,
+        /// The number that was computed again.
+        recomputed: f64,
+    },
     /// The planner's own error: an output is not what it should be.
     #[error("{message}")]
     Unusable {

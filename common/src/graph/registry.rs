@@ -60,13 +60,12 @@ impl Registry {
     ) -> Result<Blob, NodeFailure> {
         let Some(node_type) = self.types.get(kind) else {
             let known: Vec<_> = self.kinds().collect();
-            return Err(NodeFailure::new(format!(
-                "unknown node kind {kind:?}, this process knows {known:?}; use the same build everywhere"
-            )));
+            let message = format!("unknown node kind {kind:?}, this process knows {known:?}");
+            return Err(NodeFailure::UnknownKind { message });
         };
         // Unwind safety: a node only reads its arguments, and the context holds atomics and a cache that survives panics.
         let output = catch_unwind(AssertUnwindSafe(|| node_type.run(parameters, inputs, context)))
-            .unwrap_or_else(|panic| Err(NodeFailure::new(format!("panicked: {}", panic_text(&*panic)))))?;
+            .unwrap_or_else(|panic| Err(NodeFailure::Panicked { message: panic_text(&*panic).to_owned() }))?;
         if output.len() > MAX_BLOB_BYTES {
             let found = output.len();
             return Err(NodeFailure::new(format!(

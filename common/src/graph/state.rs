@@ -215,12 +215,6 @@ impl Graph {
         matches!(self.state(node), Some(NodeState::Waiting | NodeState::Ready))
     }
 
-    /// How many nodes are open.
-    #[must_use]
-    pub fn open_nodes(&self) -> usize {
-        self.open
-    }
-
     /// How many nodes there are.
     #[must_use]
     pub fn len(&self) -> usize {

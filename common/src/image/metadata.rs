@@ -19,8 +19,6 @@ pub const PARAMETERS: &str = "lookalike.parameters";
 pub const BRDF: &str = "lookalike.brdf";
 /// The gamma of the winning candidate.
 pub const GAMMA: &str = "lookalike.gamma";
-/// The gain between photo and map.
-pub const EXPOSURE_GAIN: &str = "lookalike.exposureGain";
 /// The environment map: its name and the hash of its content.
 pub const ENVIRONMENT: &str = "lookalike.environment";
 /// The camera.

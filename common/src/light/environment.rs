@@ -193,20 +193,6 @@ impl Environment {
         self.nodes.iter().fold(Rgb::ZERO, |max, &[r, g, b, _]| max.max(widen([r, g, b])))
     }
 
-    /// Irradiance on a surface of unit normal `normal`: sum over all texels of radiance, cosine and solid angle.
-    /// It visits every texel: for checks and the few places that need one value, not for hot paths.
-    #[must_use]
-    pub fn irradiance(&self, normal: Vec3) -> Rgb {
-        (0..self.height).fold(Rgb::ZERO, |total, i| {
-            let (sin_theta, cos_theta) = sin_cos(PI * (i as f64 + 0.5) / self.height as f64);
-            let row = (0..self.width).fold(Rgb::ZERO, |sum, j| {
-                let d = self.direction_at((j as f64 + 0.5) / self.width as f64, sin_theta, cos_theta);
-                sum + widen(self.texel(i, j)) * d.dot(normal).max(0.0)
-            });
-            total + row * self.texel_solid_angle(i)
-        })
-    }
-
     /// Columns of the bordered grid.
     pub(super) fn stride(&self) -> usize {
         self.stride

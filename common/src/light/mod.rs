@@ -14,4 +14,4 @@ pub use distribution::{LightDistribution, LightSample};
 pub use environment::Environment;
 pub use error::LightError;
 pub use mapping::Mapping;
-pub use resample::{source_total, to_lat_long};
+pub use resample::to_lat_long;

@@ -33,27 +33,6 @@ pub fn to_lat_long(image: Image, mapping: Mapping) -> Result<Environment, LightE
     Environment::new(Image::from_pixels(2 * height, height, texels))
 }
 
-/// Sum over the pixels of an image in the layout `mapping` of radiance times solid angle (radiance x sr): what
-/// [`Environment::total`] of the resampled map agrees with.
-///
-/// # Errors
-/// As [`to_lat_long`].
-pub fn source_total(image: &Image, mapping: Mapping) -> Result<Rgb, LightError> {
-    mapping.check_shape(image.width(), image.height())?;
-    check_pixels(image, mapping)?;
-    let (width, height) = (image.width(), image.height());
-    let mut total = Rgb::ZERO;
-    for row in 0..height {
-        for column in 0..width {
-            if is_used(mapping, width, height, column, row) {
-                let pixel = widen(image.pixel(column, row));
-                total += pixel * pixel_solid_angle(mapping, [width, height], column, row);
-            }
-        }
-    }
-    Ok(total)
-}
-
 fn canonical_height(mapping: Mapping, width: usize) -> usize {
     match mapping {
         Mapping::LatLong => width / 2,
@@ -78,21 +57,6 @@ fn check_pixels(image: &Image, mapping: Mapping) -> Result<(), LightError> {
 /// Whether a pixel's centre is a direction.
 fn is_used(mapping: Mapping, width: usize, height: usize, column: usize, row: usize) -> bool {
     mapping.direction([(column as f64 + 0.5) / width as f64, (row as f64 + 0.5) / height as f64]).is_some()
-}
-
-fn pixel_solid_angle(mapping: Mapping, [width, height]: [usize; 2], column: usize, row: usize) -> f64 {
-    const POINTS: u32 = 4;
-    let mut sum = 0.0;
-    for i in 0..POINTS {
-        for j in 0..POINTS {
-            let at = |pixel: usize, k: u32, size: usize| {
-                (pixel as f64 + (f64::from(k) + 0.5) / f64::from(POINTS)) / size as f64
-            };
-            let position = [at(column, j, width), at(row, i, height)];
-            sum += mapping.direction(position).map_or(0.0, |_| mapping.solid_angle_density(position));
-        }
-    }
-    sum / (f64::from(POINTS * POINTS) * width as f64 * height as f64)
 }
 
 /// The image that texels are integrated from.

@@ -35,8 +35,8 @@ const XYZ_TO_RGB: Matrix = [[3.2406, -1.5372, -0.4986], [-0.9689, 1.8758, 0.0415
 const LAB_THRESHOLD: f64 = 0.008_856;
 
 /// CIELAB of a linear Rec. 709 colour whose white is (1, 1, 1).
-#[must_use]
-pub fn lab_from_linear(rgb: [f64; 3]) -> [f64; 3] {
+#[cfg(test)]
+pub(super) fn lab_from_linear(rgb: [f64; 3]) -> [f64; 3] {
     let [x, y, z] = apply(&product(&WHITEN, &RGB_TO_XYZ), rgb);
     lab(x, y, z)
 }

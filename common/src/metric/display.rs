@@ -21,7 +21,8 @@ impl DisplayImage {
     ///
     /// # Errors
     /// [`MetricError::Length`] if `pixels.len() != width * height`; [`MetricError::NotFinite`].
-    pub fn from_encoded(width: usize, height: usize, pixels: Vec<[f64; 3]>) -> Result<Self, MetricError> {
+    #[cfg(test)]
+    pub(super) fn from_encoded(width: usize, height: usize, pixels: Vec<[f64; 3]>) -> Result<Self, MetricError> {
         if pixels.len() != width * height {
             return Err(MetricError::Length { what: "pixel buffer", expected: width * height, found: pixels.len() });
         }

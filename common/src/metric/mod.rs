@@ -28,7 +28,9 @@ mod window;
 mod working;
 
 pub use cid::{CidOptions, Scales, cid};
-pub use colour::{lab_from_linear, linear_from_lab};
+#[cfg(test)]
+use colour::lab_from_linear;
+pub use colour::linear_from_lab;
 pub use cssim::{Judge, JudgeOptions, Score};
 pub use dispatch::Lanes;
 pub use display::{DisplayImage, auto_exposure, decode_srgb, encode_srgb};

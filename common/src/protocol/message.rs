@@ -94,6 +94,17 @@ pub enum ToWorker {
     },
 }
 
+/// In which way a node failed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum FailureKind {
+    /// Its inputs do not allow an output.
+    Application,
+    /// It panicked.
+    Panic,
+    /// The worker does not know its kind.
+    UnknownKind,
+}
+
 /// What a worker says to its coordinator.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum ToCoordinator {
@@ -120,10 +131,12 @@ pub enum ToCoordinator {
         /// Its length in bytes.
         length: u64,
     },
-    /// This node has no output: an application error, the same on any worker.
+    /// This node has no output, and would have none on any worker.
     Failed {
         /// The lease.
         lease: LeaseName,
+        /// In which way it failed.
+        kind: FailureKind,
         /// What is wrong.
         message: String,
     },

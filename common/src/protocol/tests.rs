@@ -32,7 +32,9 @@ fn to_coordinator() -> Vec<ToCoordinator> {
         ToCoordinator::Started(LEASE),
         ToCoordinator::Fetch { hash: [5; 32] },
         ToCoordinator::Finished { lease: LEASE, hash: [6; 32], length: 8 },
-        ToCoordinator::Failed { lease: LEASE, message: "no".into() },
+        ToCoordinator::Failed { lease: LEASE, kind: FailureKind::Application, message: "no".into() },
+        ToCoordinator::Failed { lease: LEASE, kind: FailureKind::Panic, message: "index 7 of 7".into() },
+        ToCoordinator::Failed { lease: LEASE, kind: FailureKind::UnknownKind, message: "nonsense".into() },
         ToCoordinator::Goodbye,
     ]
 }
@@ -54,7 +56,7 @@ fn message_bytes_belong_to_this_protocol_version() {
         .flat_map(|bytes| [vec![u8::try_from(bytes.len()).unwrap()], bytes].concat())
         .collect();
     // When this fails the wire has changed: count PROTOCOL_VERSION up and write the new hash here.
-    let golden = (1, "358ab3808e1efd4f52ab34e7fdfb46eed2570b95311cad14c75073673fe2c919");
+    let golden = (2, "962bdd4363fb855c4aabb39094da787b2c4485041e5bfbdbc8c8fc39cfd1cf92");
     assert_eq!((PROTOCOL_VERSION, BlobHash::of(&encoded).to_string().as_str()), golden);
 }
 
@@ -185,11 +187,11 @@ fn unknown_version_is_named_on_both_sides() {
 fn preamble_has_its_golden_bytes_and_knows_strangers() {
     let challenge = Challenge::new([1; 32]);
     let ones = "01".repeat(32);
-    assert_eq!(hex(&challenge.to_bytes()), format!("4c4f4f4b4c494b4501000000{ones}"));
+    assert_eq!(hex(&challenge.to_bytes()), format!("4c4f4f4b4c494b4502000000{ones}"));
     let response = challenge.answer(&secret(7), [2; 32]).unwrap();
     let twos = "02".repeat(32);
     let proof = "026986a53a89f7db2d00e0f9e731d1dffbb340e30c2ff1e74e03d5a6c17b3fa9";
-    assert_eq!(hex(&response.to_bytes()), format!("4c4f4f4b4c494b4501000000{twos}{proof}"));
+    assert_eq!(hex(&response.to_bytes()), format!("4c4f4f4b4c494b4502000000{twos}{proof}"));
     assert_eq!(Challenge::from_bytes(&[b'H'; CHALLENGE_BYTES]), Err(HandshakeError::Magic));
     assert_eq!(Response::from_bytes(&[0; RESPONSE_BYTES]), Err(HandshakeError::Magic));
     let mut verdict = response.judge(&challenge, &secret(7)).to_bytes();

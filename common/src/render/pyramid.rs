@@ -238,3 +238,58 @@ fn join(parts: &[Node]) -> Node {
 pub fn strongest(energy: [f32; 3]) -> f32 {
     energy[0].max(energy[1]).max(energy[2])
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{image::Image, math::Rgb};
+
+    /// The sum over the coarsest cells.
+    fn root_energy(pyramid: &LightPyramid) -> Rgb {
+        pyramid.roots().fold(Rgb::ZERO, |sum, cell| sum + widen(pyramid.node(cell).energy))
+    }
+
+    #[test]
+    fn the_roots_hold_all_the_light_of_the_map() {
+        // Dim, textured walls, a window and a sun of one texel; sides that are no powers of two.
+        let texel = |k: usize| match (k / 44, k % 44) {
+            (6..=9, 5..=9) => [4.0, 5.0, 7.0],
+            (7, 31) => [900.0, 800.0, 700.0],
+            (row, column) => [0.1, 0.08, 0.06].map(|wall: f32| wall * (1.0 + 0.1 * ((3 * row + column) % 7) as f32)),
+        };
+        let map = Environment::new(Image::from_pixels(44, 22, (0..44 * 22).map(texel).collect())).unwrap();
+        let total = map.total();
+        let integral = bilinear_integral(&map);
+        let pyramid = LightPyramid::new(map);
+        let energy = root_energy(&pyramid);
+        // The pyramid integrates the bilinear function; only sin(theta) within a quarter texel is neglected.
+        assert!((energy / integral - Rgb::ONE).abs().max_element() < 1e-3, "{energy} {integral}");
+        // The sum over texels sees the sun in its own row, not spread over three: their solid angles differ by a hundredth.
+        assert!((energy / total - Rgb::ONE).abs().max_element() < 0.01, "{energy} {total}");
+    }
+
+    #[test]
+    fn children_hold_the_light_of_their_parent() {
+        let texel = |k: usize| [0.2 + (k % 5) as f32, 1.0, 0.5 + (k % 3) as f32];
+        let map = Environment::new(Image::from_pixels(32, 16, (0..512).map(texel).collect())).unwrap();
+        let pyramid = LightPyramid::new(map);
+        for root in pyramid.roots() {
+            let sum = pyramid.children(root).fold(Rgb::ZERO, |sum, child| sum + widen(pyramid.node(child).energy));
+            // Single precision.
+            assert!((sum / widen(pyramid.node(root).energy) - Rgb::ONE).abs().max_element() < 1e-5, "{root:?}");
+        }
+    }
+
+    /// Radiance over the sphere by the midpoint rule with 8 x 8 points per texel.
+    fn bilinear_integral(map: &Environment) -> Rgb {
+        let (rows, columns) = (8 * map.height(), 8 * map.width());
+        let mut sum = Rgb::ZERO;
+        for i in 0..rows {
+            let v = (i as f64 + 0.5) / rows as f64;
+            let row =
+                (0..columns).fold(Rgb::ZERO, |row, j| row + map.radiance_at((j as f64 + 0.5) / columns as f64, v));
+            sum += row * sin_cos(PI * v).0;
+        }
+        sum * (PI / rows as f64) * (TAU / columns as f64)
+    }
+}

@@ -4,7 +4,7 @@
 //! duplicates merge into counts, and `w_p = count / (N pdf_p)` makes the weighted sum an unbiased estimate of the sum
 //! over all pixels.
 
-use super::transport::Pixel;
+use super::transport::{Pixel, tile_order};
 use crate::math::sampling::{key, uniform};
 
 /// How many pixels stage one looks at.
@@ -36,7 +36,7 @@ pub struct Candidate {
     pub intensity: f64,
 }
 
-/// The chosen pixels, in ascending order of (row, column), each once.
+/// The chosen pixels, tile by tile ([`tile_order`]), each once: neighbours share cuts of the light.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct PixelSubset {
     /// Column and row.
@@ -66,8 +66,7 @@ impl PixelSubset {
         let mut ordered = candidates.to_vec();
         ordered.sort_by_key(|c| (c.pixel[1], c.pixel[0]));
         let SampleCount::Draws(draws) = count else {
-            let pixels: Vec<Pixel> = ordered.iter().map(|c| c.pixel).collect();
-            return Some(Self { weights: vec![1.0; pixels.len()], pixels });
+            return Some(Self::in_tile_order(ordered.iter().map(|c| (c.pixel, 1.0)).collect()));
         };
         let random = |draw: u32| uniform(key(&[seed, STAGE, u64::from(index), u64::from(draw)]));
         let mut counts = vec![0u32; ordered.len()];
@@ -106,12 +105,15 @@ impl PixelSubset {
                 }
             }
         }
-        let mut subset = Self::default();
-        for ((candidate, &count), pdf) in ordered.iter().zip(&counts).zip(&pdf).filter(|((_, c), _)| **c > 0) {
-            subset.pixels.push(candidate.pixel);
-            subset.weights.push(f64::from(count) / (f64::from(draws) * pdf));
-        }
-        Some(subset)
+        let drawn = ordered.iter().zip(&counts).zip(&pdf).filter(|((_, count), _)| **count > 0);
+        let weighted = drawn.map(|((c, &count), pdf)| (c.pixel, f64::from(count) / (f64::from(draws) * pdf)));
+        Some(Self::in_tile_order(weighted.collect()))
+    }
+
+    fn in_tile_order(mut chosen: Vec<(Pixel, f64)>) -> Self {
+        chosen.sort_by_key(|(pixel, _)| tile_order(*pixel));
+        let (pixels, weights) = chosen.into_iter().unzip();
+        Self { pixels, weights }
     }
 }
 
@@ -189,5 +191,16 @@ mod tests {
     fn the_full_set_has_unit_weights() {
         let s = PixelSubset::draw(&gradient(), SampleCount::Full, Sampling::Importance, 0, 0).unwrap();
         assert_eq!((s.pixels.len(), s.weights.iter().all(|&w| w == 1.0)), (1600, true));
+    }
+
+    #[test]
+    fn pixels_are_in_tile_order_whatever_the_order_of_the_candidates() {
+        let mut reversed = gradient();
+        reversed.reverse();
+        for count in [SampleCount::Full, SampleCount::Draws(300)] {
+            let s = PixelSubset::draw(&gradient(), count, Sampling::Importance, 3, 0).unwrap();
+            assert!(s.pixels.is_sorted_by_key(|p| tile_order(*p)), "{count:?}");
+            assert_eq!(Some(s), PixelSubset::draw(&reversed, count, Sampling::Importance, 3, 0));
+        }
     }
 }

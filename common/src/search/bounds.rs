@@ -62,14 +62,6 @@ impl Bounds {
         Self::new(lower.to_vec(), upper.to_vec(), vec![Scale::Linear; lower.len()])
     }
 
-    /// A box whose coordinates are searched as they are.
-    ///
-    /// # Errors
-    /// As [`Bounds::new`].
-    pub fn unscaled(lower: &[f64], upper: &[f64]) -> Result<Self, SearchError> {
-        Self::new(lower.to_vec(), upper.to_vec(), vec![Scale::Unscaled; lower.len()])
-    }
-
     /// Number of parameters, at least 1.
     #[must_use]
     pub fn dimension(&self) -> usize {

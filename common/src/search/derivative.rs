@@ -8,17 +8,17 @@ use super::normal_equations::NormalEquations;
 
 /// The worst disagreement between an analytic and a numeric derivative.
 #[derive(Debug, Clone, PartialEq)]
-pub struct DerivativeCheck {
+pub(crate) struct DerivativeCheck {
     /// Which function: a residual's index, or 0.
-    pub row: usize,
+    pub(crate) row: usize,
     /// Which parameter.
-    pub column: usize,
+    pub(crate) column: usize,
     /// The derivative as given.
-    pub analytic: f64,
+    pub(crate) analytic: f64,
     /// The derivative by differences.
-    pub numeric: f64,
+    pub(crate) numeric: f64,
     /// Their difference in units of the largest derivative by this parameter; NaN when either is not a number.
-    pub error: f64,
+    pub(crate) error: f64,
 }
 
 /// Compares a Jacobian, row-major m x n at `point`, with differences of `functions` (n values to m), with step
@@ -27,7 +27,7 @@ pub struct DerivativeCheck {
 /// # Panics
 /// When lengths do not fit.
 #[must_use]
-pub fn check_jacobian(
+pub(crate) fn check_jacobian(
     mut functions: impl FnMut(&[f64]) -> Vec<f64>,
     jacobian: &[f64],
     point: &[f64],
@@ -58,7 +58,7 @@ pub fn check_jacobian(
 /// # Panics
 /// When lengths do not fit.
 #[must_use]
-pub fn check_gradient(problem: &mut dyn LeastSquaresProblem, point: &[f64], steps: &[f64]) -> DerivativeCheck {
+pub(crate) fn check_gradient(problem: &mut dyn LeastSquaresProblem, point: &[f64], steps: &[f64]) -> DerivativeCheck {
     let mut normal = NormalEquations::new(problem.dimension());
     problem.linearise(point, &mut normal);
     let gradient: Vec<f64> = (0..point.len()).map(|i| normal.vector(i)).collect();

@@ -12,8 +12,6 @@
 //! returns a point outside its box, nor one worse than its start. An objective that is not finite at the start is an
 //! error; elsewhere it is a rejected point.
 //!
-//! [`derivative`] checks a Jacobian against differences, for the tests of whoever writes one.
-//!
 //! ```
 //! use lookalike::search::{Bounds, pattern};
 //! let bounds = Bounds::linear(&[0.0, 0.0], &[1.0, 1.0])?;
@@ -25,12 +23,14 @@
 
 pub mod bounds;
 pub mod bvls;
-pub mod derivative;
+#[cfg(test)]
+pub(crate) mod derivative;
 pub mod error;
 pub mod least_squares;
 pub mod multi_start;
 pub mod normal_equations;
 pub mod pattern;
+pub mod sandwich;
 mod semidefinite;
 pub mod termination;
 #[cfg(test)]
@@ -39,4 +39,5 @@ mod test_functions;
 pub use bounds::{Bounds, Scale};
 pub use error::SearchError;
 pub use normal_equations::NormalEquations;
+pub use sandwich::Sandwich;
 pub use termination::{Progress, Termination};

@@ -43,12 +43,6 @@ impl Termination {
         Self::ALL.into_iter().find(|reason| reason.name() == name)
     }
 
-    /// Whether the search ended because it was done, not because it was cut short.
-    #[must_use]
-    pub const fn converged(self) -> bool {
-        !matches!(self, Self::MaxIterations | Self::MaxEvaluations | Self::Stopped)
-    }
-
     /// Every reason.
     pub const ALL: [Self; 7] = [
         Self::MeshTolerance,

@@ -1,8 +1,17 @@
 //! Functions and least-squares problems with known minima, shared by the tests of the searches.
 
+use super::bounds::{Bounds, Scale};
+use super::error::SearchError;
 use super::least_squares::LeastSquaresProblem;
 use super::normal_equations::NormalEquations;
 use crate::math::elementary::exp;
+
+impl Bounds {
+    /// A box whose coordinates are searched as they are.
+    pub(super) fn unscaled(lower: &[f64], upper: &[f64]) -> Result<Self, SearchError> {
+        Self::new(lower.to_vec(), upper.to_vec(), vec![Scale::Unscaled; lower.len()])
+    }
+}
 
 /// Rosenbrock's function in any even dimension: pairs of `100 (b - a^2)^2 + (1 - a)^2`. Minimum 0 at (1, ..., 1).
 pub(super) fn rosenbrock(x: &[f64]) -> f64 {

@@ -16,6 +16,7 @@ mod tokens;
 pub use exit::Exit;
 pub(crate) use exit::NotThereYet;
 
+use crate::settings::DemoSettings;
 use anyhow::Context;
 use args::{Cli, Command, FitArgs};
 use clap::{CommandFactory, Parser};
@@ -32,7 +33,7 @@ pub(crate) fn main(argv: Vec<OsString>) -> ExitCode {
         Ok(cli) => cli,
         Err(error) => return report::failure(&error),
     };
-    let result = start_tracing(&cli.log).and_then(|()| dispatch(cli.command));
+    let result = start_tracing(&cli.log).and_then(|()| dispatch(cli));
     result.unwrap_or_else(|error| report::failure(&error))
 }
 
@@ -59,11 +60,15 @@ fn start_tracing(filter: &str) -> anyhow::Result<()> {
         .map_err(anyhow::Error::from_boxed)
 }
 
-fn dispatch(command: Command) -> anyhow::Result<ExitCode> {
+fn dispatch(Cli { log, command }: Cli) -> anyhow::Result<ExitCode> {
     use crate::commands::{compare, demo, fit, render, worker};
     match command {
-        Command::Demo(args) => demo::run(args.into_settings()?),
-        Command::Fit(args) => fit::run(FitArgs::into_settings(*args)?),
+        Command::Demo(args) => demo::run(DemoSettings { log: Some(log), ..args.into_settings()? }),
+        Command::Fit(args) => {
+            let mut settings = FitArgs::into_settings(*args)?;
+            settings.cluster.log = Some(log);
+            fit::run(settings)
+        }
         Command::Render(args) => render::run(args.into_settings()?),
         Command::Compare(args) => compare::run(args.into_settings()),
         Command::Worker(args) => worker::run(args),

@@ -44,7 +44,7 @@ pub(crate) fn run(settings: DemoSettings) -> anyhow::Result<ExitCode> {
         settings: MethodSettings::default(),
         exposure,
         inputs,
-        cluster: ClusterSettings { workers: settings.workers, ..ClusterSettings::default() },
+        cluster: ClusterSettings { workers: settings.workers, log: settings.log, ..ClusterSettings::default() },
         progress: settings.progress,
         out: out.clone(),
         out_name: out_name.clone(),

@@ -99,6 +99,7 @@ fn run_graph(
     let remote = job.cluster.workers.count() == 0 || !job.cluster.listen.ip().is_loopback();
     options.listen = (remote || job.cluster.listen.port() != 0).then_some(job.cluster.listen);
     options.advertise = job.cluster.advertise.as_ref().map(ToString::to_string);
+    options.log.clone_from(&job.cluster.log);
     options.policy.wait_for_workers = job.cluster.wait_for_workers;
     options.policy.grace = job.cluster.grace;
     let runtime = tokio::runtime::Builder::new_multi_thread()
@@ -111,12 +112,12 @@ fn run_graph(
         display.event(event);
     });
     runtime.block_on(run).map_err(|error| {
-        let exit = match error.exit_code() {
-            2 => Exit::BadInput,
-            130 => Exit::Interrupted,
-            _ => Exit::ClusterFailed,
-        };
-        anyhow::Error::new(error).context(exit)
+        match error.exit_code() {
+            2 => anyhow::Error::new(error).context(Exit::BadInput),
+            // The heading says it all.
+            130 => Exit::Interrupted.into(),
+            _ => anyhow::Error::new(error).context(Exit::ClusterFailed),
+        }
     })
 }
 

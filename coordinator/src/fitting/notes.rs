@@ -2,7 +2,7 @@
 
 use lookalike::{
     brdf::{Model, Role, flat_bounds, flat_names},
-    fit::{FitOutcome, Method, gamma_range},
+    fit::{FitOutcome, Method, Uncertainty, gamma_range},
 };
 
 /// Notes on the winner: at an end of the gammas, parameters at their bounds, reflecting more than it receives.
@@ -25,21 +25,47 @@ pub(crate) fn notes(method: &Method, outcome: &FitOutcome) -> Vec<String> {
             ));
         }
     }
-    notes.extend(at_bounds(method.model, last));
+    let is_determined = |i: usize| outcome.uncertainty.get(i) != Some(&Uncertainty::Undetermined);
+    notes.extend(at_bounds(method.model, last, is_determined));
+    notes.extend(undetermined(method.model, &outcome.uncertainty));
     notes.extend(bright(method.model, last));
     notes
 }
 
-fn at_bounds(model: &dyn Model, parameters: &[f64]) -> Option<String> {
+fn at_bounds(model: &dyn Model, parameters: &[f64], is_determined: impl Fn(usize) -> bool) -> Option<String> {
     let (lower, upper) = flat_bounds(model.parameters());
     let names = flat_names(model.parameters());
     // A colour of zero is an answer (no diffuse part); an upper bound or a width at its end is a limit of the model.
     let is_width = |i: usize| model.lobes().iter().any(|b| b.width == Some(i));
     let limited = |&i: &usize| parameters[i] == upper[i] || (is_width(i) && parameters[i] == lower[i]);
-    let limited: Vec<String> =
-        (0..parameters.len()).filter(limited).map(|i| format!("{} = {}", names[i], parameters[i])).collect();
+    let limited: Vec<String> = (0..parameters.len())
+        .filter(limited)
+        .filter(|&i| is_determined(i))
+        .map(|i| format!("{} = {}", names[i], parameters[i]))
+        .collect();
     let list = limited.join(", ");
     (!limited.is_empty()).then(|| format!("at the limit of the model's range: {list}; the photo asks for more"))
+}
+
+/// The parameters of which much of the range matches the photo as well.
+fn undetermined(model: &dyn Model, uncertainty: &[Uncertainty]) -> Option<String> {
+    let names = flat_names(model.parameters());
+    let mut list = Vec::new();
+    let mut first = 0;
+    for parameter in model.parameters() {
+        let entries = first..first + parameter.channels.count();
+        let open: Vec<usize> = entries.clone().filter(|&i| uncertainty[i] == Uncertainty::Undetermined).collect();
+        if open.len() == entries.len() {
+            list.push(parameter.name.to_owned());
+        } else {
+            list.extend(open.into_iter().map(|i| names[i].clone()));
+        }
+        first = entries.end;
+    }
+    let list = list.join(", ");
+    (!list.is_empty()).then(|| {
+        format!("the photo does not determine {list}: other values look the same, so do not read them as a measurement")
+    })
 }
 
 /// Colours are free, so a fit may reflect more light than it receives.
@@ -56,4 +82,31 @@ fn bright(model: &dyn Model, parameters: &[f64]) -> Option<String> {
         first += parameter.channels.count();
     }
     None
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use lookalike::brdf::CookTorrance;
+
+    const KNOWN: Uncertainty = Uncertainty::StandardError(0.01);
+
+    #[test]
+    fn parameters_that_are_not_determined_are_named_in_one_note() {
+        let mut uncertainty = [KNOWN; 8];
+        uncertainty[3] = Uncertainty::AtBound;
+        assert_eq!(undetermined(&CookTorrance, &uncertainty), None);
+        for open in [1, 3, 4, 5, 7] {
+            uncertainty[open] = Uncertainty::Undetermined;
+        }
+        let note = undetermined(&CookTorrance, &uncertainty).unwrap();
+        assert!(note.starts_with("the photo does not determine kd.g, ks, m: other values look the same"), "{note}");
+    }
+
+    #[test]
+    fn a_bound_that_means_nothing_is_not_called_a_limit_of_the_model() {
+        let parameters = [0.3, 0.3, 0.3, 0.0, 0.0, 0.0, 0.5, 1.0];
+        assert!(at_bounds(&CookTorrance, &parameters, |_| true).is_some_and(|note| note.contains("m = 1")));
+        assert_eq!(at_bounds(&CookTorrance, &parameters, |i| i != 7), None);
+    }
 }

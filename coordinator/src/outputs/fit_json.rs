@@ -7,7 +7,7 @@ use super::conventions;
 use crate::settings::MethodSettings;
 use lookalike::{
     brdf::{Channels, Model},
-    fit::{FitOutcome, Judged, Method},
+    fit::{FitOutcome, Judged, Method, Uncertainty},
     scene::Capture,
 };
 use serde_json::{Map, Value, json};
@@ -63,6 +63,11 @@ impl FitRecord<'_> {
         let mut stage_two = json!({ "gamma": winner.candidate.gamma, "subset": winner.candidate.subset });
         merge(&mut stage_two, score(winner.cssim, winner.cssim_object));
         merge(&mut stage_two, json!({ "parameters": parameters_json(model, &winner.candidate.parameters) }));
+        let winner_parameters = &winner.candidate.parameters;
+        merge(
+            &mut stage_two,
+            json!({ "uncertainty": uncertainty_json(model, winner_parameters, &self.outcome.uncertainty) }),
+        );
         let polished = self.outcome.polished.as_ref().map(|p| {
             let mut entry = score(p.cssim, p.cssim_object);
             merge(&mut entry, json!({ "parameters": parameters_json(model, &p.parameters) }));
@@ -131,19 +136,40 @@ impl Timing {
 
 /// A flat parameter vector by name: colours as three numbers, scalars as one.
 pub(crate) fn parameters_json(model: &dyn Model, parameters: &[f64]) -> Value {
+    by_name(model, &parameters.iter().map(|value| json!(value)).collect::<Vec<_>>())
+}
+
+/// One value per entry of the flat parameter vector, by name.
+fn by_name(model: &dyn Model, entries: &[Value]) -> Value {
     let mut object = Map::new();
     let mut first = 0;
     for parameter in model.parameters() {
         let count = parameter.channels.count();
-        let values = &parameters[first..first + count];
+        let values = &entries[first..first + count];
         let value = match parameter.channels {
-            Channels::Scalar => json!(values[0]),
+            Channels::Scalar => values[0].clone(),
             Channels::Rgb => json!(values),
         };
         object.insert(parameter.name.to_owned(), value);
         first += count;
     }
     Value::Object(object)
+}
+
+/// What the photo says of each parameter: the standard error as a share of the value, `null` where there is none, and whether the
+/// value is `determined`, held `at-bound`, or `undetermined`.
+fn uncertainty_json(model: &dyn Model, parameters: &[f64], uncertainty: &[Uncertainty]) -> Value {
+    let relative = parameters.iter().zip(uncertainty).map(|(value, known)| match known {
+        Uncertainty::StandardError(error) => json!(error / value.abs()),
+        Uncertainty::AtBound | Uncertainty::Undetermined => Value::Null,
+    });
+    let state = uncertainty.iter().map(|known| match known {
+        Uncertainty::StandardError(_) => json!("determined"),
+        Uncertainty::AtBound => json!("at-bound"),
+        Uncertainty::Undetermined => json!("undetermined"),
+    });
+    let relative = by_name(model, &relative.collect::<Vec<_>>());
+    json!({ "relative": relative, "state": by_name(model, &state.collect::<Vec<_>>()) })
 }
 
 /// The name of a choice as it is typed on the command line.

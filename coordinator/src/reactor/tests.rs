@@ -23,6 +23,8 @@ pub(super) struct Script {
     /// Added once node 0 is complete.
     pub(super) follow_up: Option<NodeSpec>,
     pub(super) tolerates_failures: bool,
+    /// Refuses every output with this error.
+    pub(super) not_verified: bool,
     pub(super) completed: Vec<NodeId>,
     pub(super) failed: Vec<(NodeId, FailureReason)>,
 }
@@ -35,6 +37,10 @@ impl Planner for Script {
 
     fn completed(&mut self, node: NodeId, _: &Blob, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
         self.completed.push(node);
+        if self.not_verified {
+            let what = "the cost of gamma 2".to_owned();
+            return Err(PlanError::NotVerified { what, claimed: 0.5, recomputed: 0.25 });
+        }
         if node == NodeId(0) {
             self.follow_up.take().map(|spec| graph.add_node(spec)).transpose()?;
         }
@@ -363,4 +369,18 @@ fn local_workers_that_keep_dying_end_the_run() {
 #[test]
 fn empty_plan_is_finished_at_once() {
     assert!(Bench::new(Script::default()).core.is_finished());
+}
+
+#[test]
+fn wrong_result_ends_the_run_and_names_gamma_numbers_and_worker() {
+    let mut bench = Bench::new(Script { not_verified: true, ..independent(1) });
+    bench.join(A, 1);
+    bench.join(B, 1);
+    bench.start(A, 0, 1);
+    let error = bench.try_handle(finished(Site::Worker(A), 0, 1, 7)).unwrap_err();
+    let text = error.to_string();
+    for part in ["\"n0\"", "from worker 1", "the cost of gamma 2 is said to be 0.5, but is 0.25"] {
+        assert!(text.contains(part), "{text}");
+    }
+    assert_eq!(error.exit_code(), 3);
 }

@@ -100,6 +100,7 @@ fn local_workers(options: &RunnerOptions, address: String) -> Result<LocalWorker
         count: options.workers,
         command: command.map_err(unknown_program)?,
         access: options.access_file.clone(),
+        log: options.log.clone(),
         address,
         threads: options.threads_per_worker.unwrap_or_else(|| threads_per_worker(options.workers)),
         others_may_come: options.listen.is_some(),

@@ -5,7 +5,7 @@ use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::time::Duration;
 
-use lookalike::graph::{BlobHash, FailureReason, PlanError};
+use lookalike::graph::{BlobHash, FailureReason, NodeFailure, PlanError};
 use thiserror::Error;
 
 use crate::comm::{NodeName, Site};
@@ -87,6 +87,18 @@ pub enum RunError {
         /// The second output.
         second: BlobHash,
     },
+    /// A result is not what its recomputation gives.
+    #[error(
+        "the result of {name} from {site} is wrong: {error}; use the same build everywhere, check the memory of that machine, and report this"
+    )]
+    WrongResult {
+        /// The node.
+        name: Box<NodeName>,
+        /// Where the result came from.
+        site: Site,
+        /// What is wrong with it.
+        error: PlanError,
+    },
     /// The planner cannot go on, by default because a node failed.
     #[error(transparent)]
     Plan(#[from] PlanError),
@@ -105,7 +117,10 @@ impl RunError {
             | Self::NothingToAdvertise { .. }
             | Self::Listen { .. }
             | Self::AccessFile { .. } => 2,
-            Self::Plan(PlanError::NodeFailed { reason: FailureReason::Application(_), .. }) => 2,
+            // What a node says of its inputs is about the user's; a panic or an unknown kind is our own mistake.
+            Self::Plan(PlanError::NodeFailed {
+                reason: FailureReason::Node(NodeFailure::Application { .. }), ..
+            }) => 2,
             Self::Interrupted => 130,
             _ => 3,
         }

@@ -13,13 +13,14 @@ mod error;
 mod interrupt;
 mod options;
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Duration;
 
 use lookalike::graph::{DecodedCache, NodeId, Planner, Registry, RunContext, WorkerId};
 use lookalike::protocol::{Assignment, LeaseName, ToWorker};
 use tokio::sync::mpsc::{UnboundedReceiver, UnboundedSender, unbounded_channel};
-use tokio::time::{Instant, sleep_until};
+use tokio::time::{Instant, MissedTickBehavior, interval, sleep_until};
 use tokio_util::sync::CancellationToken;
 use tracing::{info, trace};
 
@@ -67,14 +68,14 @@ pub async fn run<P: Planner>(
         here: Here {
             registry,
             decoded: Arc::new(DecodedCache::new(DECODED_BOUND_BYTES)),
-            contexts: Vec::new(),
+            contexts: BTreeMap::new(),
             results: results_sender,
         },
         began: Instant::now(),
     };
     let outcome = driver.drive(results, interrupted).await;
     info!(summary = ?driver.core.summary(), "the run is over");
-    driver.here.contexts.iter().for_each(RunContext::cancel);
+    driver.here.contexts.values().for_each(|(context, _)| context.cancel());
     let reason = if outcome.is_ok() { "the run is complete" } else { "the run has failed" };
     driver.cluster.stop(reason).await;
     outcome.map(|()| (driver.planner, driver.core.summary()))
@@ -100,6 +101,8 @@ impl<P: Planner, O: FnMut(&RunEvent)> Driver<P, O> {
         let outcome = reactor::start(&mut self.core, &mut self.planner, now, &mut self.outbox);
         self.perform();
         outcome?;
+        let mut glance = interval(GLANCE);
+        glance.set_missed_tick_behavior(MissedTickBehavior::Delay);
         while !self.core.is_finished() {
             let deadline = self.core.next_deadline().map(|deadline| self.began + deadline);
             let event = tokio::select! {
@@ -107,7 +110,14 @@ impl<P: Planner, O: FnMut(&RunEvent)> Driver<P, O> {
                 biased;
                 () = interrupted.cancelled() => return Err(RunError::Interrupted),
                 Some(inbound) = self.cluster.inbound.recv() => self.event(inbound),
-                Some(result) = results.recv() => Some(result),
+                Some(result) = results.recv() => {
+                    self.here.forget(&result);
+                    Some(result)
+                }
+                _ = glance.tick(), if !self.here.contexts.is_empty() => {
+                    self.tell_progress();
+                    None
+                }
                 () = sleep_or_wait(deadline) => Some(Event::DeadlinePassed),
             };
             let Some(event) = event else { continue };
@@ -123,6 +133,16 @@ impl<P: Planner, O: FnMut(&RunEvent)> Driver<P, O> {
 
     fn now(&self) -> Duration {
         self.began.elapsed()
+    }
+
+    /// How far the nodes are that run here, where that has changed. Those of workers come with their heartbeats.
+    fn tell_progress(&mut self) {
+        for (node, (context, told)) in &mut self.here.contexts {
+            let permille = u16::try_from(context.progress_permille()).unwrap_or(1000);
+            if std::mem::replace(told, permille) != permille {
+                (self.observer)(&RunEvent::NodeProgress { node: *node, permille });
+            }
+        }
     }
 
     fn event(&mut self, inbound: Inbound) -> Option<Event> {
@@ -182,7 +202,7 @@ impl<P: Planner, O: FnMut(&RunEvent)> Driver<P, O> {
     fn run_here(&mut self, node: NodeId, attempt: u32) {
         let graph = self.core.graph();
         let (Some(spec), Some(inputs)) = (graph.spec(node).cloned(), graph.input_blobs(node)) else { return };
-        let context = self.here.new_context();
+        let context = self.here.new_context(node);
         let (registry, results) = (Arc::clone(&self.here.registry), self.here.results.clone());
         // On the rayon pool and not on a blocking thread of tokio: its parallel iterators run there anyway, and a runtime
         // waits for blocking threads before it ends, but an interrupted run shall not wait for a node.
@@ -198,6 +218,9 @@ impl<P: Planner, O: FnMut(&RunEvent)> Driver<P, O> {
     }
 }
 
+/// How often to look how far the nodes are that run here.
+const GLANCE: Duration = Duration::from_millis(250);
+
 /// More threads than this on one worker are a mistake or a lie.
 const MAX_THREADS: usize = 4096;
 
@@ -212,15 +235,22 @@ async fn sleep_or_wait(deadline: Option<Instant>) {
 struct Here {
     registry: Arc<Registry>,
     decoded: Arc<DecodedCache>,
-    /// Of every node that was started here, to cancel it when the run ends.
-    contexts: Vec<RunContext>,
+    /// Of every node that runs here, with the progress that was told last: to watch it, and to cancel it when the run ends.
+    contexts: BTreeMap<NodeId, (RunContext, u16)>,
     results: UnboundedSender<Event>,
 }
 
 impl Here {
-    fn new_context(&mut self) -> RunContext {
+    fn new_context(&mut self, node: NodeId) -> RunContext {
         let context = RunContext::new(Arc::clone(&self.decoded));
-        self.contexts.push(context.clone());
+        self.contexts.insert(node, (context.clone(), 0));
         context
+    }
+
+    /// Let the context of a node go that has ended.
+    fn forget(&mut self, ended: &Event) {
+        if let Event::Finished { node, .. } | Event::Failed { node, .. } = ended {
+            self.contexts.remove(node);
+        }
     }
 }

@@ -18,6 +18,8 @@ pub struct RunnerOptions {
     pub threads_per_worker: Option<NonZeroUsize>,
     /// How to start a local worker; `None` starts this very program as `worker`.
     pub worker_command: Option<WorkerCommand>,
+    /// The log filter of local workers, as `--log` takes it; `None` leaves them their default.
+    pub log: Option<String>,
     /// Where to listen for workers from elsewhere; `None` listens on the loopback interface, on any free port, for the local
     /// ones alone.
     pub listen: Option<SocketAddr>,
@@ -41,6 +43,7 @@ impl RunnerOptions {
             workers,
             threads_per_worker: None,
             worker_command: None,
+            log: None,
             listen: None,
             advertise: None,
             access_file,

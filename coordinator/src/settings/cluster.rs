@@ -8,6 +8,8 @@ use std::{fmt, net::SocketAddr, num::NonZeroUsize, str::FromStr, thread, time::D
 pub struct ClusterSettings {
     /// Local worker processes to spawn.
     pub workers: Workers,
+    /// The log filter of the local workers; none leaves them their own default.
+    pub log: Option<String>,
     /// Address to listen on; port 0 lets the system choose.
     pub listen: SocketAddr,
     /// What the access file tells workers to connect to; none means the address listened on.
@@ -33,6 +35,7 @@ impl Default for ClusterSettings {
     fn default() -> Self {
         Self {
             workers: Workers::PerCore,
+            log: None,
             listen: SocketAddr::from(([127, 0, 0, 1], 0)),
             advertise: None,
             wait_for_workers: Duration::from_mins(10),

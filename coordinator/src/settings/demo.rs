@@ -10,6 +10,8 @@ pub struct DemoSettings {
     pub out: PathBuf,
     /// Local worker processes; never 0.
     pub workers: Workers,
+    /// The log filter of the local workers.
+    pub log: Option<String>,
     /// How progress is shown.
     pub progress: ProgressKind,
 }

@@ -63,5 +63,17 @@ fn interrupt_ends_every_process_with_code_130() {
         assert!(output.stdout.is_empty() && !folder.path().join("out/fit.json").exists());
         let said = events.iter().any(|e| e.as_str().is_some_and(|line| line.contains("interrupted")));
         assert!(said, "{events:?}");
+        let twice = events.iter().any(|e| e.as_str().is_some_and(|line| line.contains("caused by: interrupted")));
+        assert!(!twice, "{events:?}");
     }
+}
+
+#[test]
+fn local_workers_log_as_the_coordinator_is_told_to() {
+    let folder = folder();
+    let joined = "INFO lookalike_worker::session: joined";
+    let quiet = fit(folder.path(), "quiet", QUICK).done();
+    assert!(!quiet.stderr.contains(joined), "{}", quiet.stderr);
+    let loud = fit(folder.path(), "loud", &format!("{QUICK} --log lookalike_worker=info")).done();
+    assert!(loud.stderr.contains(joined), "{}", loud.stderr);
 }

@@ -58,6 +58,12 @@ fn fit_json_has_the_shape_of_the_contract() {
     for name in ["cssim", "cssim_object", "parameters"] {
         assert_eq!(won[name], stage_two[name]);
     }
+    let uncertainty = &stage_two["uncertainty"];
+    assert_eq!(uncertainty["state"]["kd"], json!(["determined", "determined", "determined"]), "{stage_two}");
+    assert!(number(&uncertainty["relative"]["kd"][0]) < 0.2, "{stage_two}");
+    assert!(uncertainty["state"]["alpha"].is_string() && uncertainty["relative"]["f0"].is_array(), "{stage_two}");
+    let open = uncertainty.to_string().contains("undetermined");
+    assert_eq!(answer.stdout.contains("the photo does not determine"), open, "{}", answer.stdout);
     let polished = &json["polished"];
     assert!(number(&polished["cssim"]) <= lowest && number(&polished["cssim_object"]) > 0.0);
     assert!((1..=300).contains(&polished["evaluations"].as_u64().unwrap()));

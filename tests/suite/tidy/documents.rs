@@ -6,7 +6,7 @@ use super::{
 };
 use std::{collections::BTreeSet, fs, process::Command};
 
-const DOCUMENTS: [&str; 4] = ["README.md", "ARCHITECTURE.md", "CONTRIBUTING.md", "CHANGELOG.md"];
+const DOCUMENTS: [&str; 5] = ["README.md", "ARCHITECTURE.md", "CONTRIBUTING.md", "CHANGELOG.md", "docs/design.md"];
 const FOLDERS: [&str; 8] = ["common/", "coordinator/", "docs/", "fuzz/", "tests/", "worker/", ".ci/", "experiments/"];
 
 /// A document without its HTML comments.
@@ -53,9 +53,12 @@ fn links_and_paths_in_documents_resolve() {
         let named = prose.split('`').skip(1).step_by(2).filter(|path| {
             FOLDERS.iter().any(|folder| path.starts_with(folder)) && !path.contains(['*', '<', ' ', '{', '('])
         });
-        for link in links.filter(|link| !link.starts_with("http")).chain(named) {
+        // Links start from the document's folder, paths in the text from the root.
+        let folder = root().join(name).parent().expect("a document lies in a folder").to_owned();
+        let places = links.filter(|link| !link.starts_with("http")).map(|link| (folder.clone(), link));
+        for (from, link) in places.chain(named.map(|path| (root(), path))) {
             let path = link.split('#').next().unwrap_or_default();
-            if !path.is_empty() && !root().join(path).exists() {
+            if !path.is_empty() && !from.join(path).exists() {
                 offences.push(format!("{name}: {link} does not exist"));
             }
         }
@@ -96,6 +99,50 @@ fn the_readme_names_the_two_commands() {
     for command in ["cargo run --release --bin lookalike -- demo", "cargo test"] {
         assert!(lines.contains(&command), "expected the line {command:?} in a code block of README.md");
     }
+}
+
+#[test]
+fn sections_of_the_design_that_are_cited_exist() {
+    let design = document("docs/design.md");
+    let headings = design.lines().filter_map(|line| line.strip_prefix("## ")?.split_once(". "));
+    let sections: Vec<&str> = headings.map(|(number, _)| number).collect();
+    assert_eq!(sections, ["1", "2", "3", "4", "5", "6", "7", "8", "9", "10"], "the sections of docs/design.md");
+    let (mut offences, mut cited) = (Vec::new(), 0);
+    for source in sources() {
+        // Comments in one line, whatever their breaks.
+        let lines =
+            source.text.lines().map(|line| line.trim_start().trim_start_matches('/').trim_start_matches('!').trim());
+        let text = lines.collect::<Vec<_>>().join(" ");
+        for (place, phrase) in text.match_indices("design section") {
+            let numbers = section_numbers(&text[place + phrase.len()..]);
+            cited += numbers.len();
+            if numbers.is_empty() && !source.path.starts_with("tests/suite/tidy") {
+                offences.push(format!("{}: cites a section of the design without its number", source.path));
+            }
+            let unknown = numbers.iter().filter(|number| !sections.contains(&number.as_str()));
+            offences.extend(unknown.map(|number| format!("{}: design section {number}", source.path)));
+        }
+    }
+    assert!(cited > 20, "only {cited} citations found: does this test still read them?");
+    none("docs/design.md has every section that a comment cites", offences);
+}
+
+/// The numbers that follow "design section": of ` 5`, `s 2 and 9`, `s 1, 2 and 10`.
+fn section_numbers(text: &str) -> Vec<String> {
+    let list = text.strip_prefix('s').unwrap_or(text);
+    let words = list.split_whitespace().filter(|word| *word != "and");
+    let is_number = |word: &&str| word.starts_with(|c: char| c.is_ascii_digit());
+    let number = |word: &str| word.chars().take_while(char::is_ascii_digit).collect::<String>();
+    let mut numbers = Vec::new();
+    for word in words.take_while(is_number) {
+        numbers.push(number(word));
+        // A list goes on after a comma or an "and"; a number after anything else is another sentence's.
+        let goes_on = word.ends_with(',') || list.split_once(word).is_some_and(|(_, rest)| rest.starts_with(" and "));
+        if !goes_on {
+            break;
+        }
+    }
+    numbers
 }
 
 #[test]

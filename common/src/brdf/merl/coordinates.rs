@@ -2,7 +2,7 @@
 //! Representation* (1998), for isotropic materials.
 
 use super::DIMENSIONS;
-use crate::math::{Vec3, arctangent::angle, cell, elementary::sin_cos};
+use crate::math::{Vec3, arctangent::angle, cell};
 use std::f64::consts::{FRAC_PI_2, PI};
 
 /// The angles of a pair of directions, in radians.
@@ -79,18 +79,4 @@ fn between(x: f64, cells: usize) -> (usize, f64) {
     let position = (x * cells as f64 - 0.5).clamp(0.0, (cells - 1) as f64);
     let first = cell(position, cells - 1);
     (first, position - first as f64)
-}
-
-/// Light and view (unit, local, normal +Z) of a cell's centre, the cell given along `theta_h`, `theta_d`, `phi_d`. Either may
-/// lie below the surface.
-#[must_use]
-pub fn cell_directions([theta_h, theta_d, phi_d]: [usize; 3]) -> (Vec3, Vec3) {
-    let centre = |index: usize, axis: usize| (index as f64 + 0.5) / DIMENSIONS[axis] as f64;
-    let root = centre(theta_h, 0);
-    let (sin_h, cos_h) = sin_cos(root * root * FRAC_PI_2);
-    let (sin_d, cos_d) = sin_cos(centre(theta_d, 1) * FRAC_PI_2);
-    let (sin_phi, cos_phi) = sin_cos(centre(phi_d, 2) * PI);
-    let along = Vec3::new(sin_h, 0.0, cos_h) * cos_d;
-    let across = Vec3::new(cos_h * cos_phi, sin_phi, -sin_h * cos_phi) * sin_d;
-    (along + across, along - across)
 }

@@ -8,7 +8,7 @@ use crate::{
         sampling::{key, uniform},
     },
 };
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 /// A file whose cell holds `value(cell)` in 1/sr; `None` is outside.
 fn file(value: impl Fn([usize; 3]) -> Option<[f64; 3]>) -> Vec<u8> {
@@ -22,6 +22,19 @@ fn file(value: impl Fn([usize; 3]) -> Option<[f64; 3]>) -> Vec<u8> {
         }
     }
     bytes
+}
+
+/// Light and view (unit, local, normal +Z) of a cell's centre, the cell given along `theta_h`, `theta_d`, `phi_d`. Either may
+/// lie below the surface.
+fn cell_directions([theta_h, theta_d, phi_d]: [usize; 3]) -> (Vec3, Vec3) {
+    let centre = |index: usize, axis: usize| (index as f64 + 0.5) / DIMENSIONS[axis] as f64;
+    let root = centre(theta_h, 0);
+    let (sin_h, cos_h) = sin_cos(root * root * FRAC_PI_2);
+    let (sin_d, cos_d) = sin_cos(centre(theta_d, 1) * FRAC_PI_2);
+    let (sin_phi, cos_phi) = sin_cos(centre(phi_d, 2) * PI);
+    let along = Vec3::new(sin_h, 0.0, cos_h) * cos_d;
+    let across = Vec3::new(cos_h * cos_phi, sin_phi, -sin_h * cos_phi) * sin_d;
+    (along + across, along - across)
 }
 
 /// A table of a function of directions, -1 below the horizon as in the real files.
@@ -165,7 +178,7 @@ fn negative_neighbours_are_dropped_and_a_hole_is_black() {
     let bytes = file(|[h, d, phi]| ((h + d + phi) % 2 == 0 && !(40..44).contains(&d)).then_some([0.5; 3]));
     let table = MerlTable::read("test", &bytes).unwrap();
     for (wi, wo) in pairs(20_000, 0.01) {
-        let position = 90.0 * HalfDifference::new(wi, wo).theta_d / std::f64::consts::FRAC_PI_2 - 0.5;
+        let position = 90.0 * HalfDifference::new(wi, wo).theta_d / FRAC_PI_2 - 0.5;
         let expected = if (40.0..43.0).contains(&position) { 0.0 } else { 0.5 };
         assert!((table.eval(wi, wo).y - expected).abs() < 1e-7, "{position}");
     }

@@ -17,7 +17,7 @@ pub(super) use report::{ReportParameters, ReportWire};
 pub(super) use search::SearchParameters;
 pub(super) use select::SelectParameters;
 pub(super) use transport::TransportParameters;
-pub(super) use view::ViewWire;
+pub(super) use view::{ViewWire, joined};
 
 /// All node types of a fit. Coordinator and workers hold the same registry.
 #[must_use]

@@ -13,7 +13,8 @@ use std::ops::ControlFlow;
 
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(in crate::fit) struct PolishParameters {
-    pub(in crate::fit) start: Vec<f64>,
+    /// What polish may start from: the best of them on this node's table.
+    pub(in crate::fit) starts: Vec<Vec<f64>>,
     pub(in crate::fit) max_evaluations: u32,
 }
 
@@ -26,14 +27,14 @@ impl NodeType for Polish {
     }
 
     fn run(&self, parameters: &[u8], inputs: &[Blob], context: &RunContext) -> Result<Vec<u8>, NodeFailure> {
-        let PolishParameters { start, max_evaluations } = read("parameters of polish", parameters)?;
+        let PolishParameters { starts, max_evaluations } = read("parameters of polish", parameters)?;
         let scene = Scene::read(inputs, context)?;
         let mut observe = |progress: &crate::search::Progress<'_>| {
             context.report(progress.evaluations as u64, u64::from(max_evaluations));
             if context.is_cancelled() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         };
         let (view, limit) = (scene.full(), max_evaluations as usize);
-        let polished = polish(&view, &scene.view.judge, scene.view.by, &start, limit, &mut observe)
+        let polished = polish(&view, &scene.view.judge, scene.view.by, &starts, limit, &mut observe)
             .map_err(|error| NodeFailure::new(format!("polish: {error}")))?;
         // A search that was told to stop is not a result.
         context.check()?;

@@ -97,6 +97,11 @@ pub(super) fn concatenated(
         .map(|shard| context.decoded(shard, |bytes| read::<TableWire>("transport table", bytes)?.table()))
         .collect::<Result<Vec<_>, _>>()?;
     let tables: Vec<&TransportTable> = tables.iter().map(|table| &**table).collect();
+    joined(model, &tables)
+}
+
+/// The table of consecutive shards that are decoded already.
+pub(in crate::fit) fn joined(model: &dyn Model, shards: &[&TransportTable]) -> Result<TransportTable, NodeFailure> {
     let fits = |table: &TransportTable| {
         let lobes = table.lobes.iter().zip(model.lobes());
         table.lobes.len() == model.lobes().len()
@@ -104,7 +109,7 @@ pub(super) fn concatenated(
                 .into_iter()
                 .all(|(t, basis)| t.terms == lobe_terms(basis.lobe) && t.knots.is_some() == basis.width.is_some())
     };
-    TransportTable::concatenate(&tables).filter(fits).ok_or_else(|| {
+    TransportTable::concatenate(shards).filter(fits).ok_or_else(|| {
         NodeFailure::new(format!(
             "the shards of a transport table do not belong together or to {}, or there are none",
             model.name()

@@ -1,6 +1,20 @@
 use super::*;
 use crate::math::sampling::{key, uniform};
 
+impl Environment {
+    /// Irradiance on a surface of unit normal `normal`: sum over all texels of radiance, cosine and solid angle.
+    pub(in crate::light) fn irradiance(&self, normal: Vec3) -> Rgb {
+        (0..self.height).fold(Rgb::ZERO, |total, i| {
+            let (sin_theta, cos_theta) = sin_cos(PI * (i as f64 + 0.5) / self.height as f64);
+            let row = (0..self.width).fold(Rgb::ZERO, |sum, j| {
+                let d = self.direction_at((j as f64 + 0.5) / self.width as f64, sin_theta, cos_theta);
+                sum + widen(self.texel(i, j)) * d.dot(normal).max(0.0)
+            });
+            total + row * self.texel_solid_angle(i)
+        })
+    }
+}
+
 /// A map whose texels all differ.
 fn speckled(width: usize, height: usize) -> Environment {
     let texel = |k: usize| std::array::from_fn(|c| to_f32(uniform(key(&[k as u64, c as u64]))));

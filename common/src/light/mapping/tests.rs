@@ -1,6 +1,29 @@
 use super::*;
 use crate::math::sampling::{key, uniform};
 
+impl Mapping {
+    /// Steradians per unit of image area (the whole image has area 1) at a position where [`Mapping::direction`] is
+    /// some direction.
+    pub(in crate::light) fn solid_angle_density(self, [x, y]: [f64; 2]) -> f64 {
+        match self {
+            Self::LatLong => TAU * PI * sin_cos(PI * y).0,
+            Self::Cross => {
+                let (a, b) = (2.0 * (3.0 * x).fract() - 1.0, 2.0 * (4.0 * y).fract() - 1.0);
+                let square = 1.0 + a * a + b * b;
+                // The face spans 2 x 2 at distance 1, and a twelfth of the image.
+                4.0 * 12.0 / (square * square.sqrt())
+            }
+            Self::Angular => {
+                let r = on_disk(x, y).map_or(1.0, |[_, _, r]| r);
+                // Both axes run over 2 units; sin(phi) d(phi) d(psi) = pi sin(pi r) / r dx dy.
+                4.0 * PI * if r > 0.0 { sin_cos(PI * r).0 / r } else { PI }
+            }
+            // An orthographic mirror ball keeps areas: d(omega) = 4 dx dy.
+            Self::MirrorBall => 16.0,
+        }
+    }
+}
+
 fn points(count: u64) -> impl Iterator<Item = [f64; 2]> {
     (0..count).map(|i| [uniform(key(&[i, 1])), uniform(key(&[i, 2]))])
 }

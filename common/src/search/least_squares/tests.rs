@@ -25,7 +25,8 @@ fn assert_near(minimum: &Minimum, expected: &[f64], tolerance: f64) {
 fn rosenbrock_is_solved_from_the_classical_start() {
     let minimum = solve(&mut Rosenbrock, &[-1.2, 1.0], &wide(2));
     assert_near(&minimum, &[1.0, 1.0], 1e-9);
-    assert!(minimum.termination.converged() && minimum.evaluations <= 30, "{minimum:?}");
+    let cut_short = matches!(minimum.termination, Termination::MaxEvaluations | Termination::Stopped);
+    assert!(!cut_short && minimum.evaluations <= 30, "{minimum:?}");
 }
 
 #[test]

@@ -47,6 +47,7 @@ impl ClusterArgs {
         }
         Ok(ClusterSettings {
             workers: self.workers,
+            log: None,
             listen: self.listen,
             advertise: self.advertise,
             wait_for_workers: self.wait_for_workers,

@@ -88,7 +88,7 @@ impl DemoArgs {
         if self.workers == Workers::Count(0) {
             bail!("the demo computes with local workers only; give --workers 1 or more");
         }
-        Ok(DemoSettings { out: self.out, workers: self.workers, progress: self.progress })
+        Ok(DemoSettings { out: self.out, workers: self.workers, progress: self.progress, log: None })
     }
 }
 

@@ -1,0 +1,63 @@
+//! What a fit can take: photos, maps and subsets that fit into blobs and into memory.
+
+use super::FULL_SHARD;
+use crate::{
+    fit::{Method, MethodError},
+    graph::{MAX_BLOB_BYTES, MAX_INPUTS},
+    image::Image,
+    render::subset::SampleCount,
+    scene::Capture,
+};
+use thiserror::Error;
+
+/// Why a fit cannot be planned.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum FitError {
+    /// A setting is out of range.
+    #[error(transparent)]
+    Method(#[from] MethodError),
+    /// The photo has no light to fit to.
+    #[error("every usable pixel of the photo is black: check the exposure of the photo and the place of the object")]
+    Black,
+    /// More than one message can carry.
+    #[error("{what} has {found} pixels, more than the {limit} that a fit can take: {remedy}")]
+    TooLarge {
+        /// What is too large.
+        what: &'static str,
+        /// Its pixels.
+        found: usize,
+        /// The most there may be.
+        limit: usize,
+        /// What to do.
+        remedy: &'static str,
+    },
+}
+
+/// Refuses what would not fit into a blob, or into memory, before any work is done.
+pub(super) fn check_sizes(capture: &Capture, method: &Method) -> Result<(), FitError> {
+    let size = |image: &Image| image.width() * image.height();
+    let map = capture.environment();
+    let usable = if method.samples == SampleCount::Full { capture.counts().usable } else { 0 };
+    let checks = [
+        ("the photo", size(capture.photo()), MOST_PHOTO, "crop it around the object, or scale it down"),
+        ("the environment map", map.width() * map.height(), MOST_MAP, "scale it down"),
+        ("the full set of samples", usable, MOST_FULL, "scale the photo down, or draw a number of samples"),
+    ];
+    for (what, found, limit, remedy) in checks {
+        if found > limit {
+            return Err(FitError::TooLarge { what, found, limit, remedy });
+        }
+    }
+    Ok(())
+}
+
+/// Most pixels of a photo: its pictures (32 bytes per pixel) travel in one blob, its table in [`MAX_INPUTS`] shards.
+const MOST_PHOTO: usize = 8_000_000;
+/// Most texels of a map, 12 bytes each in one blob.
+const MOST_MAP: usize = 20_000_000;
+/// Most pixels of stage one: their table takes about 1.2 kB each, more than once.
+const MOST_FULL: usize = 200_000;
+
+const _: () = assert!(MOST_PHOTO * 32 < MAX_BLOB_BYTES && MOST_PHOTO / FULL_SHARD + 2 < MAX_INPUTS);
+const _: () = assert!(MOST_MAP * 12 < MAX_BLOB_BYTES);

@@ -1,0 +1,7 @@
+//! The method and its plan on scenes that are small enough for a unit test.
+
+mod planner;
+mod polish;
+mod recovery;
+mod scene;
+mod uncertainty;

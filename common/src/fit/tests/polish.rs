@@ -1,0 +1,71 @@
+//! Stage three never makes a match worse, on one table or over several.
+
+use super::scene::{Bench, capture, method};
+use crate::{
+    fit::{
+        FitPlanner, FullView, JudgedBy, MAX_EVALUATIONS, polish,
+        wire::{PolishedWire, read, write},
+    },
+    graph::{Blob, NodeSpec},
+    metric::{Judge, JudgeOptions},
+    render::{
+        knots::Knots,
+        pyramid::LightPyramid,
+        transport::{Accuracy, Pixel, TransportPlan},
+    },
+};
+use std::{cell::Cell, ops::ControlFlow};
+
+const MATERIAL: [f64; 7] = [0.3, 0.2, 0.1, 0.05, 0.05, 0.05, 0.2];
+
+#[test]
+fn polish_starts_from_the_best_and_never_ends_worse_on_its_table() {
+    let capture = capture("ggx", &MATERIAL, 0.05);
+    let (photo, coverage) = (capture.photo(), capture.scoring_coverage());
+    let (width, height) = (photo.width(), photo.height());
+    let places = (0..width * height).filter(|&i| coverage[i] > 0.0).map(|i| [i % width, i / width]);
+    let pixels: Vec<Pixel> = places.map(|place| place.map(|x| u32::try_from(x).unwrap())).collect();
+    let model = method("ggx").model;
+    let plan = TransportPlan { model, knots: Knots::covering(0.1, 0.4, 5.0), accuracy: Accuracy::FULL };
+    let pyramid = LightPyramid::new((**capture.environment()).clone());
+    let table = plan.integrate(capture.geometry(), &pyramid, &pixels);
+    let view = FullView { model, table: &table, pixels: &pixels, coverage: &coverage, width, height };
+    let judge = Judge::new(photo, &coverage, 1.0, &JudgeOptions::default()).unwrap();
+    let score = |point: &[f64]| judge.score(&view.render(point)).unwrap().cssim;
+    let near = vec![0.28, 0.21, 0.1, 0.06, 0.05, 0.04, 0.19];
+    let far = vec![0.6, 0.1, 0.5, 0.3, 0.3, 0.3, 0.38];
+    assert!(score(&near) < score(&far));
+    for starts in [vec![near.clone()], vec![far.clone(), near.clone()], vec![near.clone(), far]] {
+        for limit in [3, 60] {
+            let mut observe = |_: &crate::search::Progress<'_>| ControlFlow::Continue(());
+            let found = polish(&view, &judge, JudgedBy::Image, &starts, limit, &mut observe).unwrap();
+            assert!(found.cssim <= score(&near) && found.evaluations <= limit, "{starts:?} {limit}: {found:?}");
+            assert_eq!(found.cssim, score(&found.parameters));
+        }
+    }
+}
+
+#[test]
+fn a_round_of_polish_that_ends_worse_than_the_winner_is_not_the_result() {
+    let planner = FitPlanner::new(capture("ggx", &MATERIAL, 0.05), method("ggx"), 1.0).unwrap();
+    let rounds = Cell::new(0);
+    // The first round ends at the edge of its table, and as a round on another table may: worse than where it started.
+    let astray = |spec: &NodeSpec, output: Blob| {
+        if spec.kind != "polish" {
+            return output;
+        }
+        rounds.set(rounds.get() + 1);
+        if rounds.get() > 1 {
+            return output;
+        }
+        let mut polished = read::<PolishedWire>("polish", &output).unwrap().polished(method("ggx").model).unwrap();
+        (polished.parameters[0], polished.parameters[1], polished.evaluations) = (0.9, 0.9, MAX_EVALUATIONS - 20);
+        polished.at_table_edge = true;
+        Blob::new(write("polish", &PolishedWire::of(polished)).unwrap())
+    };
+    let outcome = Bench::default().run(planner, |_| 0, astray).unwrap().into_outcome().unwrap();
+    assert!(rounds.get() > 1);
+    let (winner, polished) = (outcome.judged[outcome.winner].cssim, outcome.polished.unwrap());
+    // Another table moves a score by less than this; from where the first round went, 20 evaluations do not lead back.
+    assert!(polished.cssim < winner + 1e-3, "{winner} {polished:?}");
+}
