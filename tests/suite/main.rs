@@ -9,9 +9,9 @@
 mod bad_input;
 mod cli;
 mod cluster;
-mod cluster_hostile;
 mod compare;
 mod fit;
+mod hostile;
 mod network;
 #[cfg(feature = "slow")]
 mod physics;
