@@ -6,6 +6,7 @@
     reason = "tests may panic and say what they skip; clippy.toml's exceptions do not reach their helper functions"
 )]
 
+mod access;
 mod bad_input;
 mod cli;
 mod cluster;

@@ -60,12 +60,13 @@ fn start_tracing(filter: &str) -> anyhow::Result<()> {
 }
 
 fn dispatch(command: Command) -> anyhow::Result<ExitCode> {
-    use crate::commands::{compare, demo, fit, render, worker};
+    use crate::commands::{access, compare, demo, fit, render, worker};
     match command {
         Command::Demo(args) => demo::run(args.into_settings()?),
         Command::Fit(args) => fit::run(FitArgs::into_settings(*args)?),
         Command::Render(args) => render::run(args.into_settings()?),
         Command::Compare(args) => compare::run(args.into_settings()),
+        Command::Access(args) => access::run(args.into_settings()),
         Command::Worker(args) => worker::run(args),
         Command::Batch(_) => later("lookalike batch", "run `lookalike fit` once per photo"),
         Command::Status(_) => {
@@ -75,7 +76,6 @@ fn dispatch(command: Command) -> anyhow::Result<ExitCode> {
         Command::Export(_) => later("lookalike export", "the parameters are in OUT/fit.json"),
         Command::Study(_) => later("lookalike study", "run `lookalike fit` once per photo"),
         Command::Report(_) => later("lookalike report", "the numbers are in OUT/fit.json and OUT/candidates.csv"),
-        Command::Access(_) => later("lookalike access", "`lookalike fit` writes OUT/access.json when it starts"),
     }
 }
 

@@ -10,9 +10,7 @@ use lookalike_tests::cluster::{Cluster, options};
 use lookalike_tests::gate::Gate;
 use lookalike_tests::plan::Leaves;
 use lookalike_tests::process::{Process, stderr};
-use lookalike_tests::stranger::{
-    FalseCoordinator, challenge, connect_tls, greet, identity, read_to_the_end, tls_of,
-};
+use lookalike_tests::stranger::{FalseCoordinator, challenge, connect_tls, greet, identity, read_to_the_end, tls_of};
 use lookalike_worker::tls::provider;
 use rustls::server::{ClientHello, ResolvesServerCert};
 use rustls::sign::CertifiedKey;
