@@ -145,8 +145,8 @@ impl Lobe for CookTorranceLobe {
 
 /// `D G / (4 n.v)`; zero below the horizon of the light and for half vectors below the surface.
 ///
-/// Spread: with `u = tan^2(th)` and `D = exp(-u / m^2)`, `D'/D = -1 / m^2` and `D''/D = 1 / m^4`. The second-order term
-/// `tr(S) D' + 2 u s_r D''`, `s_r` the spread along the offset from the normal, is the factor below.
+/// Spread: with `u = sin^2(th)` and `c = 1 - u`, `ln D = 1/m^2 - 1/(c m^2) - 2 ln c + ..`, whose slope is `g = 2/c - 1/(c m)^2` and
+/// curvature `2/c^2 - 2/(c^3 m^2)`; `D'/D = g` and `D''/D = g^2 + g'`.
 #[inline(always)]
 fn kernel(g: &Angles, spread: &Spread, m: f64) -> f64 {
     let m2 = m * m;
@@ -154,6 +154,10 @@ fn kernel(g: &Angles, spread: &Spread, m: f64) -> f64 {
     let cos_i = g.cos_i.max(0.0);
     let distribution = exp_nonpositive(-g.sin2_h / (cos2 * m2)) / (PI * m2 * cos2 * cos2);
     let masking = (2.0 * g.cos_h.max(0.0) * g.cos_o.min(cos_i) / g.cos_d).min(1.0);
-    let blur = second_order(spread.half2 * (2.0 * spread.radial * g.sin2_h / cos2 - m2) / (m2 * m2));
+    let inverse = 1.0 / cos2;
+    let sharpness = inverse / m2;
+    let slope = (2.0 - sharpness) * inverse;
+    let curvature = slope * slope + 2.0 * (1.0 - sharpness) * inverse * inverse;
+    let blur = second_order(slope * spread.du + 0.5 * curvature * spread.du2);
     distribution * masking * blur / (4.0 * g.cos_o)
 }

@@ -128,18 +128,18 @@ impl Lobe for GgxLobe {
 /// `D V n.l`: with `d = sin^2(th) + a^2 cos^2(th)` the distribution is `a^2 / (pi d^2)`, and
 /// `V n.l = n.l / (2 (n.l s(n.v) + n.v s(n.l)))`, `s(c) = sqrt(a^2 + (1 - a^2) c^2)`.
 ///
-/// Spread: with `u = sin^2(th)`, `D = a^2 / (pi (u + a^2)^2)` near the peak; `D'/D = -2 / (u + a^2)`, `D''/D = 6 / (u + a^2)^2`. The
-/// second-order term `tr(S) D' + 2 u s_r D''`, `s_r` the spread along the offset from the normal, is the factor below.
+/// Spread: with `u = sin^2(th)` and `k = 1 - a^2`, `d = a^2 + k u`, so that `D'/D = -2 k / d` and `D''/D = 6 k^2 / d^2`.
 #[inline(always)]
 fn kernel(g: &Angles, spread: &Spread, alpha: f64) -> f64 {
     let a2 = alpha * alpha;
-    let d = g.sin2_h + a2 * g.cos_h * g.cos_h;
+    let k = 1.0 - a2;
+    let d = a2 + k * g.sin2_h;
     let cos_i = g.cos_i.max(0.0);
-    let s_o = (a2 + (1.0 - a2) * g.cos_o * g.cos_o).sqrt();
-    let s_i = (a2 + (1.0 - a2) * cos_i * cos_i).sqrt();
+    let s_o = (a2 + k * g.cos_o * g.cos_o).sqrt();
+    let s_i = (a2 + k * cos_i * cos_i).sqrt();
     // One division for both quotients: by d^2, and by d^2 times the denominator of V.
     let visibility = cos_i * s_o + g.cos_o * s_i;
     let inverse = 1.0 / (d * d * visibility);
-    let excess = 2.0 * spread.half2 * ((6.0 * spread.radial - 1.0) * g.sin2_h - a2);
+    let excess = k * (3.0 * k * spread.du2 - 2.0 * d * spread.du);
     a2 * cos_i * second_order(excess * visibility * inverse) * inverse * (0.5 * FRAC_1_PI)
 }

@@ -24,18 +24,18 @@ pub struct Incident {
     pub spread: Spread,
 }
 
-/// Mean square distance of light from its mean direction: total over both axes, as square chords of the unit sphere.
+/// What the spread of light around its mean direction does to the angles.
 ///
-/// A lobe adds the second-order term `1/2 tr(H S)` of its mean over the spread, which is isotropic in the light's directions, so
-/// that a quadrature may use fewer of them.
+/// With `u = sin^2(th)`, `th` the angle between half vector and normal, a lobe of distribution `D(u)` has the mean `D + D' du +
+/// D''/2 du2`: to second order in the spread, so that a quadrature needs fewer directions.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Spread {
-    /// Of the light direction.
+    /// Mean square distance of the light from its mean direction, as a chord of the unit sphere.
     pub light2: f64,
-    /// Of the half vector that goes with it.
-    pub half2: f64,
-    /// Share of `half2` along the half vector's offset from the normal (the rest is across it), in [0, 1]: a half if isotropic.
-    pub radial: f64,
+    /// Mean change of `sin^2(th)`.
+    pub du: f64,
+    /// Mean square change of `sin^2(th)`.
+    pub du2: f64,
 }
 
 /// The factor `1 + x` of a second-order correction, kept where a second-order expansion means anything.

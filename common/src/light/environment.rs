@@ -148,6 +148,20 @@ impl Environment {
         Rgb::new(r, g, b)
     }
 
+    /// Radiance at a point of the map, and how its sum over the channels changes there, per texel: with u, with v, and mixed.
+    #[must_use]
+    #[inline]
+    pub fn radiance_and_slopes(&self, u: f64, v: f64) -> (Rgb, [f64; 3]) {
+        let place = self.place([u, v]);
+        let [r, g, b, _] = self.bilinear(place);
+        let sum = |node: usize| self.nodes[node][..3].iter().map(|&x| f64::from(x)).sum::<f64>();
+        let Place { node, s, t } = place;
+        let [upper, lower] = [node, node + self.stride].map(|left| (sum(left), sum(left + 1)));
+        let along = (1.0 - t) * (upper.1 - upper.0) + t * (lower.1 - lower.0);
+        let down = (1.0 - s) * (lower.0 - upper.0) + s * (lower.1 - upper.1);
+        (Rgb::new(r, g, b), [along, down, (lower.1 - lower.0) - (upper.1 - upper.0)])
+    }
+
     /// Solid angle in steradians of each texel of row `i`.
     #[must_use]
     pub fn texel_solid_angle(&self, i: usize) -> f64 {

@@ -1,13 +1,16 @@
 //! The cut through the light pyramid for one surface point: as few nodes as the lobes allow.
 //!
 //! Taking a node as a point at its energy centroid leaves a second-order error, `1/2 tr(H S)`, with `H` the Hessian of
-//! `f cos` and `S` the energy's covariance over the node. A node is split while its error, bounded from above over
-//! the node and over the widths of a [`Band`], exceeds the tolerance. Nothing is random: neighbouring pixels get neighbouring
+//! `f cos` and `S` the energy's covariance over the node. A node is split while that error, bounded from above over
+//! the node and over the widths of a [`Band`], exceeds the tolerance; then most of it is taken away ([`super::blur`]). Nothing is random: neighbouring pixels get neighbouring
 //! cuts, and the error is smooth instead of noise.
 
-use super::pyramid::{Cell, LightPyramid, Node, strongest};
+use super::{
+    blur::{LEAST_COS_D, seen_from},
+    pyramid::{Cell, LightPyramid, Node, strongest},
+};
 use crate::{
-    brdf::{Angles, Incident, Spread},
+    brdf::Incident,
     math::{Rgb, Vec3, widen},
 };
 use std::f64::consts::PI;
@@ -97,12 +100,9 @@ impl Cut {
     /// The nodes of the cut as light that falls on a surface point, their energies times `share`.
     pub fn lights(&mut self, point: &Point, share: f64) -> &[Incident] {
         self.lights.clear();
-        let side = point.view.cross(point.normal);
         for node in &self.nodes {
-            let angles = Angles::new(point.normal, widen(node.centroid), point.view);
-            if angles.cos_i > 0.0 {
+            if let Some((angles, spread)) = seen_from(node, point) {
                 let energy = node.energy.map(|e| f64::from(e) * share);
-                let spread = spread(node, side, widen(node.centroid), &angles);
                 self.lights.push(Incident { angles, energy, spread });
             }
         }
@@ -115,24 +115,6 @@ impl Cut {
         self.nodes.iter().map(|node| (widen(node.centroid), widen(node.energy)))
     }
 }
-
-/// The half vector turns by half of the light's step in the plane of reflection, by `1/(2 v.h)` of it across: at grazing view far more
-/// across than along. How much of that lies along the half vector's offset from the normal follows from the share of the
-/// offset that is across the plane.
-///
-/// `side` is `v x n`. With `l.v = 2 (v.h)^2 - 1`, `|l x v|^2 = 4 (v.h)^2 (1 - (v.h)^2)`.
-fn spread(node: &Node, side: Vec3, light: Vec3, angles: &Angles) -> Spread {
-    let light2 = f64::from(node.spread2);
-    let cos_d2 = (angles.cos_d * angles.cos_d).max(LEAST_COS_D * LEAST_COS_D);
-    let offset = light.dot(side);
-    let square = 4.0 * cos_d2 * (1.0 - cos_d2) * angles.sin2_h;
-    let share = if square > 0.0 { (offset * offset / square).min(1.0) } else { 0.5 };
-    let radial = (cos_d2 * (1.0 - share) + share) / (1.0 + cos_d2);
-    Spread { light2, half2: 0.125 * light2 * (1.0 + 1.0 / cos_d2), radial }
-}
-
-/// `v.h` below this is taken as this: light that comes from straight behind the surface turns the half vector without bound.
-const LEAST_COS_D: f64 = 0.05;
 
 /// Bounds the error of taking a node as a point, for the surface points around one and a band.
 struct Bound<'a> {
@@ -162,7 +144,7 @@ impl<'a> Bound<'a> {
 
     #[inline]
     fn error(&self, node: &Node, centroid: Vec3, cos_i: f64) -> f64 {
-        let (energy, spread2) = (f64::from(strongest(node.energy)), f64::from(node.spread2));
+        let (energy, spread2) = (f64::from(strongest(node.energy)), node.spread2());
         let horizon = cos_i < f64::from(node.radius) + self.reach;
         let error = match self.band {
             // The cosine has curvature cos; at the horizon it has a kink, a first-order error over the part that is cut off.
@@ -171,7 +153,7 @@ impl<'a> Bound<'a> {
             Band::Glossy(..) => {
                 let (distribution, curvature) = self.peak_over(node, centroid);
                 let kink = if horizon { KINK * (spread2.sqrt() / self.lower).min(1.0) } else { 0.0 };
-                spread2 * (curvature + distribution) + kink * distribution
+                spread2 * (curvature + SLOW_FACTORS * distribution) + kink * distribution
             }
         };
         energy * self.shading * error
@@ -205,6 +187,10 @@ impl<'a> Bound<'a> {
 
 /// The cosine lobe needs few nodes, whose errors average less: it gets a tighter tolerance.
 const DIFFUSE_CARE: f64 = 6.0;
+
+/// Curvature, in units of the distribution, of what multiplies it: Fresnel's term, masking-shadowing, the cosine. Wide lobes are no
+/// smoother than that.
+const SLOW_FACTORS: f64 = 4.0;
 
 /// Share of a node's size by which a kink at the horizon can shift its value.
 const KINK: f64 = 0.1;

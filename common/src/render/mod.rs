@@ -6,6 +6,7 @@
 //!
 //! Direct light from the environment only: a convex object, no inter-reflection.
 
+mod blur;
 pub mod cut;
 pub mod footprint;
 pub mod image;

@@ -1,14 +1,15 @@
-//! A pyramid of the environment light: per node the energy, its centroid direction and its spread.
+//! A pyramid of the environment light: per node the energy, its centroid direction and its covariance.
 //!
 //! Level 0 holds one node per texel of the lat-long map; each coarser level joins 2 x 2 nodes. The energy of a texel is the
 //! integral of the *bilinear* radiance over the texel's area (the mean of a bilinear function over a rectangle within one
-//! patch is its value at the centre, so four quadrants suffice; only the variation of sin(theta) over a quadrant is
-//! neglected). Where a texel is too coarse for a lobe, [`Cell`]s finer than texels are made on the fly.
+//! patch is its value at the centre, so four quadrants suffice; that the radiance and sin(theta) vary together over a quadrant
+//! is neglected in the energy, not in the centroid). Where a texel is too coarse for a lobe, [`Cell`]s finer than texels are made on the fly.
 
 use crate::{
     light::Environment,
-    math::{Vec3, elementary::sin_cos, to_f32, widen},
+    math::{Vec3, elementary::sin_cos, frame::Frame, narrow, to_f32, widen},
 };
+use glam::DMat3;
 use rayon::prelude::*;
 use std::f64::consts::{PI, TAU};
 
@@ -19,10 +20,42 @@ pub struct Node {
     pub energy: [f32; 3],
     /// Energy-weighted mean direction, normalised, world space.
     pub centroid: [f32; 3],
-    /// Energy-weighted mean square distance from the centroid, as a chord of the unit sphere.
-    pub spread2: f32,
+    /// Energy-weighted covariance of the directions about the centroid, in the tangent plane there: along the first axis of
+    /// [`Frame::from_normal`], mixed, along the second; square chords of the unit sphere.
+    pub covariance: [f32; 3],
     /// No point of the node is farther from the centroid than this chord.
     pub radius: f32,
+}
+
+impl Node {
+    /// Energy-weighted mean square distance from the centroid, as a chord of the unit sphere.
+    #[must_use]
+    #[inline]
+    pub fn spread2(&self) -> f64 {
+        f64::from(self.covariance[0]) + f64::from(self.covariance[2])
+    }
+
+    /// Energy-weighted mean of `(x - c)(x - c)^T` over the directions `x` of the node, `c` its centroid.
+    #[must_use]
+    #[inline]
+    pub fn spread(&self) -> DMat3 {
+        let Frame { tangent, bitangent, .. } = Frame::from_normal(widen(self.centroid));
+        let [a, b, c] = self.covariance.map(f64::from);
+        let (along, across) = (tangent * a + bitangent * b, tangent * b + bitangent * c);
+        outer(along, tangent) + outer(across, bitangent)
+    }
+
+    /// A node from the mean of its directions (not of unit length) and the mean of `(x - c)(x - c)^T`.
+    fn new(energy: [f32; 3], centroid: Vec3, spread: DMat3, radius: f64) -> Self {
+        let Frame { tangent, bitangent, .. } = Frame::from_normal(centroid);
+        let covariance =
+            [tangent.dot(spread * tangent), tangent.dot(spread * bitangent), bitangent.dot(spread * bitangent)];
+        Self { energy, centroid: narrow(centroid), covariance: covariance.map(to_f32), radius: to_f32(radius) }
+    }
+}
+
+fn outer(a: Vec3, b: Vec3) -> DMat3 {
+    DMat3::from_cols(a * b.x, a * b.y, a * b.z)
 }
 
 /// A rectangle of the map: level (negative is finer than texels), row and column at that level.
@@ -120,21 +153,35 @@ impl LightPyramid {
 
 /// The light of the rectangle whose top left corner is (v, u) and whose sides are 1/size of the map; it must lie within one
 /// bilinear patch.
+///
+/// Over a square of side 1 around 0 the density `1 + a s + b t + c s t` has the mean (a, b)/12, the mean squares 1/12 and the mean
+/// product c/144. Here `a`, `b`, `c` are the changes of the bilinear radiance over the rectangle, relative to its centre, and `b`
+/// holds that of sin(theta) too.
 fn quadrant(environment: &Environment, v: f64, u: f64, size: [f64; 2]) -> Node {
     let (v_mid, u_mid) = (v + 0.5 / size[0], u + 0.5 / size[1]);
-    let (sin, _) = sin_cos(PI * v_mid);
+    let (sin, cos) = sin_cos(PI * v_mid);
     let (dtheta, dphi) = (PI / size[0], TAU / size[1]);
     // Exact: integral of sin(theta) over the row is 2 sin(mid) sin(dtheta / 2).
     let solid_angle = dphi * 2.0 * sin * sin_cos(0.5 * dtheta).0;
-    let energy = environment.radiance_at(u_mid, v_mid) * solid_angle;
+    let (radiance, slopes) = environment.radiance_and_slopes(u_mid, v_mid);
+    let sum = radiance.element_sum();
+    // The side of the rectangle in texels, over the radiance: changes relative to it.
+    let side = environment.height() as f64 / size[0];
+    let [a, b, c] = if sum > 0.0 { slopes.map(|slope| slope * side / sum) } else { [0.0; 3] };
+    let (s, t) = (a / 12.0, (b + dtheta * cos / sin) / 12.0);
+    let centroid = environment.direction(u_mid + s / size[1], v_mid + t / size[0]);
+
     let width = sin * dphi;
-    Node {
-        energy: crate::math::narrow(energy),
-        centroid: crate::math::narrow(environment.direction(u_mid, v_mid)),
-        spread2: to_f32((dtheta * dtheta + width * width) / 12.0),
-        // Rows widen towards the equator: take the wider edge.
-        radius: to_f32(0.5 * (dtheta * dtheta + (width + dtheta * dphi) * (width + dtheta * dphi)).sqrt()),
-    }
+    let east = centroid.cross(Vec3::Y).normalize_or(Vec3::X);
+    let south = centroid.cross(east);
+    let mixed = width * dtheta * (c * side / 144.0 - s * t);
+    let spread = outer(east, east) * (width * width * (1.0 / 12.0 - s * s))
+        + outer(south, south) * (dtheta * dtheta * (1.0 / 12.0 - t * t))
+        + (outer(east, south) + outer(south, east)) * mixed;
+    // Rows widen towards the equator: take the wider edge; the centroid lies within a sixth of the sides of the middle.
+    let wider = width + dtheta * dphi;
+    let radius = (0.5 + 1.0 / 6.0) * (dtheta * dtheta + wider * wider).sqrt();
+    Node::new(narrow(radiance * solid_angle), centroid, spread, radius)
 }
 
 fn texel_level(environment: &Environment) -> Level {
@@ -170,7 +217,7 @@ fn coarsen(fine: &Level) -> Level {
     Level { rows, columns, nodes: nodes.collect() }
 }
 
-/// Joins nodes: energies add, the centroid is their energy-weighted mean, the spread adds by the parallel axis theorem.
+/// Joins nodes: energies add, the centroid is their energy-weighted mean, covariances add by the parallel axis theorem.
 fn join(parts: &[Node]) -> Node {
     let weight = |n: &Node| f64::from(n.energy.iter().sum::<f32>());
     let total: f64 = parts.iter().map(weight).sum();
@@ -178,11 +225,12 @@ fn join(parts: &[Node]) -> Node {
     let share = |n: &Node| if total > 0.0 { weight(n) / total } else { 1.0 / parts.len() as f64 };
     let mean: Vec3 = parts.iter().map(|n| widen(n.centroid) * share(n)).sum();
     let centroid = mean.normalize_or(widen(parts[0].centroid));
-    let distance2 = |n: &Node| (widen(n.centroid) - centroid).length_squared();
-    let spread2: f64 = parts.iter().map(|n| share(n) * (f64::from(n.spread2) + distance2(n))).sum();
-    let radius = parts.iter().map(|n| distance2(n).sqrt() + f64::from(n.radius)).fold(0.0, f64::max);
+    let offset = |n: &Node| widen(n.centroid) - centroid;
+    let shares = parts.iter().map(|n| (n.spread() + outer(offset(n), offset(n))) * share(n));
+    let spread = shares.fold(DMat3::ZERO, |sum, part| sum + part);
+    let radius = parts.iter().map(|n| offset(n).length() + f64::from(n.radius)).fold(0.0, f64::max);
     let energy = std::array::from_fn(|c| parts.iter().map(|n| n.energy[c]).sum());
-    Node { energy, centroid: crate::math::narrow(centroid), spread2: to_f32(spread2), radius: to_f32(radius) }
+    Node::new(energy, centroid, spread, radius)
 }
 
 /// The strongest channel.

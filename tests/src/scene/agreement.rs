@@ -15,8 +15,8 @@ use lookalike::{
     scene::{Circle, Geometry},
 };
 
-/// Deviations of one term of one lobe at one width. All are shares of the term's own mean radiance over the whole object, which is
-/// strict where the term is the small `F5` part.
+/// Deviations of one term of one lobe at one width. All are shares of the mean radiance over the whole object: of the term's own, but
+/// for the `F5` part, which no surface shows alone, of a dielectric's with F0 = 0.04 and no diffuse part.
 #[derive(Debug, Clone, Copy)]
 pub struct Agreement {
     /// Lobe of the model.
@@ -85,7 +85,9 @@ impl References {
             let widths = if basis.width.is_some() { widths } else { &[0.0] };
             for (w, &width) in widths.iter().enumerate() {
                 let split = SplitLobe { lobe: basis.lobe, width };
-                let level = Rgb::from_array(std::array::from_fn(|c| mean(&part(model, &coarse, lobe, width, c))));
+                let [rest, fresnel, whole] = [0, 1, 2].map(|c| mean(&part(model, &coarse, lobe, width, c)));
+                let darkest = if lobe_terms(basis.lobe) == 1 { fresnel } else { DIELECTRIC_F0 * rest + fresnel };
+                let level = Rgb::new(rest, darkest, whole);
                 let seed = 1_000 + 100 * lobe as u64 + w as u64;
                 let effort = Effort { level, ..effort };
                 entries.push(Entry {
@@ -159,6 +161,9 @@ fn coarse_table(scene: &Scene, model: &'static dyn Model) -> TransportTable {
     let small = Geometry::sphere(COARSE, COARSE, circle, scene.geometry.camera()).expect("a coarse sphere is valid");
     plan.integrate(&small, &scene.pyramid, &covered(&small, |coverage| coverage >= 0.5))
 }
+
+/// Reflectance at normal incidence of the darkest common surface.
+const DIELECTRIC_F0: f64 = 0.04;
 
 /// Pixels per side of the coarse object: mean radiances to a percent.
 const COARSE: usize = 32;

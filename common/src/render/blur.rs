@@ -1,0 +1,73 @@
+//! What a surface point sees of a pyramid node: not a point, but light spread around its centroid.
+//!
+//! Let `x` be the light's offset from the centroid `c` in the tangent plane there, of mean 0 and covariance `S`, and `L = 2 v.h`. To
+//! second order the half vector `h = (l + v)/|l + v|`, `l = c + x - c |x|^2/2`, moves along a unit vector `r` across it by
+//!
+//! `r.x/L - (r.c)|x|^2/(2L) - (r.x)(h.x)/L^2`,
+//!
+//! and `u = 1 - (n.h)^2` changes, with `r sin(th) = n - (n.h) h =: q` and `p` the half vector's step, by
+//!
+//! `-2 (n.h) q.p - (q.p)^2 + (n.h)^2 |p|^2`.
+//!
+//! Their means follow from three quadratic forms of `S`.
+
+use super::{cut::Point, pyramid::Node};
+use crate::{
+    brdf::{Angles, Spread},
+    math::{Vec3, frame::Frame, widen},
+};
+
+/// `v.h` below this is taken as this: light that comes from straight behind the surface turns the half vector without bound.
+pub(super) const LEAST_COS_D: f64 = 0.05;
+
+/// The angles of a node's light at a surface point, and what its spread does to them; `None` when all of it is below the horizon.
+#[inline]
+pub(super) fn seen_from(node: &Node, point: &Point) -> Option<(Angles, Spread)> {
+    let centroid = widen(node.centroid);
+    let cos_i = point.normal.dot(centroid);
+    let radius = f64::from(node.radius);
+    if cos_i <= -radius {
+        return None;
+    }
+    let tangents = Frame::from_normal(centroid);
+    let [a, b, c] = node.covariance.map(f64::from);
+    let flat = |w: Vec3| (w.dot(tangents.tangent), w.dot(tangents.bitangent));
+    let form = |(x, y): (f64, f64), (z, w): (f64, f64)| a * x * z + b * (x * w + y * z) + c * y * w;
+
+    let mut angles = Angles::new(point.normal, centroid, point.view);
+    let (normal, view) = (flat(point.normal), flat(point.view));
+    if cos_i < radius {
+        angles.cos_i = above_horizon(cos_i, form(normal, normal));
+        if angles.cos_i <= 0.0 {
+            return None;
+        }
+    }
+    let light2 = a + c;
+    let scale = 0.5 / angles.cos_d.max(LEAST_COS_D);
+    // `q` and `h` in the tangent plane; the centroid has no part there.
+    let half = (view.0 * scale, view.1 * scale);
+    let offset = (normal.0 - angles.cos_h * half.0, normal.1 - angles.cos_h * half.1);
+    let scale2 = scale * scale;
+    let along2 = form(offset, offset) * scale2;
+    let step2 = (light2 - form(half, half)) * scale2;
+    let bend = 0.5 * (cos_i - angles.cos_h * angles.cos_d) * light2 * scale + form(offset, half) * scale2;
+    let cos2 = 1.0 - angles.sin2_h;
+    let du = 2.0 * angles.cos_h * bend + cos2 * step2 - along2;
+    Some((angles, Spread { light2, du, du2: 4.0 * cos2 * along2 }))
+}
+
+/// Mean of `max(0, n.l)` of light of mean cosine `cos_i` and variance `variance`, taken as spread evenly: every lobe vanishes linearly
+/// at the horizon, and a node that it cuts would else count fully or not at all.
+fn above_horizon(cos_i: f64, variance: f64) -> f64 {
+    let reach = (3.0 * variance).sqrt();
+    if cos_i >= reach {
+        cos_i
+    } else if cos_i <= -reach {
+        0.0
+    } else {
+        (cos_i + reach) * (cos_i + reach) / (4.0 * reach)
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,92 @@
+use super::*;
+use crate::{
+    brdf::{Incident, MODELS, lobe_terms},
+    math::to_f32,
+};
+use glam::DMat3;
+
+/// Directions on a skew grid of `size` (chord) around a direction, all of the same energy.
+fn grid(centre: Vec3, size: f64) -> Vec<Vec3> {
+    const N: i32 = 24;
+    let frame = Frame::from_normal(centre);
+    let place = |k: i32| (f64::from(k) + 0.5) / f64::from(N) - 0.5;
+    (0..N * N)
+        .map(|k| {
+            let (x, y) = (place(k % N), place(k / N));
+            let step = frame.tangent * (x + 0.4 * y) + frame.bitangent * (0.6 * y);
+            (centre + step * size).normalize()
+        })
+        .collect()
+}
+
+/// The node of directions of equal energy, of total energy 1.
+fn node(directions: &[Vec3]) -> Node {
+    let count = directions.len() as f64;
+    let mean = directions.iter().sum::<Vec3>() / count;
+    let centroid = mean.normalize();
+    let outer = |d: Vec3| DMat3::from_cols(d * d.x, d * d.y, d * d.z);
+    let spread = directions.iter().fold(DMat3::ZERO, |sum, d| sum + outer(*d - centroid) * (1.0 / count));
+    let radius = directions.iter().map(|d| d.distance(centroid)).fold(0.0, f64::max);
+    let frame = Frame::from_normal(centroid);
+    let covariance =
+        [(frame.tangent, frame.tangent), (frame.tangent, frame.bitangent), (frame.bitangent, frame.bitangent)]
+            .map(|(a, b)| to_f32(a.dot(spread * b)));
+    Node { energy: [1.0; 3], centroid: crate::math::narrow(centroid), covariance, radius: to_f32(radius) }
+}
+
+fn points() -> Vec<Point> {
+    let view = Vec3::Z;
+    [0.95, 0.7, 0.4].map(|cos: f64| Point::new(Vec3::new((1.0 - cos * cos).sqrt(), 0.0, cos), view).unwrap()).to_vec()
+}
+
+/// The largest error over lobes, of light around directions near and off the mirror direction, as a share of the lobe's value there.
+fn error(size: f64, width: f64, second_order: bool) -> f64 {
+    let mut worst: f64 = 0.0;
+    for (point, away) in points().iter().flat_map(|p| [0.0, 0.7, 1.4].map(|away| (*p, away))) {
+        let mirror = point.normal * (2.0 * point.cos_o) - point.view;
+        let centre =
+            (mirror + Frame::from_normal(mirror).to_world(Vec3::new(away, 0.6 * away, 0.0) * width)).normalize();
+        let directions = grid(centre, size * width);
+        let node = node(&directions);
+        let (angles, spread) = seen_from(&node, &point).unwrap();
+        let spread = if second_order { spread } else { Spread::default() };
+        for basis in MODELS.iter().flat_map(|model| model.lobes()).filter(|basis| basis.width.is_some()) {
+            let terms = lobe_terms(basis.lobe);
+            let mut sums = vec![0.0; 3 * terms];
+            basis.lobe.accumulate(&[Incident { angles, energy: [1.0; 3], spread }], point.cos_o, &[width], &mut sums);
+            let found: f64 = sums.iter().step_by(3).sum();
+            let exact = |d: &Vec3| basis.lobe.eval(&Angles::new(point.normal, *d, point.view), width);
+            let mean = directions.iter().map(exact).sum::<f64>() / directions.len() as f64;
+            worst = worst.max((found / mean - 1.0).abs());
+        }
+    }
+    worst
+}
+
+/// What is left is of fourth order where the distribution alone varies over the node.
+#[test]
+fn second_order_terms_take_most_of_the_error_of_a_sharp_lobe() {
+    const WIDTH: f64 = 0.01;
+    let (plain, corrected) = (error(0.3, WIDTH, false), error(0.3, WIDTH, true));
+    assert!(corrected < 0.05 * plain, "{corrected:.2e} of {plain:.2e}");
+    let finer = error(0.15, WIDTH, true);
+    assert!(finer < 0.15 * corrected, "{finer:.2e} of {corrected:.2e}");
+}
+
+/// The slow factors of the lobe (Fresnel, masking-shadowing, cosine) are taken at the centroid.
+#[test]
+fn second_order_terms_help_a_wide_lobe_too() {
+    let (plain, corrected) = (error(0.3, 0.3, false), error(0.3, 0.3, true));
+    assert!(corrected < 0.5 * plain, "{corrected:.2e} of {plain:.2e}");
+}
+
+#[test]
+fn light_that_the_horizon_cuts_counts_as_far_as_it_is_above() {
+    for cos_i in [-0.05, -0.02, 0.0, 0.03, 0.049, 0.2] {
+        let n = 1000;
+        let spread = |k: i32| cos_i + 0.1 * ((f64::from(k) + 0.5) / f64::from(n) - 0.5);
+        let mean = (0..n).map(|k| spread(k).max(0.0)).sum::<f64>() / f64::from(n);
+        let found = above_horizon(cos_i, 0.01 / 12.0);
+        assert!((found - mean).abs() < 1e-6, "{cos_i}: {found} {mean}");
+    }
+}
