@@ -11,4 +11,4 @@ printf 'Pf\r\n1 2\r\n2\r\n\077\200\000\000\077\200\000\000' > corpus/pfm/grey
 cp seeds/png_jpeg/* corpus/png_jpeg/
 # The first byte chooses the decoder: a frame of a goodbye, an access file.
 printf '\001\003\002\000\000\000\000\006' > corpus/codec/frame
-printf '\006{ "address": "127.0.0.1:45123", "certificate": null, "secret": "%064d" }' 0 > corpus/codec/access
+printf '\006{ "address": "127.0.0.1:45123", "certificate": "blake3:%064d", "secret": "%064d" }' 0 0 > corpus/codec/access

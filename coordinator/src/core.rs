@@ -4,7 +4,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
-use lookalike::graph::{Graph, NodeId, WorkerId};
+use lookalike::graph::{BlobHash, Graph, NodeId, WorkerId};
 
 use crate::comm::{Lease, NodeName, Site};
 
@@ -99,6 +99,8 @@ pub(crate) struct Member {
     pub(crate) threads: usize,
     pub(crate) leases: BTreeMap<NodeId, Lease>,
     pub(crate) executing: BTreeSet<NodeId>,
+    /// The inputs of every node it was ever given: what it may read. (One that was taken back may still be asked about.)
+    pub(crate) readable: BTreeSet<BlobHash>,
     pub(crate) deadline: Duration,
 }
 

@@ -11,6 +11,7 @@ pub mod core;
 pub mod demo;
 mod fitting;
 pub mod inputs;
+pub mod limits;
 mod outputs;
 mod progress;
 pub mod reactor;
@@ -18,6 +19,7 @@ mod rpc;
 pub mod runner;
 pub mod settings;
 pub mod spawn;
+pub mod tls;
 
 pub use cli::Exit;
 

@@ -200,7 +200,8 @@ fn make_ready(core: &mut Core, node: NodeId, now: Duration, outbox: &mut Outbox)
 fn join(core: &mut Core, worker: WorkerId, threads: usize, process: u32, now: Duration, outbox: &mut Outbox) {
     let deadline = now + core.policy.lost_after;
     let threads = threads.max(1);
-    let member = Member { threads, leases: Default::default(), executing: Default::default(), deadline };
+    let (leases, executing, readable) = Default::default();
+    let member = Member { threads, leases, executing, readable, deadline };
     core.workers.insert(worker, member);
     core.summary.workers_joined += 1;
     outbox.tell(RunEvent::WorkerJoined { worker, threads, process });
@@ -344,11 +345,9 @@ fn take_back(core: &mut Core, worker: WorkerId, node: NodeId, outbox: &mut Outbo
 
 fn send_blob(core: &mut Core, worker: WorkerId, hash: BlobHash, now: Duration, outbox: &mut Outbox) {
     renew(core, worker, now);
-    if !core.workers.contains_key(&worker) {
-        return;
-    }
-    let Some(blob) = core.graph.blob(hash).cloned() else {
-        let what = format!("it asked for blob {hash}, which no node reads");
+    let Some(member) = core.workers.get(&worker) else { return };
+    let Some(blob) = core.graph.blob(hash).filter(|_| member.readable.contains(&hash)).cloned() else {
+        let what = format!("it asked for blob {hash}, which none of its nodes reads");
         drop_worker(core, worker, &Departure::Violation(what), outbox);
         return;
     };
@@ -394,9 +393,11 @@ fn assign(core: &mut Core, worker: WorkerId, node: NodeId, outbox: &mut Outbox) 
     record.holder = Some(Site::Worker(worker));
     let attempt = record.attempts;
     core.summary.attempts += 1;
+    let inputs = core.graph.input_blobs(node).unwrap_or_default();
     if let Some(member) = core.workers.get_mut(&worker) {
         let lease = Lease { node, attempt, epoch, deadline: member.deadline };
         member.leases.insert(node, lease);
+        member.readable.extend(inputs.iter().map(Blob::hash));
         outbox.push(Action::Assign { worker, lease });
     }
 }

@@ -2,13 +2,14 @@
 //!
 //! ```text
 //!   lookalike-test-cluster worker --access FILE ...
-//!   lookalike-test-cluster gates COUNT ADDRESS WORKERS ACCESS_FILE
+//!   lookalike-test-cluster gates COUNT ADDRESS WORKERS ACCESS_FILE [STRANGERS]
 //! ```
 
 use std::io::Write;
 use std::process::ExitCode;
 use std::sync::Arc;
 
+use lookalike_coordinator::limits::Limits;
 use lookalike_coordinator::runner::{RunError, RunnerOptions, run};
 
 use crate::nodes::registry;
@@ -22,7 +23,8 @@ pub fn main() -> ExitCode {
         return lookalike_worker::main_from(arguments.into_iter().skip(1), registry());
     }
     let arguments: Vec<_> = arguments.iter().map(|argument| argument.to_string_lossy().into_owned()).collect();
-    let ["gates", count, address, workers, access_file] =
+    let mut limits = Limits::default();
+    let ["gates", count, address, workers, access_file, ref strangers @ ..] =
         arguments[1..].iter().map(String::as_str).collect::<Vec<_>>()[..]
     else {
         return ExitCode::from(2);
@@ -30,7 +32,11 @@ pub fn main() -> ExitCode {
     let (Ok(count), Ok(workers)) = (count.parse(), workers.parse()) else {
         return ExitCode::from(2);
     };
-    match coordinate(Leaves::Gates { count, address: address.to_owned() }, workers, access_file) {
+    if let Some(Ok(strangers)) = strangers.first().map(|strangers| strangers.parse()) {
+        limits.strangers = strangers;
+    }
+    let options = RunnerOptions { limits, ..RunnerOptions::new(workers, access_file.into()) };
+    match coordinate(Leaves::Gates { count, address: address.to_owned() }, options) {
         Ok(result) => {
             // Nobody reads it when the test is over.
             let _ = writeln!(std::io::stdout(), "{result:?}");
@@ -43,9 +49,8 @@ pub fn main() -> ExitCode {
     }
 }
 
-fn coordinate(leaves: Leaves, workers: usize, access_file: &str) -> Result<Option<Vec<u8>>, RunError> {
+fn coordinate(leaves: Leaves, options: RunnerOptions) -> Result<Option<Vec<u8>>, RunError> {
     let runtime = tokio::runtime::Runtime::new().map_err(RunError::Signals)?;
-    let options = RunnerOptions::new(workers, access_file.into());
     let (planner, _) = runtime.block_on(run(options, TestPlanner::new(leaves), Arc::new(registry()), |_| {}))?;
     Ok(planner.result)
 }

@@ -98,6 +98,14 @@ fn bad_usage_is_code_two_and_says_what_is_possible() {
         (format!("{fit} --camera perspective:200"), &["--camera", "0 and 180 degrees"]),
         (format!("{fit} --grace soon"), &["--grace", "expected number"]),
         (format!("{fit} --listen localhost"), &["--listen", "invalid socket address"]),
+        (
+            format!("{fit} --access a.json --advertise node7"),
+            &["'--access <FILE>' cannot be used with '--advertise <A>'"],
+        ),
+        ("access new -o a.json".into(), &["--address <HOST:PORT>"]),
+        ("access new --address node7 -o a.json".into(), &["'node7'", "expected HOST:PORT with a port"]),
+        ("access new --address node7:0 -o a.json".into(), &["expected HOST:PORT with a port from 1"]),
+        ("access new --address fe80::1 -o a.json".into(), &["an IPv6 address needs brackets"]),
         (format!("{fit} --max-cssim -1"), &["--max-cssim"]),
         (format!("{fit} --env-rotation east"), &["--env-rotation", "a finite number"]),
         (format!("{fit} --log lookalike=loud"), &["--log"]),
@@ -123,8 +131,6 @@ fn what_is_not_there_yet_says_so_and_what_to_do() {
         ("export run --format materialx -o m.mtlx".into(), &["lookalike export is not there yet"]),
         ("study study.toml --out study".into(), &["lookalike study is not there yet"]),
         ("report run".into(), &["lookalike report is not there yet"]),
-        ("access new --address node7:4100 -o a.json".into(), &["lookalike access is not there yet"]),
-        (format!("{fit} --access a.json"), &["--access is not there yet", "OUT/access.json"]),
         (format!("{fit} --resume"), &["--resume is not there yet", "another --out"]),
         (format!("{fit} --exposure-gain rgb"), &["degenerate", "--anchor"]),
         (format!("{fit} --exposure-gain rgb --anchor f0=.04"), &["--anchor is not there yet"]),
@@ -132,6 +138,28 @@ fn what_is_not_there_yet_says_so_and_what_to_do() {
     ] {
         refused(&lookalike(&arguments), phrases);
     }
+}
+
+#[test]
+fn an_access_file_is_made_once_with_its_key_beside_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let new = ["access", "new", "--address", "node7:4100", "-o", "cluster.json"];
+    let answer = lookalike_in(folder.path(), &new);
+    assert_eq!((answer.code, answer.stdout.as_str()), (Some(0), ""), "{}", answer.stderr);
+    assert_eq!(answer.stderr.lines().count(), 1);
+    let [json, pem] = ["cluster.json", "cluster.key.pem"].map(|name| folder.path().join(name));
+    let text = fs::read_to_string(&json).unwrap();
+    assert_eq!(lookalike::protocol::Access::parse(&text).unwrap().address, "node7:4100");
+    assert!(fs::read_to_string(&pem).unwrap().contains("BEGIN CERTIFICATE"));
+    #[cfg(unix)]
+    for file in [&json, &pem] {
+        use std::os::unix::fs::PermissionsExt;
+        assert_eq!(fs::metadata(file).unwrap().permissions().mode() & 0o777, 0o600);
+    }
+    refused(&lookalike_in(folder.path(), &new), &["cluster.json is already there", "choose another name"]);
+    assert_eq!(fs::read_to_string(&json).unwrap(), text);
+    let nowhere = ["access", "new", "--address", "node7:4100", "-o", "no/such/folder.json"];
+    refused(&lookalike_in(folder.path(), &nowhere), &["cannot write no/such/folder"]);
 }
 
 #[test]

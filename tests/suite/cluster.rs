@@ -1,9 +1,9 @@
 //! Real worker processes: whatever happens to them, the result is the one of a run in a single process.
 
 use std::process::Command;
-use std::time::Duration;
+use std::time::{Duration, SystemTime};
 
-use lookalike_coordinator::access::new_access;
+use lookalike_coordinator::access::Credentials;
 use lookalike_coordinator::comm::{Departure, RunEvent};
 use lookalike_coordinator::core::Policy;
 use lookalike_coordinator::runner::{RunError, RunnerOptions};
@@ -264,7 +264,7 @@ fn worker_without_a_coordinator_gives_up_by_name() {
     let access = folder.path().join("access.json");
     // A port where nobody listens any more.
     let address = Gate::new().address().to_string();
-    std::fs::write(&access, new_access(address).unwrap().to_json()).unwrap();
+    Credentials::new(address, SystemTime::now()).unwrap().write(&access).unwrap();
     let output =
         Process::start(Command::new(WORKER).args(["--reconnect-for", "300ms", "--access"]).arg(&access)).output();
     assert_eq!(output.status.code(), Some(3), "{}", stderr(&output));

@@ -6,12 +6,13 @@
     reason = "tests may panic and say what they skip; clippy.toml's exceptions do not reach their helper functions"
 )]
 
+mod access;
 mod bad_input;
 mod cli;
 mod cluster;
-mod cluster_hostile;
 mod compare;
 mod fit;
+mod hostile;
 mod network;
 #[cfg(feature = "slow")]
 mod physics;

@@ -5,7 +5,7 @@ use std::io;
 use std::path::PathBuf;
 use std::time::Duration;
 
-use lookalike::protocol::{AccessError, HandshakeError};
+use lookalike::protocol::AccessError;
 use thiserror::Error;
 
 use crate::wire::WireError;
@@ -35,8 +35,8 @@ pub enum WorkerError {
     Refused {
         /// Where the coordinator should be.
         address: String,
-        /// Why.
-        source: HandshakeError,
+        /// Why: [`WireError::is_final`].
+        source: WireError,
     },
     /// The coordinator cannot be reached any more.
     #[error("gave up on the coordinator at {address} after {} s without it", after.as_secs())]

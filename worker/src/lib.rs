@@ -1,4 +1,4 @@
-//! The worker: connects to a coordinator over TCP, runs nodes of the job graph on its rayon pool, returns results.
+//! The worker: connects to a coordinator over TCP and TLS, runs nodes of the job graph on its rayon pool, returns results.
 //!
 //! Threads: the main thread talks to the coordinator and never computes; the pool computes and never talks; one thread
 //! sends heartbeats; with `--leash` one more watches stdin, whose end ends the process. A worker keeps computing while its
@@ -13,6 +13,7 @@ mod execute;
 mod options;
 mod session;
 mod tasks;
+pub mod tls;
 pub mod wire;
 
 #[cfg(test)]

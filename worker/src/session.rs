@@ -4,14 +4,14 @@ use std::sync::{Arc, mpsc as blocking};
 use std::time::Duration;
 
 use lookalike::graph::{Blob, BlobHash, Registry};
-use lookalike::protocol::{Access, Hello, IncomingBlob, Secret, ToCoordinator, ToWorker, TransferError, Welcome};
-use tokio::io::AsyncWriteExt;
+use lookalike::protocol::{Access, Hello, IncomingBlob, ProofKey, ToCoordinator, ToWorker, TransferError, Welcome};
+use tokio::io::{AsyncWriteExt, ReadHalf, WriteHalf, split};
 use tokio::net::TcpStream;
-use tokio::net::tcp::{OwnedReadHalf, OwnedWriteHalf};
 use tokio::sync::Notify;
 use tokio::sync::mpsc::{UnboundedReceiver, UnboundedSender, unbounded_channel};
 use tokio::task::JoinHandle;
 use tokio::time::{Instant, sleep, timeout};
+use tokio_rustls::client::TlsStream;
 use tokio_util::sync::CancellationToken;
 use tracing::{debug, info, warn};
 
@@ -21,13 +21,14 @@ use crate::error::WorkerError;
 use crate::execute::{Completed, Executor};
 use crate::options::WorkerOptions;
 use crate::tasks::{Action, Tasks};
+use crate::tls::{self, TlsError, Transport};
 use crate::wire::{Incoming, Received, WireError, greet_coordinator, send_message, send_parts};
 
 /// How long connecting and greeting may take.
 const GREETING_TIME: Duration = Duration::from_secs(10);
 /// How long the last words may take when the worker ends.
 const FAREWELL_TIME: Duration = Duration::from_secs(1);
-/// The first pause before a new attempt to connect; each further one is twice as long.
+/// The first pause before a new attempt to connect; each further one is twice as long, up to chance.
 const FIRST_PAUSE: Duration = Duration::from_millis(100);
 /// The longest pause between two attempts.
 const LONGEST_PAUSE: Duration = Duration::from_secs(5);
@@ -41,8 +42,7 @@ pub(crate) async fn run(options: &WorkerOptions, registry: Registry) -> Result<(
     let threads = options.threads;
     let executor = Executor::new(threads, registry, options.decoded_blob_bytes, completed_sender)?;
     let tasks = Tasks::new(threads.get(), BlobCache::new(options.cached_blob_bytes));
-    let mut session =
-        Session { address, secret: access.secret, threads: threads.get(), asked_to_end, executor, completed, tasks };
+    let mut session = Session { address, access, threads: threads.get(), asked_to_end, executor, completed, tasks };
     session.keep_connected(options.reconnect_for).await
 }
 
@@ -63,7 +63,7 @@ enum Ended {
 
 struct Session {
     address: String,
-    secret: Secret,
+    access: Access,
     threads: usize,
     asked_to_end: CancellationToken,
     executor: Executor,
@@ -79,7 +79,7 @@ impl Session {
             let mut was_welcome = false;
             let error = match self.connect_and_serve(&mut was_welcome).await {
                 Ok(Ended::RunOver | Ended::AskedToEnd) => return Ok(()),
-                Err(WireError::Handshake(source)) => {
+                Err(source) if source.is_final() => {
                     return Err(WorkerError::Refused { address: self.address.clone(), source });
                 }
                 Err(error) => error,
@@ -94,7 +94,7 @@ impl Session {
             }
             info!(address = %self.address, %error, ?pause, "without coordinator, trying again");
             tokio::select! {
-                () = sleep(pause.min(patience - after)) => {}
+                () = sleep(scattered(pause).min(patience - after)) => {}
                 () = self.asked_to_end.cancelled() => return Ok(()),
             }
             pause = (pause * 2).min(LONGEST_PAUSE);
@@ -130,13 +130,18 @@ impl Session {
         ended
     }
 
-    async fn greet(&self) -> Result<(Incoming<OwnedReadHalf>, OwnedWriteHalf, Welcome), WireError> {
-        let mut stream = TcpStream::connect(&self.address).await?;
+    async fn greet(&self) -> Result<(Incoming<Reader>, Writer, Welcome), WireError> {
+        let stream = TcpStream::connect(&self.address).await?;
         stream.set_nodelay(true)?;
+        let mut stream = match tls::connect(stream, self.access.certificate).await {
+            Ok(stream) => stream,
+            Err(error) => return Err(TlsError::of_handshake(error)?.into()),
+        };
+        let channel = tls::channel_binding(stream.get_ref().1).map_err(std::io::Error::other)?;
         let mut nonce = [0; 32];
         getrandom::fill(&mut nonce).map_err(std::io::Error::other)?;
-        greet_coordinator(&mut stream, &self.secret, nonce).await?;
-        let (reader, mut writer) = stream.into_split();
+        greet_coordinator(&mut stream, &ProofKey::new(&self.access.secret, &channel), nonce).await?;
+        let (reader, mut writer) = split(stream);
         let threads = u32::try_from(self.threads).unwrap_or(u32::MAX);
         let hello = Hello { build: env!("CARGO_PKG_VERSION").into(), threads, process: std::process::id() };
         send_message(&mut writer, &ToCoordinator::Hello(hello)).await?;
@@ -224,8 +229,11 @@ impl Session {
     }
 }
 
+type Reader = ReadHalf<TlsStream<Transport>>;
+type Writer = WriteHalf<TlsStream<Transport>>;
+
 struct Connection {
-    incoming: Incoming<OwnedReadHalf>,
+    incoming: Incoming<Reader>,
     outgoing: UnboundedSender<Outgoing>,
     announced: UnboundedReceiver<u64>,
     transfer: Option<IncomingBlob>,
@@ -252,7 +260,7 @@ enum Outgoing {
 type Writing = JoinHandle<Result<(), WireError>>;
 
 /// Write in a task of its own: a large output must not keep the worker from reading, nor the other way round.
-fn start_writing(mut writer: OwnedWriteHalf) -> (UnboundedSender<Outgoing>, UnboundedReceiver<u64>, Writing) {
+fn start_writing(mut writer: Writer) -> (UnboundedSender<Outgoing>, UnboundedReceiver<u64>, Writing) {
     let (outgoing, mut queue) = unbounded_channel();
     let (written, announced) = unbounded_channel();
     let writing = tokio::spawn(async move {
@@ -273,6 +281,14 @@ fn start_writing(mut writer: OwnedWriteHalf) -> (UnboundedSender<Outgoing>, Unbo
         Ok(())
     });
     (outgoing, announced, writing)
+}
+
+/// A pause of half to all of this length: many workers that lost one coordinator shall not all come back at the same time.
+fn scattered(pause: Duration) -> Duration {
+    let mut chance = [0];
+    // Without chance the pause is as long as it may be.
+    let share = getrandom::fill(&mut chance).map_or(1.0, |()| 0.5 + f64::from(chance[0]) / 512.0);
+    pause.mul_f64(share)
 }
 
 /// Beat in a thread of its own until the returned sender is dropped. Beats that nobody has taken yet are one.

@@ -4,13 +4,16 @@ use std::io;
 
 use lookalike::graph::Blob;
 use lookalike::protocol::{
-    CHALLENGE_BYTES, Challenge, CodecError, FrameError, FrameReader, FrameTag, HandshakeError, Nonce, RESPONSE_BYTES,
-    Response, Secret, TransferError, VERDICT_BYTES, Verdict, decode_message, encode_message, frame_header, parts,
+    CHALLENGE_BYTES, Challenge, CodecError, FrameError, FrameReader, FrameTag, HandshakeError, Nonce, ProofKey,
+    RESPONSE_BYTES, Response, TransferError, VERDICT_BYTES, Verdict, decode_message, encode_message, frame_header,
+    parts,
 };
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use thiserror::Error;
 use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt};
+
+use crate::tls::TlsError;
 
 /// How much is read at a time.
 const READ_BYTES: usize = 64 << 10;
@@ -22,7 +25,10 @@ pub enum WireError {
     /// The stream itself failed.
     #[error(transparent)]
     Stream(#[from] io::Error),
-    /// The handshake failed.
+    /// The TLS handshake failed because of what the other side is.
+    #[error(transparent)]
+    Tls(#[from] TlsError),
+    /// The handshake inside TLS failed.
     #[error(transparent)]
     Handshake(#[from] HandshakeError),
     /// The peer sent something that is no frame.
@@ -56,6 +62,12 @@ impl WireError {
     pub fn is_violation(&self) -> bool {
         !matches!(self, Self::Stream(_) | Self::Ended | Self::TimedOut)
     }
+
+    /// Whether another attempt would end in the same way: the two sides do not fit, or one refuses the other.
+    #[must_use]
+    pub fn is_final(&self) -> bool {
+        matches!(self, Self::Tls(_) | Self::Handshake(_))
+    }
 }
 
 /// What comes next on a stream.
@@ -78,7 +90,12 @@ pub struct Incoming<R> {
 impl<R: AsyncRead + Unpin> Incoming<R> {
     /// Read frames from `stream`.
     pub fn new(stream: R) -> Self {
-        Self { stream, frames: FrameReader::default(), chunk: vec![0; READ_BYTES] }
+        Self::with_frames(stream, FrameReader::default())
+    }
+
+    /// Read frames from `stream`, cut by `frames`: it says how long they may be.
+    pub fn with_frames(stream: R, frames: FrameReader) -> Self {
+        Self { stream, frames, chunk: vec![0; READ_BYTES] }
     }
 
     /// The next message or part; `None` when the stream ended between frames. Nothing is lost when the future is dropped.
@@ -125,6 +142,8 @@ pub async fn send_message<T: Serialize>(stream: &mut (impl AsyncWrite + Unpin), 
     let header = frame_header(FrameTag::Message, body.len())?;
     // One write: a small message leaves in one packet.
     stream.write_all(&[&header, body.as_slice()].concat()).await?;
+    // TLS may hold back what the socket did not take.
+    stream.flush().await?;
     Ok(())
 }
 
@@ -137,6 +156,7 @@ pub async fn send_parts(stream: &mut (impl AsyncWrite + Unpin), blob: &Blob) -> 
         stream.write_all(&frame_header(FrameTag::Part, part.len())?).await?;
         stream.write_all(part).await?;
     }
+    stream.flush().await?;
     Ok(())
 }
 
@@ -146,14 +166,15 @@ pub async fn send_parts(stream: &mut (impl AsyncWrite + Unpin), blob: &Blob) -> 
 /// When the stream fails, or the other side is no coordinator of this version that knows the secret and accepts us.
 pub async fn greet_coordinator(
     stream: &mut (impl AsyncRead + AsyncWrite + Unpin),
-    secret: &Secret,
+    key: &ProofKey,
     nonce: Nonce,
 ) -> Result<(), WireError> {
     let challenge = Challenge::from_bytes(&read_array::<CHALLENGE_BYTES>(stream).await?)?;
-    let response = challenge.answer(secret, nonce)?;
+    let response = challenge.answer(key, nonce)?;
     stream.write_all(&response.to_bytes()).await?;
+    stream.flush().await?;
     let verdict = Verdict::from_bytes(&read_array::<VERDICT_BYTES>(stream).await?)?;
-    Ok(verdict.check(&challenge, &response, secret)?)
+    Ok(verdict.check(&challenge, &response, key)?)
 }
 
 /// The coordinator's side of the preamble: challenge, judge, and tell the verdict.
@@ -162,14 +183,16 @@ pub async fn greet_coordinator(
 /// When the stream fails, or the other side is no worker of this version that knows the secret.
 pub async fn greet_worker(
     stream: &mut (impl AsyncRead + AsyncWrite + Unpin),
-    secret: &Secret,
+    key: &ProofKey,
     nonce: Nonce,
 ) -> Result<(), WireError> {
     let challenge = Challenge::new(nonce);
     stream.write_all(&challenge.to_bytes()).await?;
+    stream.flush().await?;
     let response = Response::from_bytes(&read_array::<RESPONSE_BYTES>(stream).await?)?;
-    let verdict = response.judge(&challenge, secret);
+    let verdict = response.judge(&challenge, key);
     stream.write_all(&verdict.to_bytes()).await?;
+    stream.flush().await?;
     verdict.refusal.map_or(Ok(()), |refusal| Err(HandshakeError::Refused(refusal).into()))
 }
 

@@ -1,14 +1,18 @@
 //! The access file: what a worker has to know to join a run. Only who can read it can join.
 //!
 //! ```json
-//! { "address": "127.0.0.1:45123", "certificate": null, "secret": "64 hexadecimal digits" }
+//! { "address": "127.0.0.1:45123", "certificate": "blake3:64 hexadecimal digits", "secret": "64 hexadecimal digits" }
 //! ```
+//! The private key of the certificate is not in it: this file is copied to workers, and none of them shall be able to stand in
+//! for the coordinator.
 
 use std::fmt;
 
 use serde::{Deserialize, Serialize};
 use subtle::ConstantTimeEq;
 use thiserror::Error;
+
+use super::certificate::CertificatePin;
 
 /// The secret of a run: 32 random bytes. Compared in constant time, never printed.
 #[derive(Clone)]
@@ -24,23 +28,6 @@ impl Secret {
     /// The BLAKE3 keyed hash of `message` under this secret.
     pub(super) fn keyed_hash(&self, message: &[u8]) -> [u8; 32] {
         *blake3::keyed_hash(&self.0, message).as_bytes()
-    }
-
-    fn from_hex(digits: &str) -> Option<Self> {
-        let mut bytes = [0; 32];
-        let pairs = digits.as_bytes().chunks_exact(2);
-        if digits.len() != 64 {
-            return None;
-        }
-        for (byte, pair) in bytes.iter_mut().zip(pairs) {
-            let [high, low] = [pair[0], pair[1]].map(|digit| char::from(digit).to_digit(16));
-            *byte = u8::try_from(high? * 16 + low?).ok()?;
-        }
-        Some(Self(bytes))
-    }
-
-    fn to_hex(&self) -> String {
-        self.0.iter().map(|byte| format!("{byte:02x}")).collect()
     }
 }
 
@@ -64,8 +51,8 @@ impl Eq for Secret {}
 pub struct Access {
     /// Where the coordinator listens, as `HOST:PORT`.
     pub address: String,
-    /// The coordinator's certificate (PEM), to be pinned; `None` without TLS.
-    pub certificate: Option<String>,
+    /// The coordinator's certificate. A worker talks to nobody who shows another one.
+    pub certificate: CertificatePin,
     /// The secret.
     pub secret: Secret,
 }
@@ -91,9 +78,11 @@ pub enum AccessError {
         /// What there is.
         found: String,
     },
-    /// The file asks for TLS.
-    #[error("the file names a certificate, but this version does not speak TLS; use the coordinator's own version")]
-    CertificateNotSupported,
+    /// The certificate is no pin. It is not repeated here: fields may have been mixed up.
+    #[error(
+        "expected a \"certificate\" of the form blake3:HASH with 64 hexadecimal digits, found something else; was the file written by another version?"
+    )]
+    Certificate,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -108,19 +97,18 @@ impl Access {
     /// Parse the text of an access file.
     ///
     /// # Errors
-    /// When it is not one, or names a certificate: to ignore that would be to trust a connection that should be verified.
+    /// When it is not one. A file without a certificate is none: there is no connection without TLS.
     pub fn parse(text: &str) -> Result<Self, AccessError> {
         let file: AccessFile = serde_json::from_str(text).map_err(|error| AccessError::Json(without_values(&error)))?;
         let secret =
-            Secret::from_hex(&file.secret).ok_or(AccessError::Secret { found: file.secret.chars().count() })?;
+            from_hex(&file.secret).map(Secret).ok_or(AccessError::Secret { found: file.secret.chars().count() })?;
         let port = file.address.rsplit_once(':').and_then(|(_, port)| port.parse::<u16>().ok());
         if port.is_none() {
             return Err(AccessError::Address { found: file.address });
         }
-        if file.certificate.is_some() {
-            return Err(AccessError::CertificateNotSupported);
-        }
-        Ok(Self { address: file.address, certificate: file.certificate, secret })
+        let certificate =
+            file.certificate.as_deref().and_then(CertificatePin::parse).ok_or(AccessError::Certificate)?;
+        Ok(Self { address: file.address, certificate, secret })
     }
 
     /// The text of the access file.
@@ -128,8 +116,8 @@ impl Access {
     pub fn to_json(&self) -> String {
         let file = AccessFile {
             address: self.address.clone(),
-            certificate: self.certificate.clone(),
-            secret: self.secret.to_hex(),
+            certificate: Some(self.certificate.to_string()),
+            secret: to_hex(&self.secret.0),
         };
         // Three strings always have a JSON form.
         serde_json::to_string_pretty(&file).unwrap_or_default() + "\n"
@@ -139,4 +127,22 @@ impl Access {
 /// Where and of what kind an error is, without serde's quotation of the text: that might be the secret.
 fn without_values(error: &serde_json::Error) -> String {
     format!("{:?} error in line {}, column {}", error.classify(), error.line(), error.column()).to_lowercase()
+}
+
+/// 32 bytes of 64 hexadecimal digits.
+pub(super) fn from_hex(digits: &str) -> Option<[u8; 32]> {
+    let mut bytes = [0; 32];
+    let pairs = digits.as_bytes().chunks_exact(2);
+    if digits.len() != 64 {
+        return None;
+    }
+    for (byte, pair) in bytes.iter_mut().zip(pairs) {
+        let [high, low] = [pair[0], pair[1]].map(|digit| char::from(digit).to_digit(16));
+        *byte = u8::try_from(high? * 16 + low?).ok()?;
+    }
+    Some(bytes)
+}
+
+pub(super) fn to_hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }

@@ -37,10 +37,12 @@ pub struct Frame {
 #[non_exhaustive]
 pub enum FrameError {
     /// The announced length is out of range.
-    #[error("expected a frame of 1 to {MAX_FRAME_BYTES} bytes, found {found}")]
+    #[error("expected a frame of 1 to {limit} bytes, found {found}")]
     Length {
         /// The announced length.
         found: usize,
+        /// The largest length allowed.
+        limit: usize,
     },
     /// The tag is none of ours.
     #[error("expected frame tag 0 or 1, found {found}")]
@@ -55,7 +57,7 @@ pub enum FrameError {
 /// # Errors
 /// When the body does not fit into a frame.
 pub fn frame_header(tag: FrameTag, body_bytes: usize) -> Result<[u8; HEADER_BYTES], FrameError> {
-    let too_long = FrameError::Length { found: body_bytes.saturating_add(1) };
+    let too_long = FrameError::Length { found: body_bytes.saturating_add(1), limit: MAX_FRAME_BYTES };
     if body_bytes >= MAX_FRAME_BYTES {
         return Err(too_long);
     }
@@ -64,14 +66,28 @@ pub fn frame_header(tag: FrameTag, body_bytes: usize) -> Result<[u8; HEADER_BYTE
 }
 
 /// Cuts a stream of bytes into frames; holds at most one incomplete frame and what was pushed last.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct FrameReader {
     buffer: Vec<u8>,
     /// How much of the buffer has been given out.
     consumed: usize,
+    limit: usize,
+}
+
+/// Reads frames of up to [`MAX_FRAME_BYTES`].
+impl Default for FrameReader {
+    fn default() -> Self {
+        Self::with_limit(MAX_FRAME_BYTES)
+    }
 }
 
 impl FrameReader {
+    /// Read frames of up to `limit` bytes, tag included; [`MAX_FRAME_BYTES`] if that is less.
+    #[must_use]
+    pub fn with_limit(limit: usize) -> Self {
+        Self { buffer: Vec::new(), consumed: 0, limit: limit.min(MAX_FRAME_BYTES) }
+    }
+
     /// Take more bytes of the stream.
     pub fn push(&mut self, bytes: &[u8]) {
         self.buffer.drain(..self.consumed);
@@ -91,8 +107,8 @@ impl FrameReader {
         };
         let [a, b, c, d, tag] = *header;
         let length = usize::try_from(u32::from_le_bytes([a, b, c, d])).unwrap_or(usize::MAX);
-        if !(1..=MAX_FRAME_BYTES).contains(&length) {
-            return Err(FrameError::Length { found: length });
+        if !(1..=self.limit).contains(&length) {
+            return Err(FrameError::Length { found: length, limit: self.limit });
         }
         let tag = match tag {
             0 => FrameTag::Message,

@@ -5,9 +5,12 @@
 //!   worker -> coordinator   Response    magic 8, version 2, zero 2, nonce 32, proof 32             76 bytes
 //!   coordinator -> worker   Verdict     magic 8, version 2, refusal 1, zero 1, proof 32            44 bytes
 //! ```
-//! Integers are little-endian. A proof is BLAKE3 keyed with the secret, over the role's label and both nonces: neither side
-//! shows the secret, neither can replay a proof or send the other's back, and a worker takes no orders from an impostor.
-//! Proofs are compared in constant time. Fixed lengths, parsed by hand: nothing here allocates.
+//! Integers are little-endian. A proof is BLAKE3 over the role's label and both nonces, keyed with a [`ProofKey`], which is made
+//! of the secret and of the TLS connection: neither side shows the secret, neither can replay a proof or send the other's back,
+//! nobody between them can pass proofs on from one connection to another, and a worker takes no orders from an impostor.
+//! Proofs are compared in constant time. Fixed lengths, parsed by hand.
+
+use std::fmt;
 
 use subtle::ConstantTimeEq;
 use thiserror::Error;
@@ -25,6 +28,39 @@ pub const VERDICT_BYTES: usize = 44;
 /// 32 bytes from the operating system's random source, used once.
 pub type Nonce = [u8; 32];
 
+/// What makes a TLS connection unlike any other, known to its two ends alone: the exporter value `tls-exporter` of RFC 9266.
+#[derive(Clone, Copy)]
+pub struct ChannelBinding([u8; 32]);
+
+impl ChannelBinding {
+    /// The exporter's value for the label `EXPORTER-Channel-Binding` with an empty context.
+    #[must_use]
+    pub fn from_exporter(value: [u8; 32]) -> Self {
+        Self(value)
+    }
+}
+
+/// Does not show the value.
+impl fmt::Debug for ChannelBinding {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str("ChannelBinding(..)")
+    }
+}
+
+/// What proofs on one connection are keyed with: the BLAKE3 keyed hash, under the secret, of the connection's binding. Two
+/// connections have two keys, also when somebody between worker and coordinator has one with each.
+#[derive(Clone, Debug)]
+pub struct ProofKey(Secret);
+
+impl ProofKey {
+    /// The key of those who know `secret` and are the ends of the connection that `channel` names.
+    #[must_use]
+    pub fn new(secret: &Secret, channel: &ChannelBinding) -> Self {
+        Self(Secret::from_bytes(secret.keyed_hash(&[CHANNEL_LABEL, channel.0.as_slice()].concat())))
+    }
+}
+
+const CHANNEL_LABEL: &[u8] = b"lookalike channel key";
 const WORKER_LABEL: &[u8] = b"lookalike worker proof";
 const COORDINATOR_LABEL: &[u8] = b"lookalike coordinator proof";
 
@@ -47,7 +83,9 @@ pub enum HandshakeError {
     #[error("the coordinator refuses this worker: {0}")]
     Refused(Refusal),
     /// The coordinator does not know the secret: it is not the one that wrote the access file.
-    #[error("the coordinator does not know the secret of the access file; is the file from an older run?")]
+    #[error(
+        "the coordinator does not know the secret of the access file; copy the file again from the run that is to be joined"
+    )]
     Impostor,
     /// A refusal of unknown meaning.
     #[error("expected a verdict of 0 to 2, found {found}")]
@@ -61,7 +99,7 @@ pub enum HandshakeError {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 pub enum Refusal {
     /// The worker's proof is wrong.
-    #[error("wrong secret; is the access file from an older run?")]
+    #[error("wrong secret; copy the access file again from the run that is to be joined")]
     WrongSecret,
     /// The worker speaks another version.
     #[error("it speaks another protocol version; use the same build of coordinator and worker")]
@@ -126,9 +164,9 @@ impl Challenge {
     ///
     /// # Errors
     /// When the coordinator speaks another version.
-    pub fn answer(&self, secret: &Secret, nonce: Nonce) -> Result<Response, HandshakeError> {
+    pub fn answer(&self, key: &ProofKey, nonce: Nonce) -> Result<Response, HandshakeError> {
         check_version(self.version)?;
-        Ok(Response { version: PROTOCOL_VERSION, nonce, proof: proof(secret, WORKER_LABEL, &self.nonce, &nonce) })
+        Ok(Response { version: PROTOCOL_VERSION, nonce, proof: proof(key, WORKER_LABEL, &self.nonce, &nonce) })
     }
 }
 
@@ -151,8 +189,8 @@ impl Response {
 
     /// The coordinator's verdict on this answer to `challenge`.
     #[must_use]
-    pub fn judge(&self, challenge: &Challenge, secret: &Secret) -> Verdict {
-        let expected = proof(secret, WORKER_LABEL, &challenge.nonce, &self.nonce);
+    pub fn judge(&self, challenge: &Challenge, key: &ProofKey) -> Verdict {
+        let expected = proof(key, WORKER_LABEL, &challenge.nonce, &self.nonce);
         let refusal = if self.version != PROTOCOL_VERSION {
             Some(Refusal::WrongVersion)
         } else if !bool::from(self.proof.ct_eq(&expected)) {
@@ -160,7 +198,7 @@ impl Response {
         } else {
             None
         };
-        let own_proof = proof(secret, COORDINATOR_LABEL, &challenge.nonce, &self.nonce);
+        let own_proof = proof(key, COORDINATOR_LABEL, &challenge.nonce, &self.nonce);
         let proof = if refusal.is_none() { own_proof } else { [0; 32] };
         Verdict { version: PROTOCOL_VERSION, refusal, proof }
     }
@@ -199,19 +237,19 @@ impl Verdict {
     ///
     /// # Errors
     /// When it may not.
-    pub fn check(&self, challenge: &Challenge, response: &Response, secret: &Secret) -> Result<(), HandshakeError> {
+    pub fn check(&self, challenge: &Challenge, response: &Response, key: &ProofKey) -> Result<(), HandshakeError> {
         check_version(self.version)?;
         if let Some(refusal) = self.refusal {
             return Err(HandshakeError::Refused(refusal));
         }
-        let expected = proof(secret, COORDINATOR_LABEL, &challenge.nonce, &response.nonce);
+        let expected = proof(key, COORDINATOR_LABEL, &challenge.nonce, &response.nonce);
         if bool::from(self.proof.ct_eq(&expected)) { Ok(()) } else { Err(HandshakeError::Impostor) }
     }
 }
 
-fn proof(secret: &Secret, label: &[u8], challenge: &Nonce, response: &Nonce) -> [u8; 32] {
+fn proof(key: &ProofKey, label: &[u8], challenge: &Nonce, response: &Nonce) -> [u8; 32] {
     // Unambiguous without separators: the label is one of two constants, the nonces have fixed lengths.
-    secret.keyed_hash(&[label, challenge, response].concat())
+    key.0.keyed_hash(&[label, challenge, response].concat())
 }
 
 fn check_version(found: u16) -> Result<(), HandshakeError> {

@@ -1,9 +1,10 @@
 //! The wire between coordinator and workers: handshake, frames, messages, transfers of blobs. Bytes in, bytes out: nothing
 //! here opens a socket or waits for one.
 //!
-//! A connection is one TCP stream (inside TLS, once there is TLS). In order:
+//! A connection is one TCP stream with TLS 1.3 in it, from its first byte. The coordinator shows a certificate that the access
+//! file pins ([`CertificatePin`]); the worker shows none. Inside, in order:
 //! 1. a fixed-byte preamble ([`Challenge`], [`Response`], [`Verdict`]): magic, version, mutual proof of the shared
-//!    secret; parsed by hand, so that a stranger reaches no decoder;
+//!    secret, bound to this very TLS connection ([`ProofKey`]); parsed by hand, so that a stranger reaches no decoder;
 //! 2. frames ([`FrameReader`]): a length, checked against [`MAX_FRAME_BYTES`] before anything is allocated, a tag, a body;
 //! 3. in message frames [`ToCoordinator`] or [`ToWorker`], the first ones being `Hello` and `Welcome`;
 //! 4. in part frames the raw bytes of the blob that the last message announced ([`IncomingBlob`]).
@@ -12,6 +13,7 @@
 //! ever serialised because it happens to be convenient.
 
 mod access;
+mod certificate;
 mod codec;
 mod frame;
 mod handshake;
@@ -20,10 +22,12 @@ mod transfer;
 mod version;
 
 pub use access::{Access, AccessError, Secret};
+pub use certificate::CertificatePin;
 pub use codec::{CodecError, decode, decode_message, encode, encode_message};
 pub use frame::{Frame, FrameError, FrameReader, FrameTag, MAX_FRAME_BYTES, frame_header};
 pub use handshake::{
-    CHALLENGE_BYTES, Challenge, HandshakeError, Nonce, RESPONSE_BYTES, Refusal, Response, VERDICT_BYTES, Verdict,
+    CHALLENGE_BYTES, Challenge, ChannelBinding, HandshakeError, Nonce, ProofKey, RESPONSE_BYTES, Refusal, Response,
+    VERDICT_BYTES, Verdict,
 };
 pub use message::{
     Assignment, Executing, FailureKind, Hello, LeaseName, MAX_MESSAGE_TEXT_BYTES, RunName, ToCoordinator, ToWorker,

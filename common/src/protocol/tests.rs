@@ -47,6 +47,15 @@ fn secret(byte: u8) -> Secret {
     Secret::from_bytes([byte; 32])
 }
 
+/// The key of a secret on one and the same connection.
+fn key(byte: u8) -> ProofKey {
+    key_on(byte, 5)
+}
+
+fn key_on(byte: u8, channel: u8) -> ProofKey {
+    ProofKey::new(&secret(byte), &ChannelBinding::from_exporter([channel; 32]))
+}
+
 #[test]
 fn message_bytes_belong_to_this_protocol_version() {
     let encoded: Vec<u8> = to_worker()
@@ -137,50 +146,68 @@ fn frame_of_bad_length_or_tag_is_refused_from_its_header_alone() {
         reader.push(bytes);
         reader.next_frame()
     };
-    assert_eq!(first(&[0, 0, 0, 0, 0]), Err(FrameError::Length { found: 0 }));
-    assert_eq!(first(&[1, 0, 0x20, 0, 0]), Err(FrameError::Length { found: MAX_FRAME_BYTES + 1 }));
-    assert_eq!(first(&[255; 5]), Err(FrameError::Length { found: u32::MAX as usize }));
-    assert_eq!(first(b"GET / HTTP/1.1"), Err(FrameError::Length { found: 0x2054_4547 }));
+    assert_eq!(first(&[0, 0, 0, 0, 0]), Err(FrameError::Length { found: 0, limit: MAX_FRAME_BYTES }));
+    assert_eq!(
+        first(&[1, 0, 0x20, 0, 0]),
+        Err(FrameError::Length { found: MAX_FRAME_BYTES + 1, limit: MAX_FRAME_BYTES })
+    );
+    assert_eq!(first(&[255; 5]), Err(FrameError::Length { found: u32::MAX as usize, limit: MAX_FRAME_BYTES }));
+    assert_eq!(first(b"GET / HTTP/1.1"), Err(FrameError::Length { found: 0x2054_4547, limit: MAX_FRAME_BYTES }));
     assert_eq!(first(&[1, 0, 0, 0, 2]), Err(FrameError::Tag { found: 2 }));
     assert_eq!(first(&[0, 0, 0x20, 0]), Ok(None));
+    let mut reader = FrameReader::with_limit(100);
+    reader.push(&[101, 0, 0, 0, 0]);
+    assert_eq!(reader.next_frame(), Err(FrameError::Length { found: 101, limit: 100 }));
     assert!(frame_header(FrameTag::Part, MAX_FRAME_BYTES).is_err());
 }
 
 #[test]
 fn both_sides_prove_the_secret_to_each_other() {
     let challenge = Challenge::from_bytes(&Challenge::new([1; 32]).to_bytes()).unwrap();
-    let answer = challenge.answer(&secret(7), [2; 32]).unwrap();
+    let answer = challenge.answer(&key(7), [2; 32]).unwrap();
     let response = Response::from_bytes(&answer.to_bytes()).unwrap();
-    let verdict = Verdict::from_bytes(&response.judge(&challenge, &secret(7)).to_bytes()).unwrap();
-    assert_eq!(verdict.check(&challenge, &response, &secret(7)), Ok(()));
+    let verdict = Verdict::from_bytes(&response.judge(&challenge, &key(7)).to_bytes()).unwrap();
+    assert_eq!(verdict.check(&challenge, &response, &key(7)), Ok(()));
     assert_ne!(verdict.proof, response.proof);
     // An impostor accepts anyone, but cannot prove that it knows the secret.
-    assert_eq!(verdict.check(&challenge, &response, &secret(8)), Err(HandshakeError::Impostor));
+    assert_eq!(verdict.check(&challenge, &response, &key(8)), Err(HandshakeError::Impostor));
 }
 
 #[test]
 fn wrong_secret_is_refused_without_a_proof() {
     let challenge = Challenge::new([1; 32]);
-    let response = challenge.answer(&secret(8), [2; 32]).unwrap();
-    let verdict = response.judge(&challenge, &secret(7));
+    let response = challenge.answer(&key(8), [2; 32]).unwrap();
+    let verdict = response.judge(&challenge, &key(7));
     assert_eq!(verdict.proof, [0; 32]);
     let verdict = Verdict::from_bytes(&verdict.to_bytes()).unwrap();
     let refused = HandshakeError::Refused(Refusal::WrongSecret);
-    assert_eq!(verdict.check(&challenge, &response, &secret(8)), Err(refused));
+    assert_eq!(verdict.check(&challenge, &response, &key(8)), Err(refused));
     // A proof for another challenge is worth nothing.
-    let replayed = Challenge::new([3; 32]).answer(&secret(7), [2; 32]).unwrap();
-    assert_eq!(replayed.judge(&challenge, &secret(7)).refusal, Some(Refusal::WrongSecret));
+    let replayed = Challenge::new([3; 32]).answer(&key(7), [2; 32]).unwrap();
+    assert_eq!(replayed.judge(&challenge, &key(7)).refusal, Some(Refusal::WrongSecret));
+}
+
+#[test]
+fn proofs_cannot_be_passed_on_to_another_connection() {
+    let challenge = Challenge::new([1; 32]);
+    // Somebody between the two has a connection with each, and passes everything on.
+    let response = challenge.answer(&key_on(7, 1), [2; 32]).unwrap();
+    let verdict = response.judge(&challenge, &key_on(7, 2));
+    assert_eq!((verdict.refusal, verdict.proof), (Some(Refusal::WrongSecret), [0; 32]));
+    let accepted = challenge.answer(&key_on(7, 2), [2; 32]).unwrap().judge(&challenge, &key_on(7, 2));
+    assert_eq!(accepted.check(&challenge, &response, &key_on(7, 1)), Err(HandshakeError::Impostor));
+    assert!(!format!("{:?} {:?}", key_on(7, 1), ChannelBinding::from_exporter([77; 32])).contains('7'));
 }
 
 #[test]
 fn unknown_version_is_named_on_both_sides() {
     let strange = Challenge { version: 9, nonce: [1; 32] };
-    let error = strange.answer(&secret(7), [2; 32]).unwrap_err();
+    let error = strange.answer(&key(7), [2; 32]).unwrap_err();
     assert_eq!(error, HandshakeError::Version { expected: PROTOCOL_VERSION, found: 9 });
     let challenge = Challenge::new([1; 32]);
-    let mut response = challenge.answer(&secret(7), [2; 32]).unwrap();
+    let mut response = challenge.answer(&key(7), [2; 32]).unwrap();
     response.version = 9;
-    assert_eq!(response.judge(&challenge, &secret(7)).refusal, Some(Refusal::WrongVersion));
+    assert_eq!(response.judge(&challenge, &key(7)).refusal, Some(Refusal::WrongVersion));
 }
 
 #[test]
@@ -188,13 +215,13 @@ fn preamble_has_its_golden_bytes_and_knows_strangers() {
     let challenge = Challenge::new([1; 32]);
     let ones = "01".repeat(32);
     assert_eq!(hex(&challenge.to_bytes()), format!("4c4f4f4b4c494b4502000000{ones}"));
-    let response = challenge.answer(&secret(7), [2; 32]).unwrap();
+    let response = challenge.answer(&key(7), [2; 32]).unwrap();
     let twos = "02".repeat(32);
-    let proof = "026986a53a89f7db2d00e0f9e731d1dffbb340e30c2ff1e74e03d5a6c17b3fa9";
+    let proof = "1a377a2bf07122db57439a15bbd04df8a1872c437783d1da1eafd1103358f852";
     assert_eq!(hex(&response.to_bytes()), format!("4c4f4f4b4c494b4502000000{twos}{proof}"));
     assert_eq!(Challenge::from_bytes(&[b'H'; CHALLENGE_BYTES]), Err(HandshakeError::Magic));
     assert_eq!(Response::from_bytes(&[0; RESPONSE_BYTES]), Err(HandshakeError::Magic));
-    let mut verdict = response.judge(&challenge, &secret(7)).to_bytes();
+    let mut verdict = response.judge(&challenge, &key(7)).to_bytes();
     verdict[10] = 77;
     assert_eq!(Verdict::from_bytes(&verdict), Err(HandshakeError::Verdict { found: 77 }));
 }
@@ -230,25 +257,33 @@ fn transfer_of_wrong_length_or_content_is_refused() {
 
 #[test]
 fn access_file_round_trips_and_hides_its_secret() {
-    let access = Access { address: "[::1]:4000".into(), certificate: None, secret: secret(0xab) };
+    let certificate = CertificatePin::of(b"certificate");
+    let access = Access { address: "[::1]:4000".into(), certificate, secret: secret(0xab) };
     assert_eq!(Access::parse(&access.to_json()).unwrap(), access);
     assert!(access.to_json().contains(&"ab".repeat(32)));
-    assert!(!format!("{access:?}").contains("ab"));
+    assert!(!format!("{access:?}").contains("abab"));
+    assert!(certificate.names(b"certificate") && !certificate.names(b"another"));
 }
 
 #[test]
 fn bad_access_files_are_named_without_repeating_the_secret() {
-    let digits = "ab".repeat(32);
+    let (digits, pin) = ("ab".repeat(32), format!("\"blake3:{}\"", "cd".repeat(32)));
     let file = |address: &str, certificate: &str, secret: &str| {
         Access::parse(&format!(r#"{{"address": "{address}", "certificate": {certificate}, "secret": "{secret}"}}"#))
     };
-    assert!(matches!(file("host", "null", &digits), Err(AccessError::Address { .. })));
-    assert!(matches!(file("host:70000", "null", &digits), Err(AccessError::Address { .. })));
-    assert_eq!(file("h:1", "null", "abc"), Err(AccessError::Secret { found: 3 }));
-    assert_eq!(file("h:1", "null", &"g".repeat(64)), Err(AccessError::Secret { found: 64 }));
-    assert_eq!(file("h:1", "\"pem\"", &digits), Err(AccessError::CertificateNotSupported));
-    let misplaced = Access::parse(&format!(r#"{{"address": "h:1", "certificate": null, "secret": ["{digits}"]}}"#));
+    assert!(file("h:1", &pin, &digits).is_ok());
+    assert!(matches!(file("host", &pin, &digits), Err(AccessError::Address { .. })));
+    assert!(matches!(file("host:70000", &pin, &digits), Err(AccessError::Address { .. })));
+    assert_eq!(file("h:1", &pin, "abc"), Err(AccessError::Secret { found: 3 }));
+    assert_eq!(file("h:1", &pin, &"g".repeat(64)), Err(AccessError::Secret { found: 64 }));
+    // There is no connection without TLS, so no file without a pin.
+    for certificate in ["null", "\"\"", "\"pem\"", &format!("\"sha256:{digits}\""), &format!("\"blake3:{digits}00\"")] {
+        assert_eq!(file("h:1", certificate, &digits), Err(AccessError::Certificate), "{certificate}");
+    }
+    let misplaced = Access::parse(&format!(r#"{{"address": "h:1", "certificate": {pin}, "secret": ["{digits}"]}}"#));
     assert!(!misplaced.unwrap_err().to_string().contains(&digits));
+    let swapped = file("h:1", &format!("\"{digits}\""), &digits).unwrap_err();
+    assert!(!swapped.to_string().contains(&digits));
     assert!(matches!(Access::parse("{"), Err(AccessError::Json(_))));
 }
 

@@ -61,7 +61,7 @@ fn start_tracing(filter: &str) -> anyhow::Result<()> {
 }
 
 fn dispatch(Cli { log, command }: Cli) -> anyhow::Result<ExitCode> {
-    use crate::commands::{compare, demo, fit, render, worker};
+    use crate::commands::{access, compare, demo, fit, render, worker};
     match command {
         Command::Demo(args) => demo::run(DemoSettings { log: Some(log), ..args.into_settings()? }),
         Command::Fit(args) => {
@@ -71,6 +71,7 @@ fn dispatch(Cli { log, command }: Cli) -> anyhow::Result<ExitCode> {
         }
         Command::Render(args) => render::run(args.into_settings()?),
         Command::Compare(args) => compare::run(args.into_settings()),
+        Command::Access(args) => access::run(args.into_settings()),
         Command::Worker(args) => worker::run(args),
         Command::Batch(_) => later("lookalike batch", "run `lookalike fit` once per photo"),
         Command::Status(_) => {
@@ -80,7 +81,6 @@ fn dispatch(Cli { log, command }: Cli) -> anyhow::Result<ExitCode> {
         Command::Export(_) => later("lookalike export", "the parameters are in OUT/fit.json"),
         Command::Study(_) => later("lookalike study", "run `lookalike fit` once per photo"),
         Command::Report(_) => later("lookalike report", "the numbers are in OUT/fit.json and OUT/candidates.csv"),
-        Command::Access(_) => later("lookalike access", "`lookalike fit` writes OUT/access.json when it starts"),
     }
 }
 

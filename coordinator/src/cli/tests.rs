@@ -77,6 +77,7 @@ fn a_plain_fit_has_the_defaults_of_the_design() {
     assert_eq!(settings.cluster.workers, Workers::PerCore);
     assert_eq!(settings.cluster.wait_for_workers, Duration::from_secs(600));
     assert_eq!(settings.cluster.grace, Duration::from_secs(60));
+    assert_eq!((settings.cluster.listen, settings.cluster.access), (None, None));
 }
 
 #[test]
@@ -98,6 +99,10 @@ fn every_group_of_flags_reaches_the_settings() {
     assert_eq!(settings.cluster.workers, Workers::Count(0));
     assert_eq!(settings.cluster.advertise.unwrap().to_string(), "node7:4101");
     assert_eq!(settings.cluster.grace, Duration::from_secs(3600));
+    assert_eq!(settings.cluster.listen, Some(([10, 0, 0, 1], 4100).into()));
+    // The access file says under which name workers reach the coordinator, so no other name is needed.
+    let flags = ["--listen", "0.0.0.0:4100", "--access", "cluster.json"];
+    assert_eq!(fit(&[&PLAIN[..], &flags].concat()).unwrap().cluster.access, Some("cluster.json".into()));
 }
 
 #[test]

@@ -1,6 +1,7 @@
 //! The commands: what each does with its settings. They return the exit code of a run that was carried out; errors are
 //! reported by the command line.
 
+pub(crate) mod access;
 pub(crate) mod compare;
 pub(crate) mod demo;
 pub(crate) mod fit;

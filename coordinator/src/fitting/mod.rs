@@ -96,8 +96,8 @@ fn run_graph(
     clock: &mut Clock,
 ) -> anyhow::Result<(FitPlanner, crate::core::RunSummary)> {
     let mut options = RunnerOptions::new(job.cluster.workers.count(), job.out.file("access.json"));
-    let remote = job.cluster.workers.count() == 0 || !job.cluster.listen.ip().is_loopback();
-    options.listen = (remote || job.cluster.listen.port() != 0).then_some(job.cluster.listen);
+    options.listen = job.cluster.listen_for_others();
+    options.access = job.cluster.access.clone();
     options.advertise = job.cluster.advertise.as_ref().map(ToString::to_string);
     options.log.clone_from(&job.cluster.log);
     options.policy.wait_for_workers = job.cluster.wait_for_workers;

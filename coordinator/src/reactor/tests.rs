@@ -265,6 +265,23 @@ fn blob_is_sent_when_asked_for_and_counted() {
 }
 
 #[test]
+fn blob_goes_to_workers_whose_nodes_read_it_and_to_nobody_else() {
+    let blob = vec![1; 40];
+    let hash = BlobHash::of(&blob);
+    let nodes = vec![node("n", vec![], Placement::Worker), node("n", vec![Input::Blob(hash)], Placement::Worker)];
+    let mut bench = Bench::new(Script { nodes, blob, ..Script::default() });
+    bench.join(A, 1);
+    // Node 1 moves from A to B; A may have asked before it knew.
+    bench.join(B, 1);
+    let c = WorkerId(3);
+    bench.join(c, 1);
+    for worker in [A, B] {
+        assert_eq!(bench.handle(Event::BlobRequested { worker, hash }), [format!("{worker} gets 40 bytes")]);
+    }
+    assert_eq!(bench.handle(Event::BlobRequested { worker: c, hash })[0], "worker 3 is thrown out");
+}
+
+#[test]
 fn node_waits_for_the_output_it_reads_and_coordinator_nodes_run_here() {
     let mut planner = independent(2);
     let inputs = [0, 1].map(|index| Input::OutputOf(NodeId(index))).to_vec();

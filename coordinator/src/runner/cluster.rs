@@ -1,18 +1,23 @@
 //! The cluster of a run: listener, connections, local worker processes. Started together, stopped together.
 
 use std::collections::BTreeMap;
+use std::net::SocketAddr;
+use std::sync::Arc;
+use std::time::SystemTime;
 
 use lookalike::graph::WorkerId;
-use lookalike::protocol::{Access, RunName, ToWorker};
+use lookalike::protocol::{RunName, ToWorker};
 use tokio::net::TcpListener;
 use tokio::sync::mpsc::{Receiver, UnboundedSender, channel};
 use tokio::task::{JoinHandle, JoinSet};
+use tokio_rustls::TlsAcceptor;
 use tokio_util::sync::CancellationToken;
 
 use super::{RunError, RunnerOptions};
-use crate::access::{new_access, write_access};
+use crate::access::Credentials;
 use crate::rpc::{Gate, Inbound, Outgoing, serve_forever};
 use crate::spawn::{LocalWorkers, WorkerCommand, threads_per_worker};
+use crate::tls::server_config;
 
 /// How many events may wait for the reactor before the connections have to.
 const INBOUND_CAPACITY: usize = 1024;
@@ -31,27 +36,38 @@ pub(crate) struct Cluster {
 }
 
 impl Cluster {
-    /// Listen, write the access file, start the local workers.
+    /// Listen, write the access file or take the one made beforehand, start the local workers.
     pub(crate) async fn start(options: &RunnerOptions, epoch: u64) -> Result<Self, RunError> {
         options.check()?;
-        let listen = options.listen_address();
+        let now = SystemTime::now();
+        let given = options.access.as_ref().map(|path| Credentials::read(path, now)).transpose()?;
+        let listen = options.listen_address(given.as_ref().map(|given| given.access.address.as_str()))?;
         let listen_error = |source| RunError::Listen { listen, source };
         let listener = TcpListener::bind(listen).await.map_err(listen_error)?;
         let bound = listener.local_addr().map_err(listen_error)?;
-        let access = new_access(options.advertised(bound)).map_err(RunError::Randomness)?;
-        let path = options.access_file.clone();
-        write_access(&path, &access).map_err(|source| RunError::AccessFile { path, source })?;
+        let Credentials { access, identity } = match given {
+            Some(given) => given,
+            None => new_credentials(options, bound, now)?,
+        };
+        let tls = server_config(&identity).map_err(RunError::Tls)?;
         let (sender, inbound) = channel(INBOUND_CAPACITY);
         let stop = CancellationToken::new();
         let workers = local_workers(options, RunnerOptions::local_address(bound))?;
         // From here on the drop guard inside `Self` ends what was started.
         let mut run = [0; 16];
         getrandom::fill(&mut run).map_err(RunError::Randomness)?;
-        let Access { address, secret, .. } = access;
-        let gate = Gate { secret, run: RunName(run), epoch, heartbeat: options.heartbeat, inbound: sender.clone() };
+        let gate = Gate {
+            tls: TlsAcceptor::from(Arc::new(tls)),
+            secret: access.secret,
+            limits: options.limits,
+            run: RunName(run),
+            epoch,
+            heartbeat: options.heartbeat,
+            inbound: sender.clone(),
+        };
         let local_workers = workers.start(&sender, &stop)?;
         let serving = tokio::spawn(serve_forever(listener, gate, stop.clone()));
-        Ok(Self { inbound, address, members: BTreeMap::new(), stop, serving, local_workers })
+        Ok(Self { inbound, address: access.address, members: BTreeMap::new(), stop, serving, local_workers })
     }
 
     /// A worker can be sent to from now on.
@@ -93,16 +109,23 @@ impl Drop for Cluster {
     }
 }
 
+/// Make credentials for a listener that got this address, and write the access file.
+fn new_credentials(options: &RunnerOptions, bound: SocketAddr, now: SystemTime) -> Result<Credentials, RunError> {
+    let credentials = Credentials::new(options.advertised(bound), now)?;
+    credentials.write(&options.access_file)?;
+    Ok(credentials)
+}
+
 fn local_workers(options: &RunnerOptions, address: String) -> Result<LocalWorkers, RunError> {
     let command = options.worker_command.clone().map_or_else(WorkerCommand::this_program, Ok);
     let unknown_program = |source| RunError::Spawn { program: "this program".into(), source };
     Ok(LocalWorkers {
         count: options.workers,
         command: command.map_err(unknown_program)?,
-        access: options.access_file.clone(),
+        access: options.access.as_ref().unwrap_or(&options.access_file).clone(),
         log: options.log.clone(),
         address,
         threads: options.threads_per_worker.unwrap_or_else(|| threads_per_worker(options.workers)),
-        others_may_come: options.listen.is_some(),
+        others_may_come: options.others_may_come(),
     })
 }

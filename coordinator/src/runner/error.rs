@@ -8,6 +8,7 @@ use std::time::Duration;
 use lookalike::graph::{BlobHash, FailureReason, NodeFailure, PlanError};
 use thiserror::Error;
 
+use crate::access::CredentialsError;
 use crate::comm::{NodeName, Site};
 
 /// Why a run ended without its result.
@@ -33,16 +34,22 @@ pub enum RunError {
         /// What the system says.
         source: io::Error,
     },
-    /// The access file cannot be written.
-    #[error("cannot write the access file {}", path.display())]
-    AccessFile {
-        /// The file.
-        path: PathBuf,
-        /// What the system says.
-        source: io::Error,
+    /// There is no usable access file, or none can be written.
+    #[error(transparent)]
+    Credentials(#[from] CredentialsError),
+    /// The coordinator's key is not that of its certificate.
+    #[error("the coordinator's key file is not usable: {0}; make a new access file with `lookalike access new`")]
+    Tls(#[source] rustls::Error),
+    /// The access file made beforehand says where workers connect to, but not where that arrives.
+    #[error(
+        "workers with this access file connect to {address}; say on which address of this machine they arrive with --listen IP:PORT"
+    )]
+    ListenWhere {
+        /// What the access file says.
+        address: String,
     },
-    /// The operating system gives no random bytes for the secret.
-    #[error("the system gives no random bytes for the secret: {0}")]
+    /// The operating system gives no random bytes.
+    #[error("the system gives no random bytes for the name of the run: {0}")]
     Randomness(getrandom::Error),
     /// Nobody can be told to stop.
     #[error("cannot listen for Ctrl-C and SIGTERM")]
@@ -116,7 +123,9 @@ impl RunError {
             Self::NoWorkersPossible
             | Self::NothingToAdvertise { .. }
             | Self::Listen { .. }
-            | Self::AccessFile { .. } => 2,
+            | Self::ListenWhere { .. }
+            | Self::Tls(_) => 2,
+            Self::Credentials(error) => error.exit_code(),
             // What a node says of its inputs is about the user's; a panic or an unknown kind is our own mistake.
             Self::Plan(PlanError::NodeFailed {
                 reason: FailureReason::Node(NodeFailure::Application { .. }), ..

@@ -7,6 +7,7 @@ use std::time::Duration;
 
 use super::RunError;
 use crate::core::Policy;
+use crate::limits::Limits;
 use crate::spawn::WorkerCommand;
 
 /// How to run a graph on workers.
@@ -25,8 +26,12 @@ pub struct RunnerOptions {
     pub listen: Option<SocketAddr>,
     /// What the access file tells workers to connect to, as `HOST` or `HOST:PORT`; `None` tells the address listened on.
     pub advertise: Option<String>,
-    /// Where to write the access file; its folder has to exist.
+    /// Where to write the access file, with the coordinator's key beside it; its folder has to exist.
     pub access_file: PathBuf,
+    /// An access file made beforehand, with its key beside it, to use instead of writing one: workers may have it already.
+    pub access: Option<PathBuf>,
+    /// What connections may cost.
+    pub limits: Limits,
     /// How often a worker shall tell that it lives.
     pub heartbeat: Duration,
     /// How workers and nodes are treated: waiting, grace, crashes.
@@ -47,24 +52,43 @@ impl RunnerOptions {
             listen: None,
             advertise: None,
             access_file,
+            access: None,
+            limits: Limits::default(),
             heartbeat: Duration::from_secs(1),
             policy: Policy::default(),
             handle_signals: true,
         }
     }
 
-    /// The address to listen on.
-    pub(crate) fn listen_address(&self) -> SocketAddr {
-        self.listen.unwrap_or_else(|| SocketAddr::from((Ipv4Addr::LOCALHOST, 0)))
+    /// The address to listen on, for workers that an access file made beforehand tells to connect to `told`. Without
+    /// [`listen`](Self::listen) it is an address of the loopback interface, never another one.
+    pub(crate) fn listen_address(&self, told: Option<&str>) -> Result<SocketAddr, RunError> {
+        match (self.listen, told) {
+            (Some(listen), Some(address)) if listen.port() == 0 => {
+                Err(RunError::ListenWhere { address: address.to_owned() })
+            }
+            (Some(listen), _) => Ok(listen),
+            (None, None) => Ok(SocketAddr::from((Ipv4Addr::LOCALHOST, 0))),
+            (None, Some(address)) => {
+                let local = address.replacen("localhost:", "127.0.0.1:", 1).parse::<SocketAddr>().ok();
+                let local = local.filter(|local| local.ip().is_loopback() && local.port() != 0);
+                local.ok_or_else(|| RunError::ListenWhere { address: address.to_owned() })
+            }
+        }
+    }
+
+    /// Whether workers may come that this run does not start.
+    pub(crate) fn others_may_come(&self) -> bool {
+        self.listen.is_some() || self.access.is_some()
     }
 
     /// That some worker can join, and be told where.
     pub(crate) fn check(&self) -> Result<(), RunError> {
-        if self.workers == 0 && self.listen.is_none() {
+        if self.workers == 0 && !self.others_may_come() {
             return Err(RunError::NoWorkersPossible);
         }
         match self.listen {
-            Some(listen) if listen.ip().is_unspecified() && self.advertise.is_none() => {
+            Some(listen) if listen.ip().is_unspecified() && self.advertise.is_none() && self.access.is_none() => {
                 Err(RunError::NothingToAdvertise { listen })
             }
             _ => Ok(()),
@@ -120,6 +144,24 @@ mod tests {
         let error = options(1, Some("0.0.0.0:4000"), None).check().unwrap_err();
         assert!(error.to_string().contains("add --advertise"), "{error}");
         assert!(options(1, Some("[::]:4000"), Some("host")).check().is_ok());
+    }
+
+    #[test]
+    fn without_listen_only_the_loopback_interface_is_listened_on() {
+        let nowhere = options(1, None, None);
+        assert_eq!(nowhere.listen_address(None).unwrap().to_string(), "127.0.0.1:0");
+        assert_eq!(nowhere.listen_address(Some("127.0.0.1:4100")).unwrap().to_string(), "127.0.0.1:4100");
+        assert_eq!(nowhere.listen_address(Some("localhost:4100")).unwrap().to_string(), "127.0.0.1:4100");
+        assert_eq!(nowhere.listen_address(Some("[::1]:4100")).unwrap().to_string(), "[::1]:4100");
+        for elsewhere in ["node7:4100", "10.0.0.1:4100", "0.0.0.0:4100", "127.0.0.1:0"] {
+            let error = nowhere.listen_address(Some(elsewhere)).unwrap_err();
+            assert!(error.to_string().contains("--listen IP:PORT"), "{error}");
+        }
+        let somewhere = options(0, Some("0.0.0.0:4100"), None);
+        assert_eq!(somewhere.listen_address(Some("node7:30100")).unwrap().to_string(), "0.0.0.0:4100");
+        assert!(options(0, Some("10.0.0.1:0"), None).listen_address(Some("node7:4100")).is_err());
+        let beforehand = RunnerOptions { access: Some("a.json".into()), ..options(0, Some("0.0.0.0:4100"), None) };
+        assert!(beforehand.check().is_ok());
     }
 
     #[test]

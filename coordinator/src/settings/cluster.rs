@@ -1,7 +1,7 @@
 //! Who computes: local worker processes, remote ones, or both (design section 8).
 
 use anyhow::{Context, bail};
-use std::{fmt, net::SocketAddr, num::NonZeroUsize, str::FromStr, thread, time::Duration};
+use std::{fmt, net::SocketAddr, num::NonZeroUsize, path::PathBuf, str::FromStr, thread, time::Duration};
 
 /// Where workers come from and how long a coordinator waits for them.
 #[derive(Debug, Clone, PartialEq)]
@@ -10,10 +10,12 @@ pub struct ClusterSettings {
     pub workers: Workers,
     /// The log filter of the local workers; none leaves them their own default.
     pub log: Option<String>,
-    /// Address to listen on; port 0 lets the system choose.
-    pub listen: SocketAddr,
+    /// Address to listen on; port 0 lets the system choose. None is the loopback interface.
+    pub listen: Option<SocketAddr>,
     /// What the access file tells workers to connect to; none means the address listened on.
     pub advertise: Option<Advertise>,
+    /// An access file made beforehand, to be used instead of a new one.
+    pub access: Option<PathBuf>,
     /// How long to wait for the first worker.
     pub wait_for_workers: Duration,
     /// How long to wait for another worker after losing the last.
@@ -36,11 +38,21 @@ impl Default for ClusterSettings {
         Self {
             workers: Workers::PerCore,
             log: None,
-            listen: SocketAddr::from(([127, 0, 0, 1], 0)),
+            listen: None,
             advertise: None,
+            access: None,
             wait_for_workers: Duration::from_mins(10),
             grace: Duration::from_mins(1),
         }
+    }
+}
+
+impl ClusterSettings {
+    /// Where workers may join that the run does not start itself; none when it waits for no others.
+    #[must_use]
+    pub fn listen_for_others(&self) -> Option<SocketAddr> {
+        let waits = self.workers.count() == 0 && self.access.is_none();
+        self.listen.or_else(|| waits.then(|| SocketAddr::from(([127, 0, 0, 1], 0))))
     }
 }
 
@@ -141,6 +153,18 @@ mod tests {
         for text in ["-1", "1.5", "many", "5000", ""] {
             assert!(text.parse::<Workers>().is_err(), "{text}");
         }
+    }
+
+    #[test]
+    fn without_local_workers_others_are_listened_for() {
+        let with = |workers, access: Option<&str>| {
+            let access = access.map(PathBuf::from);
+            ClusterSettings { workers: Workers::Count(workers), access, ..ClusterSettings::default() }
+        };
+        assert_eq!(with(1, None).listen_for_others(), None);
+        assert_eq!(with(0, None).listen_for_others(), Some(([127, 0, 0, 1], 0).into()));
+        // Where to, the access file says.
+        assert_eq!(with(0, Some("a.json")).listen_for_others(), None);
     }
 
     #[test]

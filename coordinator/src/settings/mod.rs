@@ -6,6 +6,7 @@
 //!
 //! What is deliberately absent: files are not opened here, and nothing here depends on the command line's grammar.
 
+mod access;
 mod camera;
 mod choices;
 mod circle;
@@ -20,6 +21,7 @@ mod render;
 mod samples;
 mod scene;
 
+pub use access::AccessSettings;
 pub use camera::CameraSpec;
 pub use choices::{CompressAtZero, EnvMapping, Judge, MetricKind, Preset, ProgressKind, Sampling, SearchKind, Start};
 pub use circle::Circle;

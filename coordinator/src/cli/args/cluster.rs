@@ -1,6 +1,5 @@
 //! Flags of the coordinator: where workers come from and how long it waits for them.
 
-use crate::cli::NotThereYet;
 use crate::settings::{Advertise, ClusterSettings, Workers};
 use anyhow::bail;
 use clap::Args;
@@ -12,14 +11,14 @@ pub(crate) struct ClusterArgs {
     /// Local worker processes to start: auto is one per core, 0 waits for remote ones
     #[arg(long, value_name = "N", default_value_t, allow_negative_numbers = true)]
     workers: Workers,
-    /// IP address and port to listen on for workers; port 0 lets the system choose
-    #[arg(long, value_name = "ADDR", default_value = "127.0.0.1:0")]
-    listen: SocketAddr,
+    /// IP address and port to listen on for workers; port 0 lets the system choose [default: 127.0.0.1:0]
+    #[arg(long, value_name = "ADDR")]
+    listen: Option<SocketAddr>,
     /// What the access file tells workers to connect to: HOST or HOST:PORT [default: the address listened on]
     #[arg(long, value_name = "A")]
     advertise: Option<Advertise>,
-    /// Access file made beforehand (not there yet) [default: a new one, OUT/access.json]
-    #[arg(long, value_name = "FILE")]
+    /// Access file made beforehand with lookalike access new, its key beside it [default: a new one, OUT/access.json]
+    #[arg(long, value_name = "FILE", conflicts_with = "advertise")]
     access: Option<PathBuf>,
     /// How long to wait for the first worker, such as 10min or 90s
     #[arg(long, value_name = "T", default_value = "10min", value_parser = humantime::parse_duration)]
@@ -31,18 +30,11 @@ pub(crate) struct ClusterArgs {
 
 impl ClusterArgs {
     pub(crate) fn into_settings(self) -> anyhow::Result<ClusterSettings> {
-        if self.access.is_some() {
-            return Err(NotThereYet {
-                what: "--access",
-                instead: "this version writes a new access file, OUT/access.json, for workers to take",
-            }
-            .into());
-        }
-        if self.listen.ip().is_unspecified() && self.advertise.is_none() {
+        let everywhere = self.listen.filter(|listen| listen.ip().is_unspecified());
+        if let (Some(listen), None, None) = (everywhere, &self.advertise, &self.access) {
             bail!(
-                "--listen {} accepts connections on every interface but is no address to connect to; say under which \
-                 name workers reach this machine with --advertise HOST",
-                self.listen
+                "--listen {listen} accepts connections on every interface but is no address to connect to; say under which \
+                 name workers reach this machine with --advertise HOST"
             );
         }
         Ok(ClusterSettings {
@@ -50,6 +42,7 @@ impl ClusterArgs {
             log: None,
             listen: self.listen,
             advertise: self.advertise,
+            access: self.access,
             wait_for_workers: self.wait_for_workers,
             grace: self.grace,
         })

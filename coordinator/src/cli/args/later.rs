@@ -8,7 +8,7 @@ use super::{
     method::MethodArgs,
     scene::{EnvironmentArgs, PhotoArgs, SphereArgs, ViewArgs},
 };
-use clap::{Args, Subcommand, ValueEnum};
+use clap::{Args, ValueEnum};
 use std::{net::SocketAddr, path::PathBuf};
 
 #[derive(Debug, Args)]
@@ -121,23 +121,4 @@ pub(crate) struct ReportArgs {
     /// Folder of the run
     #[arg(value_name = "DIR")]
     run: PathBuf,
-}
-
-#[derive(Debug, Args)]
-pub(crate) struct AccessArgs {
-    #[command(subcommand)]
-    command: AccessCommand,
-}
-
-#[derive(Debug, Subcommand)]
-enum AccessCommand {
-    /// Make a new access file (not there yet)
-    New {
-        /// Host and port under which workers will reach the coordinator
-        #[arg(long, value_name = "HOST:PORT")]
-        address: String,
-        /// File to write, readable by its owner only
-        #[arg(long, short, value_name = "FILE")]
-        out: PathBuf,
-    },
 }

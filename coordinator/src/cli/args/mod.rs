@@ -3,6 +3,7 @@
 //! Help texts are part of the contract: one sentence of purpose, units, defaults, and an example in `--help`. What a
 //! version does not have yet stays in the grammar and answers with [`super::NotThereYet`], so that nothing is ignored silently.
 
+mod access;
 mod cluster;
 mod compare;
 mod fit;
@@ -52,8 +53,8 @@ pub(crate) enum Command {
     Study(later::StudyArgs),
     /// Rebuild the report page of a run (not there yet)
     Report(later::ReportArgs),
-    /// Make an access file before the run it is for (not there yet)
-    Access(later::AccessArgs),
+    /// Make an access file before the run it is for
+    Access(access::AccessArgs),
     /// Compute for a coordinator: the same as lookalike-worker
     #[command(after_long_help = "Example:\n  lookalike worker --access run/access.json --threads 8")]
     Worker(lookalike_worker::Arguments),

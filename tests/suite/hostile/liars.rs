@@ -1,0 +1,149 @@
+//! Workers that have the access file and are up to no good: they are thrown out, their nodes run elsewhere.
+
+use super::{PROGRAM, run_at_the_gate, run_within, worker};
+use lookalike::graph::BlobHash;
+use lookalike::protocol::{FailureKind, FrameTag, LeaseName, ToCoordinator, ToWorker};
+use lookalike_coordinator::comm::{Departure, RunEvent};
+use lookalike_coordinator::limits::Limits;
+use lookalike_coordinator::runner::RunnerOptions;
+use lookalike_tests::cluster::{Cluster, options};
+use lookalike_tests::gate::Gate;
+use lookalike_tests::plan::{Leaves, TestPlanner};
+use lookalike_tests::stranger::{LIAR, TlsClient, hear, join, read_to_the_end, say, say_frame};
+use std::io::Write;
+
+/// How the liar's membership ended.
+fn end_of_liar(cluster: &Cluster) -> Departure {
+    let liar = cluster.wait_for(|event| match event {
+        RunEvent::WorkerJoined { worker, process: LIAR, .. } => Some(*worker),
+        _ => None,
+    });
+    cluster.wait_for(|event| match event {
+        RunEvent::WorkerLeft { worker, departure } if *worker == liar => Some(departure.clone()),
+        _ => None,
+    })
+}
+
+/// Asserts that a liar who does this is thrown out of a run that goes on.
+#[track_caller]
+fn assert_thrown_out(limits: Limits, lie: impl FnOnce(&mut TlsClient)) {
+    let gate = Gate::new();
+    let cluster = run_within(&gate, 1, limits);
+    let waiting = gate.next();
+    let mut stream = join(&cluster.access(), 1);
+    lie(&mut stream);
+    let departure = end_of_liar(&cluster);
+    assert!(matches!(departure, Departure::Violation(_)), "{departure:?}");
+    let _ = read_to_the_end(stream);
+    waiting.release();
+    assert!(cluster.finish().0.is_some());
+}
+
+#[test]
+fn frames_that_are_none_end_the_membership() {
+    let oversized = [255, 255, 255, 127, 0].to_vec();
+    let unknown_tag = [1, 0, 0, 0, 9].to_vec();
+    let no_message = [3, 0, 0, 0, 0, 99, 99].to_vec();
+    let part_of_nothing = [2, 0, 0, 0, 1, 0].to_vec();
+    for lie in [oversized, unknown_tag, no_message, part_of_nothing] {
+        assert_thrown_out(Limits::default(), |stream| stream.write_all(&lie).unwrap());
+    }
+}
+
+#[test]
+fn frame_beyond_the_coordinators_own_limit_is_refused_from_its_header() {
+    // A frame of 5000 bytes, of which only the header is sent.
+    let limits = Limits { frame_bytes: 4096, ..Limits::default() };
+    assert_thrown_out(limits, |stream| stream.write_all(&[0x88, 0x13, 0, 0, 0]).unwrap());
+}
+
+#[test]
+fn answers_to_nothing_and_false_hashes_are_not_believed() {
+    let lease = LeaseName { node: 0, attempt: 9, epoch: 1 };
+    let never_asked = ToCoordinator::Failed { lease, kind: FailureKind::Application, message: "I lie".into() };
+    let false_hash = ToCoordinator::Finished { lease, hash: [1; 32], length: 0 };
+    let too_long = ToCoordinator::Finished { lease, hash: [1; 32], length: u64::MAX };
+    let unknown_blob = ToCoordinator::Fetch { hash: [1; 32] };
+    // The input of the node at the gate: it is there, but this worker has nothing to do with it.
+    let blob_of_another = ToCoordinator::Fetch { hash: BlobHash::of(&[]).0 };
+    for lie in [never_asked, false_hash, too_long, unknown_blob, blob_of_another] {
+        assert_thrown_out(Limits::default(), |stream| say(stream, &lie));
+    }
+}
+
+#[test]
+fn frame_that_is_cut_off_is_the_end_of_the_connection_and_of_nothing_else() {
+    for says_farewell in [true, false] {
+        let gate = Gate::new();
+        let cluster = run_at_the_gate(&gate);
+        let waiting = gate.next();
+        let mut stream = join(&cluster.access(), 1);
+        stream.write_all(&[200, 0, 0, 0, 0, 1, 2, 3]).unwrap();
+        if says_farewell {
+            stream.conn.send_close_notify();
+        }
+        stream.flush().unwrap();
+        stream.sock.shutdown(std::net::Shutdown::Write).unwrap();
+        assert_eq!(end_of_liar(&cluster), Departure::Lost);
+        waiting.release();
+        assert!(cluster.finish().0.is_some());
+    }
+}
+
+#[test]
+fn garbage_under_the_encryption_is_the_end_of_the_connection_and_of_nothing_else() {
+    let gate = Gate::new();
+    let cluster = run_at_the_gate(&gate);
+    let waiting = gate.next();
+    let mut stream = join(&cluster.access(), 1);
+    stream.flush().unwrap();
+    // A record of the right form that nobody with the keys has written.
+    stream.sock.write_all(&[&[0x17, 3, 3, 0, 32][..], &[5; 32]].concat()).unwrap();
+    assert_eq!(end_of_liar(&cluster), Departure::Lost);
+    waiting.release();
+    assert!(cluster.finish().0.is_some());
+}
+
+/// A run of two leaves over one blob that nobody works for yet.
+fn run_without_workers(limits: Limits) -> (Leaves, Cluster) {
+    let leaves = Leaves::Large { bytes: 20_000_001 };
+    let listen = Some(([127, 0, 0, 1], 0).into());
+    let cluster = Cluster::start(leaves.clone(), RunnerOptions { listen, limits, ..options(PROGRAM, 0) });
+    cluster.address();
+    (leaves, cluster)
+}
+
+#[test]
+fn worker_that_returns_other_bytes_than_it_announced_is_not_believed() {
+    let (leaves, cluster) = run_without_workers(Limits::default());
+    let mut liar = join(&cluster.access(), 1);
+    let lease = hear(&mut liar, |message| match message {
+        ToWorker::Assign(assignment) => Some(assignment.lease),
+        _ => None,
+    });
+    say(&mut liar, &ToCoordinator::Started(lease));
+    say(&mut liar, &ToCoordinator::Finished { lease, hash: BlobHash::of(b"right").0, length: 5 });
+    say_frame(&mut liar, FrameTag::Part, b"wrong");
+    assert!(matches!(end_of_liar(&cluster), Departure::Violation(_)));
+    let honest = worker(&cluster.access_file());
+    assert_eq!(cluster.finish().0, TestPlanner::reference(leaves));
+    assert_eq!(honest.output().status.code(), Some(0));
+}
+
+#[test]
+fn worker_that_asks_and_does_not_take_is_thrown_out() {
+    let (leaves, cluster) = run_without_workers(Limits { pending_blobs: 4, ..Limits::default() });
+    let mut liar = join(&cluster.access(), 1);
+    let hash = hear(&mut liar, |message| match message {
+        ToWorker::Assign(assignment) => Some(assignment.inputs[0]),
+        _ => None,
+    });
+    // Twenty megabytes are more than the sockets take, so the first one is on its way for ever.
+    for _ in 0..5 {
+        say(&mut liar, &ToCoordinator::Fetch { hash });
+    }
+    assert!(matches!(end_of_liar(&cluster), Departure::Violation(_)));
+    let honest = worker(&cluster.access_file());
+    assert_eq!(cluster.finish().0, TestPlanner::reference(leaves));
+    assert_eq!(honest.output().status.code(), Some(0));
+}
