@@ -14,10 +14,8 @@ mod compare;
 mod fit;
 mod hostile;
 mod network;
-#[cfg(feature = "slow")]
 mod physics;
 mod program;
-#[cfg(feature = "slow")]
 mod recovery;
 mod render;
 mod tidy;

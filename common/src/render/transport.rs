@@ -30,9 +30,9 @@ pub struct Accuracy {
 
 impl Accuracy {
     /// Tables of stage one.
-    pub const SUBSET: Self = Self { tolerance: 2e-4, footprint: 1.0 };
+    pub const SUBSET: Self = Self { tolerance: 5e-4, footprint: 1.0 };
     /// Full-resolution tables of stage two and polish.
-    pub const FULL: Self = Self { tolerance: 1e-3, footprint: 3.0 };
+    pub const FULL: Self = Self { tolerance: 3e-3, footprint: 3.0 };
 }
 
 /// What a table is to hold: lobes of `model`, widths on `knots`.
