@@ -101,6 +101,8 @@ def main():
     parser.add_argument("--only", nargs="*", default=[])
     options = parser.parse_args()
     options.work.mkdir(parents=True, exist_ok=True)
+    begin, end = "<!-- tables: real_materials.py -->", "<!-- end of tables -->"
+    before, after = DOCUMENT.read_text().split(begin)[0], DOCUMENT.read_text().split(end)[1]
 
     cases = [(m, p) for p in PROBES for m in MATERIALS if not options.only or f"{m}-{p}" in options.only]
     rows, comparison, lines = {model: [] for model in MODELS}, [], []
@@ -121,12 +123,13 @@ def main():
     parts = [f"### {m}\n\n" + table(scores.format("alpha" if m == "ggx" else "m"), rows[m]) for m in MODELS]
     header = "| case | smallest ratio | largest ratio | evaluations, least squares | evaluations, pattern |"
     parts.append("### Cost of pattern search over that of least squares (ggx, 21 gammas)\n\n" + table(header, comparison))
-    begin, end = "<!-- tables: real_materials.py -->", "<!-- end of tables -->"
-    text = DOCUMENT.read_text()
-    before, after = text.split(begin)[0], text.split(end)[1]
-    DOCUMENT.write_text(f"{before}{begin}\n\n" + "\n\n".join(parts) + f"\n\n{end}{after}")
     names = "material,probe,model,gamma,cost,cssim,cssim_object,evaluations,width"
-    CSV.write_text("\n".join([names, *(",".join(map(str, line)) for line in lines)]) + "\n")
+    text = "\n".join([names, *(",".join(map(str, line)) for line in lines)]) + "\n"
+    if options.only:
+        print("\n\n".join(parts))
+        return
+    CSV.write_text(text)
+    DOCUMENT.write_text(f"{before}{begin}\n\n" + "\n\n".join(parts) + f"\n\n{end}{after}")
 
 
 if __name__ == "__main__":

@@ -19,8 +19,8 @@ pub struct Limits {
     /// The longest frame a worker may send, in bytes, checked before anything is allocated (default, and at most,
     /// [`MAX_FRAME_BYTES`]: 2 MiB).
     pub frame_bytes: usize,
-    /// How many blobs a worker may have asked for without having taken them (default 65536: it has a few leases with at most 4096
-    /// inputs each). What waits are references; a blob's bytes are in memory once.
+    /// How many blobs a worker may have asked for without having taken them (default 65536: sixteen leases of the 4096 inputs that a
+    /// node may have; those of a fit have dozens). What waits are references; a blob's bytes are in memory once.
     pub pending_blobs: usize,
     /// How long a worker may take to close its end after the coordinator's last word (default 2 s).
     pub farewell_time: Duration,

@@ -173,7 +173,7 @@ fn settle(core: &mut Core, planner: &mut impl Planner, now: Duration, outbox: &m
 
 /// What the planner says of an output, with the name of whom it came from where that one did wrong.
 fn refused(core: &mut Core, node: NodeId, error: PlanError) -> RunError {
-    if !matches!(error, PlanError::NotVerified { .. }) {
+    if !matches!(error, PlanError::NotVerified { .. } | PlanError::WrongOutput { .. }) {
         return RunError::Plan(error);
     }
     let site = core.record(node).and_then(|record| record.finished_by).unwrap_or(Site::Coordinator);

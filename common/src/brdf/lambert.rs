@@ -30,7 +30,6 @@ impl Lobe for Lambert {
 }
 
 #[inline(always)]
-fn kernel(angles: &Angles, spread: &Spread, _width: f64) -> f64 {
-    // The mean vector of directions spread around their centroid is shorter than 1 by half the mean square chord: exact.
-    FRAC_1_PI * angles.cos_i.max(0.0) * (1.0 - 0.5 * spread.light2)
+fn kernel(angles: &Angles, _spread: &Spread, _width: f64) -> f64 {
+    FRAC_1_PI * angles.cos_i.max(0.0)
 }

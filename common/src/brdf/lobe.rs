@@ -24,14 +24,12 @@ pub struct Incident {
     pub spread: Spread,
 }
 
-/// What the spread of light around its mean direction does to the angles.
+/// What the spread of light around its mean direction does to the half vector's angle; `n.l` is that of the mean already.
 ///
 /// With `u = sin^2(th)`, `th` the angle between half vector and normal, a lobe of distribution `D(u)` has the mean `D + D' du +
 /// D''/2 du2`: to second order in the spread, so that a quadrature needs fewer directions.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Spread {
-    /// Mean square distance of the light from its mean direction, as a chord of the unit sphere.
-    pub light2: f64,
     /// Mean change of `sin^2(th)`.
     pub du: f64,
     /// Mean square change of `sin^2(th)`.

@@ -11,7 +11,10 @@ mod verify;
 
 pub use limits::FitError;
 
-use self::{limits::check_sizes, verify::SubsetTables};
+use self::{
+    limits::check_sizes,
+    verify::{Shard, SubsetTables},
+};
 use super::{
     BestScore, Candidate, Judged, JudgedBy, Method, Objective, Polished, SearchKind, Start,
     method::AtZero,
@@ -91,6 +94,8 @@ pub struct FitPlanner {
     environment: Option<BlobHash>,
     view: Option<BlobHash>,
     searches: BTreeMap<NodeId, usize>,
+    /// The parts of tables that have not come yet.
+    shards: BTreeMap<NodeId, Shard>,
     /// A search of every subset: it names the subset's table.
     search_of_subset: Vec<NodeId>,
     tables_of_subsets: SubsetTables,
@@ -153,6 +158,7 @@ impl FitPlanner {
             extra_gammas: Vec::new(),
             environment: None,
             view: None,
+            shards: BTreeMap::new(),
             searches: BTreeMap::new(),
             search_of_subset: Vec::new(),
             tables_of_subsets: SubsetTables::default(),
@@ -200,7 +206,7 @@ impl FitPlanner {
 
     /// Adds the shards of a table of `count` pixels of the list `pixels`.
     fn add_transport(
-        &self,
+        &mut self,
         graph: &mut GraphEdit<'_>,
         what: &str,
         pixels: (BlobHash, usize, usize),
@@ -208,7 +214,8 @@ impl FitPlanner {
         accuracy: Accuracy,
     ) -> Result<Vec<Input>, PlanError> {
         let (list, count, shard) = pixels;
-        let geometry = self.capture.geometry();
+        let capture = Arc::clone(&self.capture);
+        let geometry = capture.geometry();
         let environment = self.environment.ok_or_else(|| PlanError::new("the environment was not added"))?;
         let mut inputs = vec![Input::Blob(environment), Input::Blob(list)];
         if let Some(map) = geometry.normal_map() {
@@ -232,7 +239,9 @@ impl FitPlanner {
                 inputs: inputs.clone(),
                 placement: Placement::Worker,
             };
-            shards.push(Input::OutputOf(graph.add_node(spec)?));
+            let node = graph.add_node(spec)?;
+            self.shards.insert(node, Shard { pixels: range.1 as usize, knots });
+            shards.push(Input::OutputOf(node));
         }
         Ok(shards)
     }
@@ -336,14 +345,12 @@ impl FitPlanner {
     ) -> Result<Candidate, PlanError> {
         let candidate = read::<CandidateWire>("candidate", output)
             .and_then(|wire| wire.candidate(self.method.model))
-            .map_err(other)?;
+            .map_err(|failure| verify::wrong("a candidate", &failure))?;
         let gammas = &self.method.gammas;
         let asked = (gammas[place % gammas.len()], index(place / gammas.len()));
         if (candidate.gamma, candidate.subset) != asked {
             let found = (candidate.gamma, candidate.subset);
-            return Err(PlanError::new(format!(
-                "expected the candidate of gamma and subset {asked:?}, found {found:?}"
-            )));
+            return Err(verify::wrong(format!("the candidate of gamma and subset {asked:?}"), &format!("{found:?}")));
         }
         let (s, gammas) = (place / gammas.len(), gammas.len());
         self.with_objective(&candidate, graph, |objective| verify::check_cost(&candidate, objective))??;
@@ -511,6 +518,9 @@ impl Planner for FitPlanner {
     }
 
     fn completed(&mut self, node: NodeId, output: &Blob, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
+        if let Some(shard) = self.shards.remove(&node) {
+            return verify::check_shard(self.method.model, shard, output);
+        }
         if let Some(place) = self.searches.remove(&node) {
             let candidate = self.checked_candidate(place, output, graph)?;
             self.candidates.insert(place, candidate);

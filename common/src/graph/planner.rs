@@ -131,6 +131,14 @@ pub enum PlanError {
         /// The number that was computed again.
         recomputed: f64,
     },
+    /// An output is not one of its node: it does not decode, or is of another shape, or holds values that cannot be.
+    #[error("expected {expected}, found {found}")]
+    WrongOutput {
+        /// What the node was asked for.
+        expected: String,
+        /// What its output is.
+        found: String,
+    },
     /// The planner's own error: an output is not what it should be.
     #[error("{message}")]
     Unusable {

@@ -36,15 +36,17 @@ pub(super) fn seen_from(node: &Node, point: &Point) -> Option<(Angles, Spread)> 
 
     let mut angles = Angles::new(point.normal, centroid, point.view);
     let (normal, view) = (flat(point.normal), flat(point.view));
+    let light2 = a + c;
     if cos_i < radius {
-        angles.cos_i = above_horizon(cos_i, form(normal, normal));
+        angles.cos_i = above_horizon(cos_i, form(normal, normal), radius);
         if angles.cos_i <= 0.0 {
             return None;
         }
     }
-    let light2 = a + c;
-    // `h` and `q` in the tangent plane; the centroid has no part there.
-    let length = 2.0 * angles.cos_d.max(f64::MIN_POSITIVE);
+    // The mean vector of directions spread around their centroid is shorter than 1 by half the mean square chord: exact.
+    angles.cos_i *= 1.0 - 0.5 * light2;
+    // `h` and `q` in the tangent plane; the centroid has no part there. Light straight from behind has no half vector.
+    let length = 2.0 * angles.cos_d.max(1e-9);
     let half = (view.0 / length, view.1 / length);
     let offset = (normal.0 - angles.cos_h * half.0, normal.1 - angles.cos_h * half.1);
     let scale = 0.5 / angles.cos_d.max(LEAST_COS_D);
@@ -54,13 +56,14 @@ pub(super) fn seen_from(node: &Node, point: &Point) -> Option<(Angles, Spread)> 
     let bend = 0.5 * (cos_i - angles.cos_h * angles.cos_d) * light2 * scale + form(offset, half) * scale2;
     let cos2 = 1.0 - angles.sin2_h;
     let du = 2.0 * angles.cos_h * bend + cos2 * step2 - along2;
-    Some((angles, Spread { light2, du, du2: 4.0 * cos2 * along2 }))
+    Some((angles, Spread { du, du2: 4.0 * cos2 * along2 }))
 }
 
-/// Mean of `max(0, n.l)` of light of mean cosine `cos_i` and variance `variance`, taken as spread evenly: every lobe vanishes linearly
-/// at the horizon, and a node that it cuts would else count fully or not at all.
-fn above_horizon(cos_i: f64, variance: f64) -> f64 {
-    let reach = (3.0 * variance).sqrt();
+/// Mean of `max(0, n.l)` of light of mean cosine `cos_i` and variance `variance`, taken as spread evenly, no farther than `radius`: every
+/// lobe vanishes linearly at the horizon, and a node that it cuts would else count fully or not at all.
+fn above_horizon(cos_i: f64, variance: f64, radius: f64) -> f64 {
+    // A variance that is none may be rounded below 0.
+    let reach = (3.0 * variance.max(0.0)).sqrt().min(radius);
     if cos_i >= reach {
         cos_i
     } else if cos_i <= -reach {

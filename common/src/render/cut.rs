@@ -1,9 +1,9 @@
 //! The cut through the light pyramid for one surface point: as few nodes as the lobes allow.
 //!
-//! Taking a node as a point at its energy centroid leaves a second-order error, `1/2 tr(H S)`, with `H` the Hessian of
-//! `f cos` and `S` the energy's covariance over the node. A node is split while that error, bounded from above over
-//! the node and over the widths of a [`Band`], exceeds the tolerance; then most of it is taken away (in `render/blur.rs`). Nothing is random: neighbouring pixels get neighbouring
-//! cuts, and the error is smooth instead of noise.
+//! Taking a node as a point at its energy centroid leaves a second-order error, `1/2 tr(H S)`, with `H` the Hessian of `f cos` and `S`
+//! the energy's covariance over the node. A node is split while that error, bounded from above over the node and over the widths of
+//! a [`Band`], exceeds the tolerance; then most of it is taken away (in `render/blur.rs`). Nothing is random: neighbouring pixels get
+//! neighbouring cuts, and the error is smooth instead of noise.
 
 use super::{
     blur::{LEAST_COS_D, seen_from},
@@ -64,9 +64,8 @@ pub struct Cut {
 }
 
 impl Cut {
-    /// Refines the pyramid until no node's error in radiance, for a lobe of unit weight, exceeds `tolerance` (for glossy lobes
-    /// `tolerance` times `n.v`) at any surface point
-    /// whose normal and view lie within `reach` (chords of the unit sphere, added) of those of `point`; `point.cos_o` is the lowest
+    /// Refines the pyramid until no node's error in radiance, for a lobe of unit weight, exceeds `tolerance` (for glossy lobes times
+    /// `n.v`, and less for wide ones) at any surface point whose normal and view lie within `reach` (chords of the unit sphere, added) of those of `point`; `point.cos_o` is the lowest
     /// of them.
     pub fn refine(&mut self, pyramid: &LightPyramid, point: &Point, reach: f64, band: Band, tolerance: f64) {
         let bound = Bound::new(point, reach, band);
@@ -74,7 +73,7 @@ impl Cut {
         // the same tolerance everywhere its relative error would be twenty times that of the lobe.
         let tolerance = match band {
             Band::Diffuse => tolerance,
-            Band::Glossy(..) => tolerance * point.cos_o.max(LEAST_COS_D),
+            Band::Glossy(sharpest, _) => tolerance * point.cos_o.max(LEAST_COS_D) * (EVEN / sharpest).min(1.0),
         };
         self.nodes.clear();
         self.stack.clear();
@@ -191,6 +190,10 @@ const DIFFUSE_CARE: f64 = 6.0;
 /// Curvature, in units of the distribution, of what multiplies it: Fresnel's term, masking-shadowing, the cosine. Wide lobes are no
 /// smoother than that.
 const SLOW_FACTORS: f64 = 4.0;
+
+/// Of lobes wider than this the second-order terms leave as much as they take, as what multiplies the distribution varies as much; they
+/// need few nodes and get a tighter tolerance.
+const EVEN: f64 = 0.1;
 
 /// Share of a node's size by which a kink at the horizon can shift its value.
 const KINK: f64 = 0.1;

@@ -178,9 +178,10 @@ fn quadrant(environment: &Environment, v: f64, u: f64, size: [f64; 2]) -> Node {
     let spread = outer(east, east) * (width * width * (1.0 / 12.0 - s * s))
         + outer(south, south) * (dtheta * dtheta * (1.0 / 12.0 - t * t))
         + (outer(east, south) + outer(south, east)) * mixed;
-    // Rows widen towards the equator: take the wider edge; the centroid lies within a sixth of the sides of the middle.
+    // Rows widen towards the equator: take the wider edge. The centroid lies within 2/9 of the sides of the middle (a quadrant at a
+    // pole, whose density grows away from it and towards a bright texel).
     let wider = width + dtheta * dphi;
-    let radius = (0.5 + 1.0 / 6.0) * (dtheta * dtheta + wider * wider).sqrt();
+    let radius = (0.5 + 2.0 / 9.0) * (dtheta * dtheta + wider * wider).sqrt();
     Node::new(narrow(radiance * solid_angle), centroid, spread, radius)
 }
 

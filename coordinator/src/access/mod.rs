@@ -182,12 +182,13 @@ impl Credentials {
     }
 
     fn write_with(&self, path: &Path, write: impl Fn(&Path, &[u8]) -> io::Result<()>) -> Result<(), CredentialsError> {
-        for (path, content) in
-            [(key_path(path), self.identity.to_pem()), (path.to_owned(), self.access.to_json().as_str())]
-        {
-            write(&path, content.as_bytes()).map_err(|source| CredentialsError::Write { path, source })?;
-        }
-        Ok(())
+        let put = |path: &Path, content: &str| {
+            write(path, content.as_bytes()).map_err(|source| CredentialsError::Write { path: path.to_owned(), source })
+        };
+        let key = key_path(path);
+        put(&key, self.identity.to_pem())?;
+        // A key without its access file would only be in the way.
+        put(path, self.access.to_json().as_str()).inspect_err(|_| drop(std::fs::remove_file(&key)))
     }
 }
 

@@ -94,7 +94,7 @@ pub enum RunError {
         /// The second output.
         second: BlobHash,
     },
-    /// A result is not what its recomputation gives.
+    /// A result is not what its node or its recomputation gives.
     #[error(
         "the result of {name} from {site} is wrong: {error}; use the same build everywhere, check the memory of that machine, and report this"
     )]

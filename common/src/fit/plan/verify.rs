@@ -1,4 +1,5 @@
-//! Trust in the searches of workers: the cost of every candidate is computed again, here, on the table that its search read
+//! Trust in what workers return. A shard of a transport table has to be of the shape that was asked for, with finite values (whether they
+//! are right, only another computation can tell). The cost of every candidate is computed again, here, on the table that its search read
 //! (design section 8). The cost is a pure function of the table and the parameters, so it has to be the same to the bit; one
 //! evaluation costs a thousandth of a search.
 
@@ -10,10 +11,13 @@ use crate::{
         nodes::joined,
         wire::{TableWire, read},
     },
-    graph::{GraphEdit, Input, NodeId, PlanError},
-    render::table::TransportTable,
+    graph::{Blob, GraphEdit, Input, NodeId, PlanError},
+    render::{knots::Knots, table::TransportTable},
 };
-use std::collections::{BTreeMap, btree_map::Entry};
+use std::{
+    collections::{BTreeMap, btree_map::Entry},
+    fmt::Display,
+};
 
 /// The decoded tables of pixel subsets, by the number of the subset.
 #[derive(Debug, Default)]
@@ -51,6 +55,39 @@ fn table_of(model: &dyn Model, search: NodeId, graph: &GraphEdit<'_>) -> Result<
     };
     let shards = inputs.iter().skip(1).map(shard).collect::<Result<Vec<_>, _>>()?;
     joined(model, &shards.iter().collect::<Vec<_>>()).map_err(other)
+}
+
+/// A part of a transport table, as it was asked for.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Shard {
+    /// How many pixels.
+    pub(super) pixels: usize,
+    /// The grid of widths.
+    pub(super) knots: Knots,
+}
+
+/// Refuses a part of a transport table that is not the one that was asked for.
+pub(super) fn check_shard(model: &dyn Model, asked: Shard, output: &Blob) -> Result<(), PlanError> {
+    let of_model = || format!("a transport table of {}", model.name());
+    let table = read::<TableWire>("transport table", output)
+        .and_then(TableWire::table)
+        .and_then(|table| joined(model, &[&table]))
+        .map_err(|failure| wrong(of_model(), &failure))?;
+    if table.pixels != asked.pixels {
+        return Err(wrong(format!("{} pixels", asked.pixels), &table.pixels));
+    }
+    if let Some(other) = table.lobes.iter().filter_map(|lobe| lobe.knots).find(|knots| *knots != asked.knots) {
+        return Err(wrong(format!("widths on {:?}", asked.knots), &format!("{other:?}")));
+    }
+    match table.lobes.iter().flat_map(|lobe| &lobe.values).find(|value| !value.is_finite()) {
+        Some(value) => Err(wrong("finite radiance", value)),
+        None => Ok(()),
+    }
+}
+
+/// The output of a worker is not one of its node.
+pub(super) fn wrong(expected: impl Into<String>, found: &dyn Display) -> PlanError {
+    PlanError::WrongOutput { expected: expected.into(), found: found.to_string() }
 }
 
 fn missing() -> PlanError {

@@ -3,11 +3,12 @@
 use super::scene::{Bench, capture, method};
 use crate::{
     fit::{
-        Candidate, FitPlanner,
-        wire::{CandidateWire, read, write},
+        Candidate, FitPlanner, nodes,
+        wire::{CandidateWire, TableWire, read, write},
     },
     graph::{Blob, NodeSpec, PlanError},
     math::{cell, sampling},
+    render::{knots::Knots, table::TransportTable},
     scene::Capture,
 };
 use std::sync::{Arc, OnceLock};
@@ -67,6 +68,37 @@ fn a_search_result_with_other_parameters_and_the_old_cost_is_refused() {
     let (_, claimed, recomputed) = refusal(|c| c.parameters[0] += 1e-3).unwrap();
     assert!(recomputed > claimed, "a minimum was claimed: {claimed} {recomputed}");
     assert_eq!(refusal(|_| {}), None);
+}
+
+/// What the planner says when the first shard of the subset's table is changed.
+fn refused_shard(change: impl Fn(&mut TransportTable)) -> String {
+    let changed = |spec: &NodeSpec, output: Blob| {
+        if spec.kind != nodes::TRANSPORT {
+            return output;
+        }
+        let mut table = read::<TableWire>("transport table", &output).unwrap().table().unwrap();
+        change(&mut table);
+        Blob::new(write("transport table", &TableWire::of(table)).unwrap())
+    };
+    match Bench::default().run(planner(1), first, changed) {
+        Err(error @ PlanError::WrongOutput { .. }) => error.to_string(),
+        other => panic!("{:?}", other.map(|_| ())),
+    }
+}
+
+#[test]
+fn a_table_that_was_not_asked_for_is_refused() {
+    let said = refused_shard(|table| {
+        table.pixels -= 1;
+        for lobe in &mut table.lobes {
+            lobe.values.truncate(lobe.slices() * lobe.terms * 3 * table.pixels);
+        }
+    });
+    assert!(said.contains("pixels, found"), "{said}");
+    let said = refused_shard(|table| table.lobes[0].values[0] = f32::NAN);
+    assert!(said.contains("finite radiance, found NaN"), "{said}");
+    let said = refused_shard(|table| table.lobes[1].knots = Some(Knots::covering(0.01, 1.0, 6.9)));
+    assert!(said.contains("found"), "{said}");
 }
 
 #[test]

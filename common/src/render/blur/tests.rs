@@ -92,8 +92,21 @@ fn light_that_the_horizon_cuts_counts_as_far_as_it_is_above() {
         let n = 1000;
         let spread = |k: i32| cos_i + 0.1 * ((f64::from(k) + 0.5) / f64::from(n) - 0.5);
         let mean = (0..n).map(|k| spread(k).max(0.0)).sum::<f64>() / f64::from(n);
-        let found = above_horizon(cos_i, 0.01 / 12.0);
+        let found = above_horizon(cos_i, 0.01 / 12.0, 0.1);
         assert!((found - mean).abs() < 1e-6, "{cos_i}: {found} {mean}");
+    }
+}
+
+#[test]
+fn light_on_a_line_or_from_straight_behind_is_still_a_number() {
+    let point = points()[2];
+    let frame = Frame::from_normal(-point.view);
+    for (covariance, radius) in [([1e-4, 0.0, -1e-12], 0.03), ([-1e-12, 0.0, 1e-4], 0.03), ([0.0; 3], 0.0)] {
+        for centroid in [-point.view, -point.normal, frame.tangent, frame.bitangent, point.view] {
+            let node = Node { energy: [1.0; 3], centroid: crate::math::narrow(centroid), covariance, radius };
+            let Some((angles, spread)) = seen_from(&node, &point) else { continue };
+            assert!([angles.cos_i, angles.cos_h, spread.du, spread.du2].iter().all(|x| x.is_finite()), "{centroid}");
+        }
     }
 }
 
