@@ -3,10 +3,9 @@
 
 Usage: real_materials.py --data DIR --make-merl make_merl.py [--lookalike PROGRAM] [--work DIR] [--only MATERIAL-PROBE ...]
 
-Renders four measured materials under three light probes (photos that are there already are kept), fits each with two models,
-and once more with pattern search, and writes docs/real-materials.csv (every candidate) and the tables of docs/real-materials.md (between its markers).
-Needs Python 3.10 and, for make_merl.py, numpy. About two CPU hours, nearly all of it for the photos: their noise has to be
-small against what is measured.
+Renders four measured materials under three light probes (photos that are there already are kept), fits each with the models
+(--models; with --pattern once more with pattern search), and writes docs/real-materials.csv (every candidate) and the tables of docs/real-materials.md (between its markers).
+Needs Python 3.10 and, for make_merl.py, numpy. About an hour on two cores.
 """
 import argparse
 import json
@@ -98,6 +97,8 @@ def main():
     parser.add_argument("--make-merl", type=pathlib.Path, required=True)
     parser.add_argument("--lookalike", type=pathlib.Path, default=ROOT / "target/release/lookalike")
     parser.add_argument("--work", type=pathlib.Path, default=ROOT / "target/real-materials")
+    parser.add_argument("--models", nargs="*", default=MODELS)
+    parser.add_argument("--pattern", action="store_true", help="also compare the searches (long)")
     parser.add_argument("--only", nargs="*", default=[])
     options = parser.parse_args()
     options.work.mkdir(parents=True, exist_ok=True)
@@ -105,24 +106,26 @@ def main():
     before, after = DOCUMENT.read_text().split(begin)[0], DOCUMENT.read_text().split(end)[1]
 
     cases = [(m, p) for p in PROBES for m in MATERIALS if not options.only or f"{m}-{p}" in options.only]
-    rows, comparison, lines = {model: [] for model in MODELS}, [], []
+    rows, comparison, lines = {model: [] for model in options.models}, [], []
     for material, probe in cases:
         _, noise = photo(options, material, probe)
         case = f"{material}, {PROBES[probe][0]}"
-        for model in MODELS:
+        for model in options.models:
             result = fit(options, material, probe, model)
             rows[model].append(row_of_scores(case, noise, result))
             for c in result["candidates"]:
                 numbers = [c["gamma"], *(f"{c[name]:.6g}" for name in ("cost", "cssim", "cssim_object")), c["evaluations"]]
                 lines.append([material, probe, model, *numbers, f"{width(c['parameters']):.5g}"])
-        pattern = fit(options, material, probe, "ggx", "--search=pattern", "--polish=off")
-        comparison.append(f"| {case} | {costs(fit(options, material, probe, 'ggx'), pattern)} |")
-        print(rows["ggx"][-1], flush=True)
+        if options.pattern:
+            pattern = fit(options, material, probe, "ggx", "--search=pattern", "--polish=off")
+            comparison.append(f"| {case} | {costs(fit(options, material, probe, 'ggx'), pattern)} |")
+        print(rows[options.models[0]][-1], flush=True)
 
     scores = "| case | noise | CSSIM at 1 | at 2 | at 3 | winning gamma | its CSSIM | below gamma 1 | polished | gain | {0} of the winner | {0} polished |"
-    parts = [f"### {m}\n\n" + table(scores.format("alpha" if m == "ggx" else "m"), rows[m]) for m in MODELS]
+    parts = [f"### {m}\n\n" + table(scores.format("alpha" if m == "ggx" else "m"), rows[m]) for m in options.models]
     header = "| case | smallest ratio | largest ratio | evaluations, least squares | evaluations, pattern |"
-    parts.append("### Cost of pattern search over that of least squares (ggx, 21 gammas)\n\n" + table(header, comparison))
+    if options.pattern:
+        parts.append("### Cost of pattern search over that of least squares (ggx, 21 gammas)\n\n" + table(header, comparison))
     names = "material,probe,model,gamma,cost,cssim,cssim_object,evaluations,width"
     text = "\n".join([names, *(",".join(map(str, line)) for line in lines)]) + "\n"
     if options.only:

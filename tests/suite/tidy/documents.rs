@@ -6,8 +6,15 @@ use super::{
 };
 use std::{collections::BTreeSet, fs, process::Command};
 
-const DOCUMENTS: [&str; 6] =
-    ["README.md", "ARCHITECTURE.md", "CONTRIBUTING.md", "CHANGELOG.md", "docs/design.md", "docs/security.md"];
+const DOCUMENTS: [&str; 7] = [
+    "README.md",
+    "ARCHITECTURE.md",
+    "CONTRIBUTING.md",
+    "CHANGELOG.md",
+    "docs/design.md",
+    "docs/real-materials.md",
+    "docs/security.md",
+];
 const FOLDERS: [&str; 8] = ["common/", "coordinator/", "docs/", "fuzz/", "tests/", "worker/", ".ci/", "experiments/"];
 
 /// A document without its HTML comments.
