@@ -16,6 +16,7 @@ mod hostile;
 mod network;
 mod physics;
 mod program;
+#[cfg(feature = "slow")]
 mod recovery;
 mod render;
 mod tidy;
