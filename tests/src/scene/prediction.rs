@@ -42,7 +42,7 @@ impl Prediction {
             for (p, w) in photo.subset.weights.iter().enumerate() {
                 let (_, slope) = compression.apply_with_slope(radiance[channel][p]);
                 let row: Vec<f64> = derivatives.iter().map(|d| slope * d[channel][p]).collect();
-                let variance = slope * slope * photo.variance[p][channel];
+                let variance = slope * slope * photo.variance;
                 for (a, b) in (0..k).flat_map(|a| (0..k).map(move |b| (a, b))) {
                     bread[a * k + b] += w * row[a] * row[b];
                     meat[a * k + b] += w * w * variance * row[a] * row[b];
