@@ -123,5 +123,5 @@ impl Planner for TestPlanner {
 }
 
 fn node(kind: &str, label: &str, parameters: Vec<u8>, inputs: Vec<Input>) -> NodeSpec {
-    NodeSpec { kind: kind.into(), label: label.into(), parameters, inputs, placement: Placement::Worker }
+    NodeSpec { kind: kind.into(), label: label.into(), parameters, inputs, placement: Placement::Worker, priority: 0 }
 }

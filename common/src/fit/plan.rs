@@ -238,6 +238,7 @@ impl FitPlanner {
                 parameters: encode("parameters", &parameters)?,
                 inputs: inputs.clone(),
                 placement: Placement::Worker,
+                priority: 0,
             };
             let node = graph.add_node(spec)?;
             self.shards.insert(node, Shard { pixels: range.1 as usize, knots });
@@ -275,6 +276,7 @@ impl FitPlanner {
                     parameters: encode("parameters", &parameters)?,
                     inputs: inputs.clone(),
                     placement: Placement::Worker,
+                    priority: 0,
                 })?;
                 self.searches.insert(node, s * self.method.gammas.len() + g);
                 if g == 0 {
@@ -306,6 +308,7 @@ impl FitPlanner {
             parameters: encode("parameters", parameters)?,
             inputs,
             placement: Placement::Coordinator,
+            priority: 0,
         })
     }
 

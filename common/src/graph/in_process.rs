@@ -29,13 +29,16 @@ pub enum Execution {
 pub fn run_in_process<P: Planner>(mut planner: P, registry: &Registry, execution: Execution) -> Result<P, PlanError> {
     let mut graph = Graph::new();
     let decoded = Arc::new(DecodedCache::new(DECODED_BOUND_BYTES));
+    // By priority, then by number.
     let mut ready = BTreeSet::new();
     planner.start(&mut GraphEdit::new(&mut graph))?;
     loop {
         notify(&mut planner, &mut graph, &mut ready)?;
+        // Some may have been cancelled since they became ready.
+        let next = std::iter::from_fn(|| ready.pop_first()).map(|(_, node)| node).filter(|node| graph.is_open(*node));
         let chosen: Vec<NodeId> = match execution {
-            Execution::Sequential => ready.pop_first().into_iter().collect(),
-            Execution::Parallel => std::mem::take(&mut ready).into_iter().collect(),
+            Execution::Sequential => next.take(1).collect(),
+            Execution::Parallel => next.collect(),
         };
         if chosen.is_empty() {
             return Ok(planner);
@@ -56,11 +59,18 @@ pub fn run_in_process<P: Planner>(mut planner: P, registry: &Registry, execution
 }
 
 /// Tell the planner of all that happened, which may make more happen, and collect what became ready.
-fn notify<P: Planner>(planner: &mut P, graph: &mut Graph, ready: &mut BTreeSet<NodeId>) -> Result<(), PlanError> {
+fn notify<P: Planner>(
+    planner: &mut P,
+    graph: &mut Graph,
+    ready: &mut BTreeSet<(u32, NodeId)>,
+) -> Result<(), PlanError> {
     while let Some(change) = graph.next_change() {
         match change {
             Change::Added(_) => {}
-            Change::Ready(node) => _ = ready.insert(node),
+            Change::Ready(node) => {
+                let priority = graph.spec(node).map_or(0, |spec| spec.priority);
+                ready.insert((priority, node));
+            }
             Change::Completed(node) => {
                 if let Some(output) = graph.output(node).cloned() {
                     planner.completed(node, &output, &mut GraphEdit::new(graph))?;

@@ -11,6 +11,9 @@
 //!                            +---an input failed------+--failure--> Failed -------> Planner::failed
 //! ```
 //!
+//! A planner holds what it adds until it says that it needs it no more; what nobody holds or reads is let go, so that a run of
+//! hundreds of fits keeps only what is under way. [`Many`] planners can share a graph.
+//!
 //! What it is not: payloads are opaque here (no rendering, no parameters of a BRDF), and nothing knows of workers,
 //! leases, sockets or time. [`run_in_process`] runs a graph without any of these: it gives the result that every
 //! distributed run must reproduce bit for bit.
@@ -18,21 +21,28 @@
 mod blob;
 mod context;
 mod decoded;
+mod edit;
 mod in_process;
+mod many;
 mod node;
 mod planner;
 mod registry;
+mod sharing;
 mod state;
+mod store;
 
 pub use blob::{Blob, BlobHash, HashMismatch, MAX_BLOB_BYTES};
 pub use context::RunContext;
 pub use decoded::DecodedCache;
+pub use edit::GraphEdit;
 pub use in_process::{Execution, run_in_process};
+use many::part_label;
+pub use many::{MAX_PART_NAME_BYTES, Many, Next, Part, PartFailure, Parts, split_label};
 pub use node::{
     FailureReason, Input, MAX_INPUTS, MAX_NAME_BYTES, MAX_PARAMETER_BYTES, NodeFailure, NodeId, NodeSpec, Placement,
     WorkerId,
 };
-pub use planner::{GraphEdit, PlanError, Planner};
+pub use planner::{PlanError, Planner};
 pub use registry::{NodeType, Registry};
 pub use state::{Change, Completion, Graph, NodeState};
 

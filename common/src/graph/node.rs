@@ -15,7 +15,7 @@ pub const MAX_PARAMETER_BYTES: usize = 1 << 20;
 /// The most inputs of one node.
 pub const MAX_INPUTS: usize = 4096;
 
-/// A node of a graph, numbered from 0 in the order of addition, which is also its priority: earlier nodes run first.
+/// A node of a graph, numbered from 0 in the order of addition. Of nodes of one priority, earlier ones run first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct NodeId(pub u64);
 
@@ -53,6 +53,17 @@ pub enum Input {
     OutputOf(NodeId),
 }
 
+impl Input {
+    /// The node whose output it is.
+    #[must_use]
+    pub fn node(&self) -> Option<NodeId> {
+        match *self {
+            Self::OutputOf(node) => Some(node),
+            Self::Blob(_) => None,
+        }
+    }
+}
+
 /// The description of a node, as a planner gives it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct NodeSpec {
@@ -66,6 +77,9 @@ pub struct NodeSpec {
     pub inputs: Vec<Input>,
     /// Where it runs.
     pub placement: Placement,
+    /// Of the nodes that are ready, those of the lowest number run first, and of these the ones that were added first. Reaches no
+    /// result. In a run of [`Many`](super::Many) planners it is the number of the part.
+    pub priority: u32,
 }
 
 /// Why a node gave no output. Nodes are pure functions, so it is never retried.
@@ -95,6 +109,14 @@ pub enum NodeFailure {
     /// The node noticed that nobody wants its output any more and gave up. Not a failure of the run.
     #[error("cancelled: its output is not wanted any more")]
     Cancelled,
+}
+
+impl FailureReason {
+    /// Whether nothing went wrong: nobody wanted its output any more.
+    #[must_use]
+    pub fn is_cancellation(&self) -> bool {
+        matches!(self, Self::Node(NodeFailure::Cancelled))
+    }
 }
 
 impl NodeFailure {

@@ -4,7 +4,7 @@ use std::error::Error as StdError;
 
 use thiserror::Error;
 
-use super::{Blob, BlobHash, FailureReason, Graph, NodeId, NodeSpec};
+use super::{Blob, BlobHash, FailureReason, GraphEdit, NodeId};
 
 /// Decides which nodes a run has. The run ends when no node is open.
 ///
@@ -31,53 +31,6 @@ pub trait Planner {
     fn failed(&mut self, node: NodeId, reason: &FailureReason, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
         let (kind, label) = graph.spec(node).map(|spec| (spec.kind.clone(), spec.label.clone())).unwrap_or_default();
         Err(PlanError::NodeFailed { kind, label, reason: reason.clone() })
-    }
-}
-
-/// What a planner may do to a graph: add to it and read from it.
-#[derive(Debug)]
-pub struct GraphEdit<'graph> {
-    graph: &'graph mut Graph,
-}
-
-impl<'graph> GraphEdit<'graph> {
-    /// Let a planner edit `graph`.
-    pub fn new(graph: &'graph mut Graph) -> Self {
-        Self { graph }
-    }
-
-    /// Keep a blob, so that nodes can name it as an input.
-    ///
-    /// # Errors
-    /// When it is longer than [`MAX_BLOB_BYTES`](super::MAX_BLOB_BYTES).
-    pub fn add_blob(&mut self, bytes: Vec<u8>) -> Result<BlobHash, PlanError> {
-        self.graph.add_blob(bytes)
-    }
-
-    /// Add a node; nodes that are added earlier run earlier.
-    ///
-    /// # Errors
-    /// When an input is unknown or a size limit is passed.
-    pub fn add_node(&mut self, spec: NodeSpec) -> Result<NodeId, PlanError> {
-        self.graph.add_node(spec)
-    }
-
-    /// The description of a node.
-    #[must_use]
-    pub fn spec(&self, node: NodeId) -> Option<&NodeSpec> {
-        self.graph.spec(node)
-    }
-
-    /// The output of a completed node.
-    #[must_use]
-    pub fn output(&self, node: NodeId) -> Option<&Blob> {
-        self.graph.output(node)
-    }
-
-    /// A blob by its name.
-    #[must_use]
-    pub fn blob(&self, hash: BlobHash) -> Option<&Blob> {
-        self.graph.blob(hash)
     }
 }
 
@@ -109,6 +62,16 @@ pub enum PlanError {
         /// The label of the new node.
         label: String,
         /// The missing node.
+        node: NodeId,
+    },
+    /// A node names an input node whose output was released.
+    #[error(
+        "{label:?} wants the output of {node}, which was released; release a node after the last one that reads it was added"
+    )]
+    Released {
+        /// The label of the new node.
+        label: String,
+        /// The node without an output.
         node: NodeId,
     },
     /// Something is too large to be sent.

@@ -1,13 +1,16 @@
 //! The graph itself: nodes, their states, the blobs, and the changes that its owner has not yet looked at.
 //!
+//! A node is *held* by whoever added it until it is released, and so is a blob. What nobody holds is not kept: an output or a blob
+//! goes with the last open node that reads it, an open node is cancelled with the last open node that waits for it.
+//!
 //! Inputs can only name nodes that exist, so the graph has no cycles by construction and drains by itself: as long as a
 //! node is open, some node is ready.
 
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::VecDeque;
 
 use super::{
-    Blob, BlobHash, FailureReason, Input, MAX_BLOB_BYTES, MAX_INPUTS, MAX_NAME_BYTES, MAX_PARAMETER_BYTES, NodeId,
-    NodeSpec, PlanError,
+    Blob, BlobHash, FailureReason, Input, MAX_BLOB_BYTES, MAX_INPUTS, MAX_NAME_BYTES, MAX_PARAMETER_BYTES, NodeFailure,
+    NodeId, NodeSpec, Placement, PlanError, store::BlobStore,
 };
 
 /// Where a node is on its way.
@@ -56,9 +59,10 @@ pub enum Completion {
 #[derive(Debug, Default)]
 pub struct Graph {
     nodes: Vec<Node>,
-    blobs: BTreeMap<BlobHash, Blob>,
+    blobs: BlobStore,
     changes: VecDeque<Change>,
     open: usize,
+    ready_for_workers: usize,
 }
 
 #[derive(Debug)]
@@ -67,6 +71,8 @@ struct Node {
     state: NodeState,
     awaited_inputs: usize,
     dependents: Vec<NodeId>,
+    /// How many hold the node: each may read its output or add nodes that read it.
+    holders: usize,
 }
 
 impl Graph {
@@ -76,55 +82,150 @@ impl Graph {
         Self::default()
     }
 
-    /// Keep a blob, so that nodes can name it as an input. Equal bytes are kept once.
+    /// Keep a blob until it is released, so that nodes can name it as an input. Equal bytes are kept once, and released as often
+    /// as they were added.
     ///
     /// # Errors
     /// When it is longer than [`MAX_BLOB_BYTES`].
     pub fn add_blob(&mut self, bytes: Vec<u8>) -> Result<BlobHash, PlanError> {
-        check_limit("blob", bytes.len(), MAX_BLOB_BYTES)?;
-        Ok(self.keep(Blob::new(bytes)))
+        self.add(Blob::new(bytes))
     }
 
-    /// Add a node. It is ready at once if its inputs are there, and failed at once if one of them has failed.
+    /// Keep a blob that was hashed before, as [`add_blob`](Self::add_blob) does.
     ///
     /// # Errors
-    /// When an input is unknown or a size limit is passed.
+    /// When it is longer than [`MAX_BLOB_BYTES`].
+    pub fn add(&mut self, blob: Blob) -> Result<BlobHash, PlanError> {
+        check_limit("blob", blob.len(), MAX_BLOB_BYTES)?;
+        let hash = blob.hash();
+        self.blobs.add(blob, 1);
+        Ok(hash)
+    }
+
+    /// Hold a blob that was added no more: once no open node reads it, it is let go.
+    pub fn release_blob(&mut self, hash: BlobHash) {
+        self.blobs.release(hash);
+    }
+
+    /// Add a node, and hold it. It is ready at once if its inputs are there, and failed at once if one of them has failed.
+    ///
+    /// # Errors
+    /// When an input is unknown or was released, or a size limit is passed.
     pub fn add_node(&mut self, spec: NodeSpec) -> Result<NodeId, PlanError> {
         check_limit("kind", spec.kind.len(), MAX_NAME_BYTES)?;
         check_limit("label", spec.label.len(), MAX_NAME_BYTES)?;
         check_limit("parameters", spec.parameters.len(), MAX_PARAMETER_BYTES)?;
         check_limit("inputs", spec.inputs.len(), MAX_INPUTS)?;
-        let mut failed_input = None;
-        let mut awaited = Vec::new();
-        for input in &spec.inputs {
-            match *input {
-                Input::Blob(hash) if !self.blobs.contains_key(&hash) => {
-                    return Err(PlanError::UnknownBlob { label: spec.label, hash });
-                }
-                Input::Blob(_) => {}
-                Input::OutputOf(source) => match self.state(source) {
-                    None => return Err(PlanError::UnknownInput { label: spec.label, node: source }),
-                    Some(NodeState::Failed(_)) => failed_input = failed_input.or(Some(source)),
-                    Some(NodeState::Completed(_)) => {}
-                    Some(NodeState::Waiting | NodeState::Ready) => awaited.push(source),
-                },
-            }
-        }
+        let (read, awaited, failed_input) = self.look_at_inputs(&spec)?;
         let node = NodeId(self.nodes.len() as u64);
         for source in &awaited {
             self.at_mut(*source).dependents.push(node);
         }
-        let state = if awaited.is_empty() { NodeState::Ready } else { NodeState::Waiting };
-        let is_ready = awaited.is_empty() && failed_input.is_none();
-        self.nodes.push(Node { spec, state, awaited_inputs: awaited.len(), dependents: Vec::new() });
+        for hash in read {
+            self.blobs.retain(hash);
+        }
+        let awaited_inputs = awaited.len();
+        self.nodes.push(Node { spec, state: NodeState::Waiting, awaited_inputs, dependents: Vec::new(), holders: 1 });
         self.open += 1;
         self.changes.push_back(Change::Added(node));
         if let Some(source) = failed_input {
             self.fail(node, self.input_failed(source));
-        } else if is_ready {
-            self.changes.push_back(Change::Ready(node));
+        } else if awaited_inputs == 0 {
+            self.make_ready(node);
         }
         Ok(node)
+    }
+
+    /// The blobs that a new node reads and that are there, the nodes it waits for, and an input that has failed.
+    fn look_at_inputs(&self, spec: &NodeSpec) -> Result<(Vec<BlobHash>, Vec<NodeId>, Option<NodeId>), PlanError> {
+        let label = || spec.label.clone();
+        let (mut read, mut awaited, mut failed) = (Vec::new(), Vec::new(), None);
+        for input in &spec.inputs {
+            match *input {
+                Input::Blob(hash) if self.blob(hash).is_none() => {
+                    return Err(PlanError::UnknownBlob { label: label(), hash });
+                }
+                Input::Blob(hash) => read.push(hash),
+                Input::OutputOf(source) => match self.state(source) {
+                    None => return Err(PlanError::UnknownInput { label: label(), node: source }),
+                    Some(NodeState::Failed(_)) => failed = failed.or(Some(source)),
+                    Some(NodeState::Completed(hash)) if self.blob(*hash).is_none() => {
+                        return Err(PlanError::Released { label: label(), node: source });
+                    }
+                    Some(NodeState::Completed(hash)) => read.push(*hash),
+                    Some(NodeState::Waiting | NodeState::Ready) => awaited.push(source),
+                },
+            }
+        }
+        Ok((read, awaited, failed))
+    }
+
+    /// Hold a node once more, unless it is too late: it has failed, or its output was let go. Whether it is held.
+    pub fn hold(&mut self, node: NodeId) -> bool {
+        let output = match self.state(node) {
+            Some(NodeState::Completed(hash)) if self.blob(*hash).is_some() => Some(*hash),
+            Some(NodeState::Waiting | NodeState::Ready) => None,
+            Some(NodeState::Completed(_) | NodeState::Failed(_)) | None => return false,
+        };
+        let held = self.at_mut(node);
+        held.holders += 1;
+        if let (1, Some(hash)) = (held.holders, output) {
+            self.blobs.retain(hash);
+        }
+        true
+    }
+
+    /// Hold a node once less. When nobody holds it any more, its output is let go once no open node reads it; an open node is
+    /// cancelled unless another open node waits for it.
+    pub fn release(&mut self, node: NodeId) {
+        let Some(held) = self.get_mut(node) else { return };
+        if held.holders == 0 {
+            return;
+        }
+        held.holders -= 1;
+        if let (0, NodeState::Completed(hash)) = (held.holders, &held.state) {
+            let hash = *hash;
+            self.blobs.release(hash);
+        }
+        if self.is_unwanted(node) {
+            self.fail(node, FailureReason::Node(NodeFailure::Cancelled));
+        }
+    }
+
+    /// Whether a node is open though nobody holds it and no open node waits for it.
+    fn is_unwanted(&self, node: NodeId) -> bool {
+        let is_awaited = |held: &Node| held.dependents.iter().any(|dependent| self.is_open(*dependent));
+        self.is_open(node) && self.get(node).is_some_and(|held| held.holders == 0 && !is_awaited(held))
+    }
+
+    fn make_ready(&mut self, node: NodeId) {
+        let waiting = self.at_mut(node);
+        waiting.state = NodeState::Ready;
+        self.ready_for_workers += usize::from(waiting.spec.placement == Placement::Worker);
+        self.changes.push_back(Change::Ready(node));
+    }
+
+    /// Close an open node: what it reads may go.
+    fn close(&mut self, node: NodeId, state: NodeState) {
+        let closed = self.at_mut(node);
+        let was_ready = closed.state == NodeState::Ready && closed.spec.placement == Placement::Worker;
+        closed.state = state;
+        self.open -= 1;
+        self.ready_for_workers -= usize::from(was_ready);
+        // The specification stays where it is while its inputs are looked at.
+        let inputs = std::mem::take(&mut self.at_mut(node).spec.inputs);
+        for input in &inputs {
+            match *input {
+                Input::Blob(hash) => self.blobs.release(hash),
+                Input::OutputOf(source) => {
+                    if let Some(NodeState::Completed(hash)) = self.state(source) {
+                        let hash = *hash;
+                        self.blobs.release(hash);
+                    }
+                }
+            }
+        }
+        self.at_mut(node).spec.inputs = inputs;
     }
 
     /// Hand in an output of a node. Any computation of a ready node will do: all of them are equal.
@@ -135,35 +236,46 @@ impl Graph {
             Some(NodeState::Completed(first)) => return Completion::Different { first: *first },
             Some(NodeState::Waiting | NodeState::Failed(_)) | None => return Completion::Refused,
         }
-        let hash = self.keep(output);
-        self.open -= 1;
-        self.changes.push_back(Change::Completed(node));
         let completed = self.at_mut(node);
-        completed.state = NodeState::Completed(hash);
-        for dependent in std::mem::take(&mut completed.dependents) {
+        let is_held = completed.holders > 0;
+        let dependents = std::mem::take(&mut completed.dependents);
+        let readers = dependents.iter().filter(|dependent| self.is_open(**dependent)).count();
+        let hash = output.hash();
+        self.blobs.add(output, readers + usize::from(is_held));
+        self.close(node, NodeState::Completed(hash));
+        self.changes.push_back(Change::Completed(node));
+        for dependent in dependents {
             let waiting = self.at_mut(dependent);
             waiting.awaited_inputs -= 1;
             if waiting.awaited_inputs == 0 && waiting.state == NodeState::Waiting {
-                waiting.state = NodeState::Ready;
-                self.changes.push_back(Change::Ready(dependent));
+                self.make_ready(dependent);
             }
         }
         Completion::Accepted
     }
 
-    /// Close an open node without an output, and with it every node that waits for it. Does nothing to a closed node.
+    /// Close an open node without an output, and with it every node that waits for it; what only they were waiting for and nobody
+    /// holds is cancelled. Does nothing to a closed node.
     pub fn fail(&mut self, node: NodeId, reason: FailureReason) {
         let mut failing = VecDeque::from([(node, reason)]);
-        while let Some((node, reason)) = failing.pop_front() {
-            if !self.is_open(node) {
-                continue;
+        // The inputs of what has failed.
+        let mut inputs = Vec::new();
+        loop {
+            while let Some((node, reason)) = failing.pop_front() {
+                if !self.is_open(node) {
+                    continue;
+                }
+                self.close(node, NodeState::Failed(reason));
+                self.changes.push_back(Change::Failed(node));
+                let failed = self.at_mut(node);
+                let dependents = std::mem::take(&mut failed.dependents);
+                inputs.extend(failed.spec.inputs.iter().filter_map(Input::node));
+                failing.extend(dependents.into_iter().map(|dependent| (dependent, self.input_failed(node))));
             }
-            let failed = self.at_mut(node);
-            failed.state = NodeState::Failed(reason);
-            let dependents = std::mem::take(&mut failed.dependents);
-            self.open -= 1;
-            self.changes.push_back(Change::Failed(node));
-            failing.extend(dependents.into_iter().map(|dependent| (dependent, self.input_failed(node))));
+            let Some(source) = inputs.pop() else { return };
+            if self.is_unwanted(source) {
+                failing.push_back((source, FailureReason::Node(NodeFailure::Cancelled)));
+            }
         }
     }
 
@@ -184,7 +296,7 @@ impl Graph {
         Some(&self.get(node)?.spec)
     }
 
-    /// The output of a completed node.
+    /// The output of a completed node, unless it was let go.
     #[must_use]
     pub fn output(&self, node: NodeId) -> Option<&Blob> {
         match self.state(node)? {
@@ -196,7 +308,7 @@ impl Graph {
     /// A blob by its name.
     #[must_use]
     pub fn blob(&self, hash: BlobHash) -> Option<&Blob> {
-        self.blobs.get(&hash)
+        self.blobs.get(hash)
     }
 
     /// The input blobs of a node, in the order of its specification; `None` while one of them is missing.
@@ -213,6 +325,18 @@ impl Graph {
     #[must_use]
     pub fn is_open(&self, node: NodeId) -> bool {
         matches!(self.state(node), Some(NodeState::Waiting | NodeState::Ready))
+    }
+
+    /// How many nodes are ready or running, of those that workers run.
+    #[must_use]
+    pub fn ready_for_workers(&self) -> usize {
+        self.ready_for_workers
+    }
+
+    /// The size of all blobs that are kept, in bytes. Looks at every one of them.
+    #[must_use]
+    pub fn blob_bytes(&self) -> usize {
+        self.blobs.bytes()
     }
 
     /// How many nodes there are.
@@ -233,12 +357,6 @@ impl Graph {
         self.open == 0 && self.changes.is_empty()
     }
 
-    fn keep(&mut self, blob: Blob) -> BlobHash {
-        let hash = blob.hash();
-        self.blobs.entry(hash).or_insert(blob);
-        hash
-    }
-
     fn input_failed(&self, node: NodeId) -> FailureReason {
         let label = self.spec(node).map(|spec| spec.label.clone()).unwrap_or_default();
         FailureReason::InputFailed { node, label }
@@ -246,6 +364,10 @@ impl Graph {
 
     fn get(&self, node: NodeId) -> Option<&Node> {
         self.nodes.get(usize::try_from(node.0).ok()?)
+    }
+
+    fn get_mut(&mut self, node: NodeId) -> Option<&mut Node> {
+        self.nodes.get_mut(usize::try_from(node.0).ok()?)
     }
 
     /// A node that is known to exist because this graph itself wrote its number down.

@@ -67,7 +67,8 @@ impl Planner for FanOut {
 
 fn spec(kind: &str, parameters: &[u8], inputs: Vec<Input>) -> NodeSpec {
     let label = format!("{kind} {parameters:?}");
-    NodeSpec { kind: kind.into(), label, parameters: parameters.to_vec(), inputs, placement: Placement::Worker }
+    let (kind, parameters) = (kind.into(), parameters.to_vec());
+    NodeSpec { kind, label, parameters, inputs, placement: Placement::Worker, priority: 0 }
 }
 
 fn registry() -> Registry {
@@ -226,4 +227,72 @@ fn context_tells_cancellation_and_progress() {
     context.report(5, 0);
     context.clone().cancel();
     assert_eq!((context.progress_permille(), context.check()), (1000, Err(NodeFailure::Cancelled)));
+}
+
+#[test]
+fn outputs_go_when_nobody_holds_them_and_the_last_reader_is_done() {
+    let mut graph = Graph::new();
+    let blob = graph.add_blob(vec![1; 100]).unwrap();
+    assert_eq!(graph.add_blob(vec![1; 100]).unwrap(), blob);
+    let first = graph.add_node(spec("sum", &[1], vec![Input::Blob(blob)])).unwrap();
+    let second = graph.add_node(spec("sum", &[2], vec![Input::OutputOf(first), Input::OutputOf(first)])).unwrap();
+    graph.release_blob(blob);
+    graph.release_blob(blob);
+    assert_eq!(graph.blob_bytes(), 100, "an open node reads it");
+    graph.complete(first, Blob::new(vec![7; 10]));
+    assert_eq!(graph.blob_bytes(), 10);
+    graph.release(first);
+    assert_eq!(graph.input_blobs(second).unwrap().len(), 2);
+    graph.complete(second, Blob::new(vec![8; 3]));
+    assert_eq!((graph.blob_bytes(), graph.output(first)), (3, None));
+    // Its name stays, to compare a second output with.
+    assert_eq!(graph.complete(first, Blob::new(vec![7; 10])), Completion::Duplicate);
+    let late = graph.add_node(spec("sum", &[3], vec![Input::OutputOf(first)]));
+    assert!(matches!(late, Err(PlanError::Released { node, .. }) if node == first));
+    assert!(!graph.hold(first) && graph.hold(second));
+    graph.release(second);
+    assert_eq!(graph.blob_bytes(), 3);
+    graph.release(second);
+    graph.release(second);
+    assert_eq!(graph.blob_bytes(), 0);
+}
+
+#[test]
+fn open_nodes_that_nobody_wants_are_cancelled_with_what_only_they_waited_for() {
+    let mut graph = Graph::new();
+    let [shared, own] = [1, 2].map(|byte| graph.add_node(spec("sum", &[byte], vec![])).unwrap());
+    let both = [shared, own].map(Input::OutputOf).to_vec();
+    let join = graph.add_node(spec("sum", &[3], both)).unwrap();
+    let other = graph.add_node(spec("sum", &[4], vec![Input::OutputOf(shared)])).unwrap();
+    changes(&mut graph);
+    assert_eq!(graph.ready_for_workers(), 2);
+    graph.release(shared);
+    graph.release(own);
+    assert!(changes(&mut graph).is_empty(), "others wait for them");
+    graph.release(join);
+    assert_eq!(changes(&mut graph), [Change::Failed(join), Change::Failed(own)]);
+    assert!(matches!(graph.state(own), Some(NodeState::Failed(reason)) if reason.is_cancellation()));
+    assert_eq!(graph.ready_for_workers(), 1);
+    graph.complete(shared, Blob::new(vec![1]));
+    graph.complete(other, Blob::new(vec![2]));
+    changes(&mut graph);
+    assert!(graph.is_drained());
+    assert_eq!(graph.blob_bytes(), 1);
+}
+
+#[test]
+fn failure_lets_go_of_what_was_read_and_cancels_what_nobody_holds() {
+    let mut graph = Graph::new();
+    let blob = graph.add_blob(vec![1; 100]).unwrap();
+    let held = graph.add_node(spec("sum", &[1], vec![])).unwrap();
+    let released = graph.add_node(spec("sum", &[2], vec![])).unwrap();
+    let inputs = vec![Input::Blob(blob), Input::OutputOf(held), Input::OutputOf(released)];
+    let join = graph.add_node(spec("sum", &[3], inputs)).unwrap();
+    graph.release(released);
+    graph.release_blob(blob);
+    changes(&mut graph);
+    graph.fail(join, FailureReason::Crashed { crashes: 3 });
+    assert_eq!(changes(&mut graph), [Change::Failed(join), Change::Failed(released)]);
+    assert_eq!(graph.blob_bytes(), 0);
+    assert!(graph.is_open(held));
 }

@@ -56,7 +56,7 @@ impl Planner for Script {
 }
 
 pub(super) fn node(label: &str, inputs: Vec<Input>, placement: Placement) -> NodeSpec {
-    NodeSpec { kind: "test".into(), label: label.into(), parameters: vec![], inputs, placement }
+    NodeSpec { kind: "test".into(), label: label.into(), parameters: vec![], inputs, placement, priority: 0 }
 }
 
 fn independent(count: usize) -> Script {

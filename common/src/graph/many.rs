@@ -1,0 +1,226 @@
+//! Many planners as one: the parts of a run, such as the fits of a batch, share a graph.
+//!
+//! - Parts begin one by one, in order, when the workers need more to do, so that hundreds of them need not be in memory.
+//! - Nodes of earlier parts run first, so that early parts end early.
+//! - A node that two parts ask for runs once; equal blobs are one blob anyway.
+//! - A node that fails ends its part; the others go on. What only that part wanted is cancelled.
+//! - A part ends when it waits for nothing any more, as a run does. What it held is released.
+//!
+//! What a part makes of its outputs does not depend on the other parts: alone, it would get the same ones.
+
+use std::collections::BTreeMap;
+
+use thiserror::Error;
+
+use super::{
+    Blob, FailureReason, GraphEdit, NodeId, PlanError, Planner,
+    sharing::{PartId, Sharing},
+};
+
+/// A part that can begin.
+#[derive(Debug)]
+pub struct Part<P> {
+    /// Its number, which no other part has: parts of lower numbers go first.
+    pub number: u32,
+    /// Its name, which goes before the labels of its nodes. Without ": "; at most [`MAX_PART_NAME_BYTES`].
+    pub name: String,
+    /// What plans its nodes.
+    pub planner: P,
+}
+
+/// The answer to "what is next?".
+#[derive(Debug)]
+pub enum Next<P> {
+    /// This part.
+    Part(Box<Part<P>>),
+    /// There are more, but the next one is not ready to begin.
+    NotYet,
+    /// No more parts.
+    End,
+}
+
+/// Why a part gave up.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum PartFailure {
+    /// One of its nodes failed.
+    #[error("{kind} {label:?} failed: {reason}")]
+    Node {
+        /// The kind of the node.
+        kind: String,
+        /// Its label, without the name of the part.
+        label: String,
+        /// Why it failed.
+        reason: FailureReason,
+    },
+    /// Its planner cannot go on.
+    #[error(transparent)]
+    Plan(PlanError),
+}
+
+/// Where the parts of a run come from, and where they go.
+pub trait Parts {
+    /// What plans a part.
+    type Planner: Planner;
+
+    /// The next part in order. With `wait`, there is nothing else to do: [`Next::NotYet`] is no answer then.
+    ///
+    /// # Errors
+    /// What ends the run.
+    fn next(&mut self, wait: bool) -> Result<Next<Self::Planner>, PlanError>;
+
+    /// Whether another part should begin, beside `active` ones with `ready` nodes that workers may run or are running.
+    fn wants_more(&self, active: usize, ready: usize) -> bool;
+
+    /// A part has ended well.
+    ///
+    /// # Errors
+    /// What ends the run.
+    fn completed(&mut self, part: Part<Self::Planner>) -> Result<(), PlanError>;
+
+    /// A part has given up.
+    ///
+    /// # Errors
+    /// What ends the run.
+    fn failed(&mut self, part: Part<Self::Planner>, failure: PartFailure) -> Result<(), PlanError>;
+}
+
+/// The planner of all parts.
+#[derive(Debug)]
+pub struct Many<S: Parts> {
+    parts: S,
+    active: BTreeMap<PartId, Part<S::Planner>>,
+    sharing: Sharing,
+    is_exhausted: bool,
+}
+
+impl<S: Parts> Many<S> {
+    /// A planner of these parts.
+    pub fn new(parts: S) -> Self {
+        Self { parts, active: BTreeMap::new(), sharing: Sharing::default(), is_exhausted: false }
+    }
+
+    /// What the parts came from.
+    pub fn into_parts(self) -> S {
+        self.parts
+    }
+
+    /// Let parts begin as long as there is too little to do.
+    fn begin_parts(&mut self, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
+        while !self.is_exhausted {
+            let is_idle = self.active.is_empty();
+            if !is_idle && !self.parts.wants_more(self.active.len(), graph.ready_for_workers()) {
+                return Ok(());
+            }
+            match self.parts.next(is_idle)? {
+                Next::Part(part) => {
+                    let number = part.number;
+                    self.active.insert(number, *part);
+                    self.advance(number, graph, |planner, graph| planner.start(graph))?;
+                    self.tell_late(graph)?;
+                }
+                Next::NotYet if is_idle => {
+                    return Err(PlanError::new("a part was waited for and did not come: a mistake in the plan"));
+                }
+                Next::NotYet => return Ok(()),
+                Next::End => self.is_exhausted = true,
+            }
+        }
+        Ok(())
+    }
+
+    /// Let a planner do something, and see what has become of its part.
+    fn advance(
+        &mut self,
+        number: PartId,
+        graph: &mut GraphEdit<'_>,
+        step: impl FnOnce(&mut S::Planner, &mut GraphEdit<'_>) -> Result<(), PlanError>,
+    ) -> Result<(), PlanError> {
+        let Some(part) = self.active.get_mut(&number) else { return Ok(()) };
+        match step(&mut part.planner, &mut graph.on_behalf(self.sharing.part(number, &part.name))) {
+            Ok(()) if self.sharing.is_idle(number) => {
+                self.end(number, graph).map_or(Ok(()), |part| self.parts.completed(part))
+            }
+            Ok(()) => Ok(()),
+            // A worker has lied or is broken: whatever else it sent is worth no more.
+            Err(error @ (PlanError::NotVerified { .. } | PlanError::WrongOutput { .. })) => Err(error),
+            Err(error) => self.give_up(number, PartFailure::Plan(error), graph),
+        }
+    }
+
+    /// Take a part out of the run, with all that it holds.
+    fn end(&mut self, number: PartId, graph: &mut GraphEdit<'_>) -> Option<Part<S::Planner>> {
+        self.sharing.release_all(number, graph.graph());
+        self.active.remove(&number)
+    }
+
+    fn give_up(&mut self, number: PartId, failure: PartFailure, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
+        self.end(number, graph).map_or(Ok(()), |part| self.parts.failed(part, failure))
+    }
+
+    fn tell(
+        &mut self,
+        number: PartId,
+        node: NodeId,
+        output: &Blob,
+        graph: &mut GraphEdit<'_>,
+    ) -> Result<(), PlanError> {
+        self.sharing.told(number, node);
+        self.advance(number, graph, |planner, graph| planner.completed(node, output, graph))
+    }
+
+    /// Tell planners of nodes that were complete before they asked for them.
+    fn tell_late(&mut self, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
+        while let Some((number, node)) = self.sharing.next_late() {
+            // It is there: the part holds it.
+            if let Some(output) = graph.output(node).cloned() {
+                self.tell(number, node, &output, graph)?;
+            }
+        }
+        Ok(())
+    }
+}
+
+impl<S: Parts> Planner for Many<S> {
+    fn start(&mut self, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
+        self.begin_parts(graph)
+    }
+
+    fn completed(&mut self, node: NodeId, output: &Blob, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
+        for number in self.sharing.end(node) {
+            self.tell(number, node, output, graph)?;
+        }
+        self.tell_late(graph)?;
+        self.begin_parts(graph)
+    }
+
+    fn failed(&mut self, node: NodeId, reason: &FailureReason, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
+        let (kind, label) = graph.spec(node).map(|spec| (spec.kind.clone(), spec.label.clone())).unwrap_or_default();
+        for number in self.sharing.end(node) {
+            let (kind, label) = (kind.clone(), split_label(&label).1.to_owned());
+            self.give_up(number, PartFailure::Node { kind, label, reason: reason.clone() }, graph)?;
+        }
+        self.begin_parts(graph)
+    }
+}
+
+/// The longest name of a part, in bytes: with the label of a node behind it, it stays within
+/// [`MAX_NAME_BYTES`](super::MAX_NAME_BYTES).
+pub const MAX_PART_NAME_BYTES: usize = 160;
+
+/// What lies between the name of a part and the label of one of its nodes.
+const SEPARATOR: &str = ": ";
+
+/// The label of a node of a part.
+pub(super) fn part_label(part: &str, label: &str) -> String {
+    format!("{part}{SEPARATOR}{label}")
+}
+
+/// The name of the part in a label, if there is one, and the rest.
+#[must_use]
+pub fn split_label(label: &str) -> (Option<&str>, &str) {
+    label.split_once(SEPARATOR).map_or((None, label), |(part, rest)| (Some(part), rest))
+}
+
+#[cfg(test)]
+mod tests;
