@@ -44,6 +44,11 @@ pub enum Action {
         /// The blob.
         blob: Blob,
     },
+    /// A worker asked for a blob that is needed no more: nothing is sent.
+    ForgoBlob {
+        /// The worker.
+        worker: WorkerId,
+    },
     /// Tell the worker that its answer has arrived.
     Acknowledge {
         /// The worker.
@@ -185,6 +190,18 @@ pub enum RunEvent {
         /// The node.
         name: NodeName,
     },
+    /// All inputs of a node are there: it waits for a place to run.
+    NodeReady {
+        /// The node.
+        node: NodeId,
+    },
+    /// A node was given to a worker.
+    NodeAssigned {
+        /// The node.
+        node: NodeId,
+        /// The worker.
+        worker: WorkerId,
+    },
     /// A node begins to run.
     NodeStarted {
         /// The node.
@@ -210,7 +227,14 @@ pub enum RunEvent {
         /// The time from its start to the arrival of the output.
         elapsed: Duration,
     },
-    /// A node has failed.
+    /// A second output of a node has come, bit for bit the first one.
+    DuplicateResult {
+        /// The node.
+        node: NodeId,
+        /// Where it ran.
+        site: Site,
+    },
+    /// A node has failed, or was cancelled.
     NodeFailed {
         /// The node.
         name: NodeName,

@@ -46,6 +46,8 @@ pub struct RunSummary {
     pub completed_nodes: usize,
     /// How many nodes failed.
     pub failed_nodes: usize,
+    /// How many nodes were given up because nobody wanted their output any more.
+    pub cancelled_nodes: usize,
     /// How many leases were given out, and how often a node was run by the coordinator.
     pub attempts: u64,
     /// How many nodes went back to the queue because their worker left.
@@ -72,8 +74,8 @@ pub struct Core {
     pub(crate) graph: Graph,
     /// One per node of the graph.
     pub(crate) records: Vec<Record>,
-    /// Ready nodes that wait for a worker; the lowest number goes first.
-    pub(crate) queue: BTreeSet<NodeId>,
+    /// Ready nodes that wait for a worker, by priority and number; the lowest goes first.
+    pub(crate) queue: BTreeSet<(u32, NodeId)>,
     pub(crate) workers: BTreeMap<WorkerId, Member>,
     /// Since when there is work but no worker.
     pub(crate) starving: Option<Starving>,
@@ -157,6 +159,11 @@ impl Core {
     pub(crate) fn starvation_limit(&self) -> Duration {
         let had_workers = self.summary.workers_joined > 0;
         if had_workers { self.policy.grace } else { self.policy.wait_for_workers }
+    }
+
+    /// The place of a node in the queue.
+    pub(crate) fn place(&self, node: NodeId) -> (u32, NodeId) {
+        (self.graph.spec(node).map_or(0, |spec| spec.priority), node)
     }
 
     pub(crate) fn name(&self, node: NodeId) -> NodeName {

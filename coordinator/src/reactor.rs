@@ -159,9 +159,15 @@ fn settle(core: &mut Core, planner: &mut impl Planner, now: Duration, outbox: &m
                 }
             }
             Change::Failed(node) => {
-                core.summary.failed_nodes += 1;
+                retract(core, node, outbox);
                 if let Some(NodeState::Failed(reason)) = core.graph.state(node).cloned() {
                     outbox.tell(RunEvent::NodeFailed { name: core.name(node), reason: reason.clone() });
+                    if reason.is_cancellation() {
+                        // The planner has asked for it.
+                        core.summary.cancelled_nodes += 1;
+                        continue;
+                    }
+                    core.summary.failed_nodes += 1;
                     planner.failed(node, &reason, &mut GraphEdit::new(&mut core.graph))?;
                 }
             }
@@ -181,9 +187,14 @@ fn refused(core: &mut Core, node: NodeId, error: PlanError) -> RunError {
 }
 
 fn make_ready(core: &mut Core, node: NodeId, now: Duration, outbox: &mut Outbox) {
+    // It may have been cancelled meanwhile.
+    if !core.graph.is_open(node) {
+        return;
+    }
+    outbox.tell(RunEvent::NodeReady { node });
     let is_for_worker = core.graph.spec(node).is_none_or(|spec| spec.placement == Placement::Worker);
     if is_for_worker {
-        core.queue.insert(node);
+        core.queue.insert(core.place(node));
         return;
     }
     core.summary.attempts += 1;
@@ -225,7 +236,7 @@ fn leave(core: &mut Core, worker: WorkerId, departure: &Departure, outbox: &mut 
         if is_suspect && crashes >= crash_limit {
             core.graph.fail(node, FailureReason::Crashed { crashes });
         } else {
-            core.queue.insert(node);
+            core.queue.insert(core.place(node));
             core.summary.requeued_nodes += 1;
             outbox.tell(RunEvent::NodeRequeued { name: core.name(node), worker, crashes });
         }
@@ -290,7 +301,10 @@ fn finished(core: &mut Core, answer: Answer, output: Blob, now: Duration, outbox
             let elapsed = started_at.map_or(Duration::ZERO, |started_at| now.saturating_sub(started_at));
             outbox.tell(RunEvent::NodeFinished { name: core.name(node), site, bytes, elapsed });
         }
-        Completion::Duplicate => core.summary.duplicate_results += 1,
+        Completion::Duplicate => {
+            core.summary.duplicate_results += 1;
+            outbox.tell(RunEvent::DuplicateResult { node, site });
+        }
         // The node has failed before; the planner knows it, and nothing can be taken back.
         Completion::Refused => {}
         Completion::Different { first } => {
@@ -327,7 +341,7 @@ fn answered(core: &mut Core, (site, node, attempt): Answer, now: Duration, outbo
 
 /// Nobody needs to run this node any more.
 fn retract(core: &mut Core, node: NodeId, outbox: &mut Outbox) {
-    core.queue.remove(&node);
+    core.queue.remove(&core.place(node));
     if let Some(Site::Worker(holder)) = core.record(node).and_then(|record| record.holder.take()) {
         take_back(core, holder, node, outbox);
     }
@@ -346,9 +360,14 @@ fn take_back(core: &mut Core, worker: WorkerId, node: NodeId, outbox: &mut Outbo
 fn send_blob(core: &mut Core, worker: WorkerId, hash: BlobHash, now: Duration, outbox: &mut Outbox) {
     renew(core, worker, now);
     let Some(member) = core.workers.get(&worker) else { return };
-    let Some(blob) = core.graph.blob(hash).filter(|_| member.readable.contains(&hash)).cloned() else {
+    if !member.readable.contains(&hash) {
         let what = format!("it asked for blob {hash}, which none of its nodes reads");
         drop_worker(core, worker, &Departure::Violation(what), outbox);
+        return;
+    }
+    let Some(blob) = core.graph.blob(hash).cloned() else {
+        // Its last reader was taken back or is done: the request crossed our word to the worker.
+        outbox.push(Action::ForgoBlob { worker });
         return;
     };
     let bytes = blob.len();
@@ -365,7 +384,7 @@ fn schedule(core: &mut Core, outbox: &mut Outbox) {
         let Some(worker) = core.least_busy(|member| member.leases.len() < member.threads + spare) else {
             return;
         };
-        if let Some(node) = core.queue.pop_first() {
+        if let Some((_, node)) = core.queue.pop_first() {
             assign(core, worker, node, outbox);
         }
     }
@@ -399,6 +418,7 @@ fn assign(core: &mut Core, worker: WorkerId, node: NodeId, outbox: &mut Outbox) 
         member.leases.insert(node, lease);
         member.readable.extend(inputs.iter().map(Blob::hash));
         outbox.push(Action::Assign { worker, lease });
+        outbox.tell(RunEvent::NodeAssigned { node, worker });
     }
 }
 

@@ -171,9 +171,26 @@ impl Tasks {
         match self.tasks.remove(&lease.node).map(|task| task.stage) {
             Some(Stage::Announcing(job)) => _ = self.running.remove(&job.serial),
             Some(Stage::Executing { context, .. }) => context.cancel(),
-            Some(Stage::Gathering { .. } | Stage::Answered(_)) | None => {}
+            Some(Stage::Gathering { assignment, .. }) => self.forgo(&assignment),
+            Some(Stage::Answered(_)) | None => {}
         }
         self.begin(new_context)
+    }
+
+    /// Wait no more for the blobs that only this assignment needed: the coordinator may have let go of them, and has to be asked
+    /// again should another node need them.
+    fn forgo(&mut self, assignment: &Assignment) {
+        for hash in assignment.inputs.iter().map(|hash| BlobHash(*hash)) {
+            let needs = |task: &Task| match &task.stage {
+                Stage::Gathering { assignment, inputs, .. } => {
+                    assignment.inputs.iter().zip(inputs).any(|(name, input)| *name == hash.0 && input.is_none())
+                }
+                _ => false,
+            };
+            if self.fetching.contains(&hash) && !self.tasks.values().any(needs) {
+                self.fetching.remove(&hash);
+            }
+        }
     }
 
     /// The coordinator has our answer.

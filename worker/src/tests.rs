@@ -158,3 +158,16 @@ fn cancelled_node_is_not_answered_and_frees_its_thread() {
     let stopped = Completed { serial: serials[0], result: Err(NodeFailure::Cancelled) };
     assert_eq!(said(&tasks.completed(stopped, context)), ["announce 1.1"]);
 }
+
+#[test]
+fn blob_that_a_cancelled_node_waited_for_is_asked_for_again() {
+    let mut tasks = tasks(1);
+    let [only, both] = [1, 2].map(|byte| Blob::new(vec![byte]));
+    let names = [&only, &both].map(|blob| format!("fetch {}", blob.hash().0[0]));
+    assert_eq!(said(&tasks.assigned(assignment(lease(0, 1), &[&only, &both]), context)), names);
+    assert!(tasks.assigned(assignment(lease(1, 1), &[&both]), context).is_empty());
+    // The coordinator may have let go of the first before it read our request.
+    assert!(tasks.cancelled(lease(0, 1), context).is_empty());
+    assert_eq!(said(&tasks.assigned(assignment(lease(2, 1), &[&only, &both]), context)), names[..1]);
+    assert_eq!(said(&tasks.fetched(both, context)), ["announce 1.1"]);
+}

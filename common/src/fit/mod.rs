@@ -24,7 +24,7 @@ pub use best::BestScore;
 pub use candidate::{Candidate, SAME, distinct, needed_span};
 pub use method::{AtZero, JudgedBy, MOST_SEARCHES, Method, MethodError, SearchKind, Start, gamma_range};
 pub use objective::Objective;
-pub use plan::{FitError, FitOutcome, FitPlanner};
+pub use plan::{FitError, FitOutcome, FitPlanner, encode_light};
 pub use polish::{INITIAL_MESH, MAX_EVALUATIONS, Polished, polish};
 pub use stage_one::{SearchFailure, search_gamma};
 pub use stage_two::{FullView, Judged, judge_candidates, winner};

@@ -7,58 +7,51 @@
 //! The graph depends on the inputs alone, never on the number of workers or the order in which nodes finish.
 
 mod limits;
+mod pictures;
+mod pixels;
+mod tables;
 mod verify;
 
 pub use limits::FitError;
 
 use self::{
     limits::check_sizes,
+    pictures::Pictures,
+    pixels::{covered_pixels, intensities, photo_at},
+    tables::{FULL_SHARD, SUBSET_SHARD, release_tables, stage_one_knots},
     verify::{Shard, SubsetTables},
 };
 use super::{
     BestScore, Candidate, Judged, JudgedBy, Method, Objective, Polished, SearchKind, Start,
     method::AtZero,
     needed_span,
-    nodes::{
-        self, PolishParameters, ReportParameters, ReportWire, SearchParameters, SelectParameters, TransportParameters,
-        ViewWire,
-    },
+    nodes::{self, PolishParameters, ReportParameters, SearchParameters, SelectParameters, ViewWire},
     polish::MAX_EVALUATIONS,
     stage_one::objective_of,
     uncertainty::{Uncertainty, uncertainties},
     winner,
-    wire::{CandidateWire, EnvironmentWire, ImageWire, KnotsWire, PolishedWire, ScoresWire, SubsetWire, read, write},
+    wire::{CandidateWire, EnvironmentWire, ImageWire, SubsetWire, read, write},
 };
 use crate::{
     brdf::flat_bounds,
     graph::{Blob, BlobHash, GraphEdit, Input, NodeFailure, NodeId, NodeSpec, Placement, PlanError, Planner},
     image::Image,
-    math::{luminance, widen},
+    light::Environment,
     metric::ErrorMap,
     render::{
-        knots::{Knots, PER_OCTAVE},
-        subset::{self, PixelSubset},
-        transport::{Accuracy, Pixel, tile_order},
+        subset::PixelSubset,
+        transport::{Accuracy, Pixel},
     },
     scene::Capture,
 };
 use serde::Serialize;
 use std::{collections::BTreeMap, sync::Arc};
 
-/// Pixels per shard of a subset's table: small enough to spread over several workers.
-const SUBSET_SHARD: usize = 32;
-
-/// Pixels per shard of the full-resolution table.
-const FULL_SHARD: usize = 2048;
-
 /// How often polish may run on towards a width beyond its table.
 const MAX_POLISH_ROUNDS: usize = 4;
 
 /// Reach of the next table around a width that polish took to the edge of this one.
 const AROUND: f64 = 1.6;
-
-/// Knots per factor of two of width in full-resolution tables (design section 7: at least 5).
-const FULL_PER_OCTAVE: f64 = 5.0;
 
 /// The outcome of a fit.
 #[derive(Debug, Clone)]
@@ -91,6 +84,10 @@ pub struct FitPlanner {
     subsets: Vec<PixelSubset>,
     pixels: Vec<Pixel>,
     extra_gammas: Vec<f64>,
+    /// Where candidates are judged, polish runs and pictures are made.
+    stage_two: Placement,
+    /// The encoded light, if somebody else has encoded it.
+    light: Option<Blob>,
     environment: Option<BlobHash>,
     view: Option<BlobHash>,
     searches: BTreeMap<NodeId, usize>,
@@ -105,8 +102,7 @@ pub struct FitPlanner {
     span: Span,
     /// Full-resolution tables by their span: none is integrated twice.
     tables: Vec<(Span, Vec<Input>)>,
-    reports: Vec<NodeId>,
-    pictures: BTreeMap<NodeId, ReportWire>,
+    pictures: Pictures,
     judged: Vec<Judged>,
     uncertainty: Vec<Uncertainty>,
     /// The winner of stage two and the outcome of every round of polish.
@@ -156,6 +152,8 @@ impl FitPlanner {
             subsets,
             pixels,
             extra_gammas: Vec::new(),
+            stage_two: Placement::Coordinator,
+            light: None,
             environment: None,
             view: None,
             shards: BTreeMap::new(),
@@ -166,8 +164,7 @@ impl FitPlanner {
             step: Step::Searching,
             span: None,
             tables: Vec::new(),
-            reports: Vec::new(),
-            pictures: BTreeMap::new(),
+            pictures: Pictures::default(),
             judged: Vec::new(),
             uncertainty: Vec::new(),
             polish_starts: Vec::new(),
@@ -183,6 +180,20 @@ impl FitPlanner {
     #[must_use]
     pub fn also_render(mut self, gammas: &[f64]) -> Self {
         self.extra_gammas = gammas.to_vec();
+        self
+    }
+
+    /// Runs what follows stage one there: in the coordinator's own process, as it does unless told otherwise, or on workers.
+    #[must_use]
+    pub fn judging_on(mut self, placement: Placement) -> Self {
+        self.stage_two = placement;
+        self
+    }
+
+    /// Takes the light of the capture from [`encode_light`], so that fits under one light encode it once.
+    #[must_use]
+    pub fn with_encoded_light(mut self, light: Blob) -> Self {
+        self.light = Some(light);
         self
     }
 
@@ -202,49 +213,6 @@ impl FitPlanner {
     #[must_use]
     pub fn best(&self) -> Arc<BestScore> {
         Arc::clone(&self.best)
-    }
-
-    /// Adds the shards of a table of `count` pixels of the list `pixels`.
-    fn add_transport(
-        &mut self,
-        graph: &mut GraphEdit<'_>,
-        what: &str,
-        pixels: (BlobHash, usize, usize),
-        knots: Knots,
-        accuracy: Accuracy,
-    ) -> Result<Vec<Input>, PlanError> {
-        let (list, count, shard) = pixels;
-        let capture = Arc::clone(&self.capture);
-        let geometry = capture.geometry();
-        let environment = self.environment.ok_or_else(|| PlanError::new("the environment was not added"))?;
-        let mut inputs = vec![Input::Blob(environment), Input::Blob(list)];
-        if let Some(map) = geometry.normal_map() {
-            inputs.push(Input::Blob(add(graph, "normal map", &ImageWire::of(&map.to_image()))?));
-        }
-        let mut shards = Vec::new();
-        for first in (0..count).step_by(shard) {
-            let range = (index(first), index(shard.min(count - first)));
-            let parameters = TransportParameters {
-                model: self.method.model.name().to_owned(),
-                geometry: geometry.spec(),
-                knots: KnotsWire::of(&knots),
-                tolerance: accuracy.tolerance,
-                footprint: accuracy.footprint,
-                range,
-            };
-            let spec = NodeSpec {
-                kind: nodes::TRANSPORT.to_owned(),
-                label: format!("transport {what}, pixels {first} to {}", first + range.1 as usize - 1),
-                parameters: encode("parameters", &parameters)?,
-                inputs: inputs.clone(),
-                placement: Placement::Worker,
-                priority: 0,
-            };
-            let node = graph.add_node(spec)?;
-            self.shards.insert(node, Shard { pixels: range.1 as usize, knots });
-            shards.push(Input::OutputOf(node));
-        }
-        Ok(shards)
     }
 
     fn add_searches(&mut self, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
@@ -307,25 +275,9 @@ impl FitPlanner {
             label: kind.to_owned(),
             parameters: encode("parameters", parameters)?,
             inputs,
-            placement: Placement::Coordinator,
+            placement: self.stage_two,
             priority: 0,
         })
-    }
-
-    /// The shards of the full-resolution table over a span.
-    fn full_table(&mut self, graph: &mut GraphEdit<'_>, span: Span) -> Result<Vec<Input>, PlanError> {
-        if let Some((_, shards)) = self.tables.iter().find(|(known, _)| *known == span) {
-            return Ok(shards.clone());
-        }
-        let list = add(graph, "list of pixels", &self.pixels)?;
-        let knots = match span {
-            Some((lower, upper)) => Knots::covering(lower, upper, FULL_PER_OCTAVE),
-            None => stage_one_knots(&self.method),
-        };
-        let pixels = (list, self.pixels.len(), FULL_SHARD);
-        let shards = self.add_transport(graph, "in full", pixels, knots, Accuracy::FULL)?;
-        self.tables.push((span, shards.clone()));
-        Ok(shards)
     }
 
     fn view_wire(&self) -> ViewWire {
@@ -388,11 +340,7 @@ impl FitPlanner {
     }
 
     fn selected(&mut self, output: &Blob, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
-        let ScoresWire(scores) = read("scores", output).map_err(other)?;
-        if scores.len() != self.candidates.len() {
-            let (expected, found) = (self.candidates.len(), scores.len());
-            return Err(PlanError::new(format!("expected {expected} scores, found {found}")));
-        }
+        let scores = verify::scores(output, self.candidates.len())?;
         let candidates = std::mem::take(&mut self.candidates).into_values();
         self.judged = candidates
             .zip(scores)
@@ -405,6 +353,7 @@ impl FitPlanner {
             .with_objective(&winner, graph, |objective| uncertainties(model, objective, &winner.parameters))?
             .map_err(|error| PlanError::Other(error.into()))?;
         self.tables_of_subsets.forget(winner.subset as usize);
+        self.release_subset_tables(graph);
         self.polish_starts = vec![self.judged[best].candidate.parameters.clone()];
         self.best.set(self.method.judge.pick(self.judged[best].cssim, self.judged[best].cssim_object));
         if self.method.polish { self.add_polish(graph) } else { self.add_report(graph) }
@@ -420,8 +369,7 @@ impl FitPlanner {
     /// Polish ends, or goes on with a wider table where it ran into the edge of this one.
     fn polished(&mut self, output: &Blob, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
         let model = self.method.model;
-        let mut polished =
-            read::<PolishedWire>("polish", output).and_then(|wire| wire.polished(model)).map_err(other)?;
+        let mut polished = verify::polished(model, output)?;
         self.polish_rounds += 1;
         self.polish_evaluations += polished.evaluations;
         polished.evaluations = self.polish_evaluations;
@@ -433,6 +381,9 @@ impl FitPlanner {
         self.polished = Some(polished);
         if goes_on {
             self.widen_span();
+            // The pictures are made of the first table and the last.
+            let between = self.tables.split_off(1);
+            release_tables(between, graph);
             self.add_polish(graph)
         } else {
             self.add_report(graph)
@@ -464,9 +415,11 @@ impl FitPlanner {
             vec![(judged_on, candidates), (self.span, vec![last])]
         };
         for (span, parameters) in jobs {
+            let count = parameters.len();
             let node = self.add_judging(graph, nodes::REPORT, span, &ReportParameters { parameters })?;
-            self.reports.push(node);
+            self.pictures.ask(node, count);
         }
+        release_tables(std::mem::take(&mut self.tables), graph);
         self.step = Step::Reporting;
         Ok(())
     }
@@ -478,19 +431,8 @@ impl FitPlanner {
     }
 
     fn reported(&mut self, node: NodeId, output: &Blob) -> Result<(), PlanError> {
-        let report: ReportWire = read("report", output).map_err(other)?;
-        self.pictures.insert(node, report);
-        if self.pictures.len() < self.reports.len() {
-            return Ok(());
-        }
-        let mut images = Vec::new();
-        let mut error = Vec::new();
-        // In the order of the nodes, which is that of the pictures.
-        for report in std::mem::take(&mut self.pictures).into_values() {
-            let wires = report.images.into_iter().map(ImageWire::image);
-            images.extend(wires.collect::<Result<Vec<_>, _>>().map_err(other)?);
-            error = report.error;
-        }
+        let size = (self.capture.photo().width(), self.capture.photo().height());
+        let Some((mut images, error)) = self.pictures.made(node, output, size)? else { return Ok(()) };
         let missing = || PlanError::new("the report lacks an image");
         let matched = images.pop().ok_or_else(missing)?;
         let winner_image = images.pop().ok_or_else(missing)?;
@@ -515,8 +457,8 @@ impl FitPlanner {
 
 impl Planner for FitPlanner {
     fn start(&mut self, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
-        let environment = EnvironmentWire::of(self.capture.environment());
-        self.environment = Some(add(graph, "environment", &environment)?);
+        let light = self.light.take().map_or_else(|| encode_light(self.capture.environment()), Ok)?;
+        self.environment = Some(graph.keep(light)?);
         self.add_searches(graph)
     }
 
@@ -532,43 +474,18 @@ impl Planner for FitPlanner {
         match self.step {
             Step::Selecting(select) if select == node => self.selected(output, graph),
             Step::Polishing(polish) if polish == node => self.polished(output, graph),
-            Step::Reporting if self.reports.contains(&node) => self.reported(node, output),
+            Step::Reporting if self.pictures.is_of(node) => self.reported(node, output),
             _ => Ok(()),
         }
     }
 }
 
-/// The grid of widths of stage one: the model's whole range.
-fn stage_one_knots(method: &Method) -> Knots {
-    let (lower, upper) = flat_bounds(method.model.parameters());
-    let entry = method.model.lobes().iter().find_map(|b| b.width);
-    let (low, high) = entry.map_or((0.5, 1.0), |entry| (lower[entry], upper[entry]));
-    Knots::covering(low, high, PER_OCTAVE)
-}
-
-/// The photo's values at the pixels of a subset, in its order.
-fn photo_at(capture: &Capture, subset: &PixelSubset) -> Vec<[f32; 3]> {
-    subset.pixels.iter().map(|p| capture.photo().pixel(p[0] as usize, p[1] as usize)).collect()
-}
-
-/// The usable pixels with their luminance.
-fn intensities(capture: &Capture) -> Vec<subset::Candidate> {
-    let (photo, width) = (capture.photo(), capture.photo().width());
-    let candidate = |i: usize| subset::Candidate {
-        pixel: [index(i % width), index(i / width)],
-        intensity: luminance(widen(photo.pixels()[i])).max(0.0),
-    };
-    capture.usable().map(candidate).collect()
-}
-
-/// The pixels that count for the score, tile by tile, so that neighbours share cuts of the light.
-fn covered_pixels(capture: &Capture) -> Vec<Pixel> {
-    let width = capture.photo().width();
-    let coverage = capture.scoring_coverage();
-    let covered = coverage.iter().enumerate().filter(|(_, c)| **c > 0.0);
-    let mut pixels: Vec<Pixel> = covered.map(|(i, _)| [index(i % width), index(i / width)]).collect();
-    pixels.sort_by_key(|pixel| tile_order(*pixel));
-    pixels
+/// A map as the nodes of a fit read it, for [`FitPlanner::with_encoded_light`].
+///
+/// # Errors
+/// When it does not fit into a blob.
+pub fn encode_light(environment: &Environment) -> Result<Blob, PlanError> {
+    Ok(Blob::new(encode("environment", &EnvironmentWire::of(environment))?))
 }
 
 fn add<T: Serialize>(graph: &mut GraphEdit<'_>, what: &str, value: &T) -> Result<BlobHash, PlanError> {

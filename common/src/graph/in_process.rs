@@ -77,7 +77,9 @@ fn notify<P: Planner>(
                 }
             }
             Change::Failed(node) => {
-                if let Some(NodeState::Failed(reason)) = graph.state(node).cloned() {
+                if let Some(NodeState::Failed(reason)) = graph.state(node).cloned()
+                    && !reason.is_cancellation()
+                {
                     planner.failed(node, &reason, &mut GraphEdit::new(graph))?;
                 }
             }

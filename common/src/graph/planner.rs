@@ -23,8 +23,9 @@ pub trait Planner {
     /// When the output is not what it should be; it ends the run.
     fn completed(&mut self, node: NodeId, output: &Blob, graph: &mut GraphEdit<'_>) -> Result<(), PlanError>;
 
-    /// A node failed. Called once per failed node, also for those that only lack its output. A planner of several fits
-    /// overrides this to give up only the fit that the node belongs to.
+    /// A node failed. Called once per failed node, also for those that only lack its output, but not for those that were cancelled
+    /// because the planner released them. A planner of several fits overrides this to give up only the fit that the node
+    /// belongs to.
     ///
     /// # Errors
     /// Unless overridden, an error that names the node: it ends the run.

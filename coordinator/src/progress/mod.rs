@@ -60,6 +60,7 @@ fn remark(event: &RunEvent) -> Option<String> {
             Some(format!("warning: local worker {process} ended ({status}); {next}"))
         }
         RunEvent::NodeRequeued { name, .. } => Some(format!("{} runs again on another worker", name.label)),
+        RunEvent::NodeFailed { reason, .. } if reason.is_cancellation() => None,
         RunEvent::NodeFailed { name, reason } => Some(format!("error: {} failed: {reason}", name.label)),
         _ => None,
     }

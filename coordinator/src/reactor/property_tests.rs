@@ -106,7 +106,7 @@ impl World {
                 }
                 Action::Drop { worker } => _ = self.connected.remove(&worker),
                 Action::RunHere { node, attempt } => assert!(self.here.insert((node, attempt))),
-                Action::SendBlob { .. } | Action::Acknowledge { .. } | Action::Tell(_) => {}
+                Action::SendBlob { .. } | Action::ForgoBlob { .. } | Action::Acknowledge { .. } | Action::Tell(_) => {}
             }
         }
     }
@@ -118,7 +118,7 @@ impl World {
             let node = NodeId(index);
             let is_for_workers = graph.spec(node).is_some_and(|spec| spec.placement == Placement::Worker);
             let holders = self.connected.values().filter(|leases| leases.contains_key(&node)).count();
-            let places = holders + usize::from(self.core.queue.contains(&node));
+            let places = holders + usize::from(self.core.queue.contains(&self.core.place(node)));
             let expected = usize::from(is_for_workers && graph.state(node) == Some(&NodeState::Ready));
             assert_eq!(places, expected, "{node} in state {:?}", graph.state(node));
         }

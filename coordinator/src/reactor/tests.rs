@@ -22,6 +22,9 @@ pub(super) struct Script {
     pub(super) blob: Vec<u8>,
     /// Added once node 0 is complete.
     pub(super) follow_up: Option<NodeSpec>,
+    /// Released once node 0 is complete.
+    pub(super) released: Vec<NodeId>,
+    pub(super) released_blob: Option<BlobHash>,
     pub(super) tolerates_failures: bool,
     /// Refuses every output with this error.
     pub(super) not_verified: bool,
@@ -43,6 +46,8 @@ impl Planner for Script {
         }
         if node == NodeId(0) {
             self.follow_up.take().map(|spec| graph.add_node(spec)).transpose()?;
+            self.released.drain(..).for_each(|node| graph.release(node));
+            self.released_blob.take().into_iter().for_each(|hash| graph.release_blob(hash));
         }
         Ok(())
     }
@@ -123,6 +128,7 @@ fn line(action: &Action) -> Option<String> {
         Action::Cancel { worker, lease } => format!("{worker} drops {}.{}", lease.node.0, lease.attempt),
         Action::Acknowledge { worker, node, attempt } => format!("{worker} is thanked for {}.{attempt}", node.0),
         Action::SendBlob { worker, blob } => format!("{worker} gets {} bytes", blob.len()),
+        Action::ForgoBlob { worker } => format!("{worker} gets nothing"),
         Action::Drop { worker } => format!("{worker} is thrown out"),
         Action::RunHere { node, attempt } => format!("run {}.{attempt} here", node.0),
         Action::Tell(RunEvent::NodeFailed { name, reason }) => format!("{} failed: {reason}", name.label),
@@ -400,4 +406,59 @@ fn wrong_result_ends_the_run_and_names_gamma_numbers_and_worker() {
         assert!(text.contains(part), "{text}");
     }
     assert_eq!(error.exit_code(), 3);
+}
+
+#[test]
+fn nodes_of_lower_priority_numbers_go_first_whenever_they_came() {
+    let mut planner = independent(4);
+    for (spec, priority) in planner.nodes.iter_mut().zip([2, 1, 1, 0]) {
+        spec.priority = priority;
+    }
+    planner.follow_up = Some(NodeSpec { priority: 1, ..node("late", vec![], Placement::Worker) });
+    let mut bench = Bench::new(planner);
+    assert_eq!(bench.join(A, 1), ["worker 1 gets 3.1", "worker 1 gets 1.1", "worker 1 gets 2.1"]);
+    assert_eq!(bench.finish(A, 3, 1, 3), ["worker 1 is thanked for 3.1", "worker 1 gets 0.1"]);
+    bench.finish(A, 0, 1, 0);
+    // A requeued node goes back to its place.
+    bench.lose(A, Departure::Goodbye);
+    assert_eq!(bench.join(B, 1), ["worker 2 gets 1.2", "worker 2 gets 2.2", "worker 2 gets 4.2"]);
+}
+
+#[test]
+fn cancelled_nodes_leave_queue_and_workers_and_are_no_failures() {
+    let mut bench = Bench::new(Script { released: vec![NodeId(1), NodeId(3)], ..independent(4) });
+    bench.join(A, 1);
+    bench.start(A, 1, 1);
+    let said = bench.finish(A, 0, 1, 0);
+    let cancelled = "failed: cancelled: its output is not wanted any more";
+    let expected = [
+        "worker 1 is thanked for 0.1".to_owned(),
+        "worker 1 drops 1.1".to_owned(),
+        format!("n1 {cancelled}"),
+        format!("n3 {cancelled}"),
+    ];
+    assert_eq!(said, expected);
+    assert_eq!((bench.core.summary().failed_nodes, bench.core.summary().cancelled_nodes), (0, 2));
+    bench.finish(A, 2, 1, 2);
+    assert!(bench.core.is_finished());
+}
+
+#[test]
+fn request_for_a_blob_that_was_let_go_is_no_violation() {
+    let blob = vec![1; 40];
+    let hash = BlobHash::of(&blob);
+    let nodes = vec![node("n", vec![], Placement::Worker), node("n", vec![Input::Blob(hash)], Placement::Worker)];
+    let mut bench = Bench::new(Script {
+        nodes,
+        blob,
+        released: vec![NodeId(1)],
+        released_blob: Some(hash),
+        follow_up: Some(node("open", vec![], Placement::Worker)),
+        ..Script::default()
+    });
+    bench.join(A, 2);
+    bench.finish(A, 0, 1, 0);
+    assert_eq!(bench.handle(Event::BlobRequested { worker: A, hash }), ["worker 1 gets nothing"]);
+    let unknown = Event::BlobRequested { worker: A, hash: BlobHash::of(b"unknown") };
+    assert_eq!(bench.handle(unknown)[0], "worker 1 is thrown out");
 }

@@ -66,6 +66,7 @@ async fn write(
                 send_parts(&mut writer, &blob).await?;
                 pending_blobs.fetch_sub(1, Ordering::Relaxed);
             }
+            Outgoing::NoBlob => _ = pending_blobs.fetch_sub(1, Ordering::Relaxed),
         }
     }
     writer.shutdown().await?;

@@ -53,6 +53,8 @@ pub(crate) enum Inbound {
 pub(crate) enum Outgoing {
     Message(ToWorker),
     Blob(Blob),
+    /// Nothing, for a blob that was asked for.
+    NoBlob,
 }
 
 /// What every connection of a run needs.

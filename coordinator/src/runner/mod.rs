@@ -174,6 +174,7 @@ impl<P: Planner, O: FnMut(&RunEvent)> Driver<P, O> {
                     self.cluster.send(worker, Outgoing::Message(ToWorker::Cancel(name)));
                 }
                 Action::SendBlob { worker, blob } => self.cluster.send(worker, Outgoing::Blob(blob)),
+                Action::ForgoBlob { worker } => self.cluster.send(worker, Outgoing::NoBlob),
                 Action::Acknowledge { worker, node, attempt } => {
                     let name = LeaseName { node: node.0, attempt, epoch: FIRST_EPOCH };
                     self.cluster.send(worker, Outgoing::Message(ToWorker::Acknowledge(name)));

@@ -1,15 +1,15 @@
-//! Trust in what workers return. A shard of a transport table has to be of the shape that was asked for, with finite values (whether they
-//! are right, only another computation can tell). The cost of every candidate is computed again, here, on the table that its search read
-//! (design section 8). The cost is a pure function of the table and the parameters, so it has to be the same to the bit; one
-//! evaluation costs a thousandth of a search.
+//! Trust in what nodes return, which may have run on a worker. A shard of a transport table has to be of the shape that was asked
+//! for, with finite values (whether they are right, only another computation can tell). The cost of every candidate is computed again,
+//! here, on the table that its search read (design section 8). The cost is a pure function of the table and the parameters, so it has
+//! to be the same to the bit; one evaluation costs a thousandth of a search. Scores, parameters and pictures have to be possible ones.
 
 use super::other;
 use crate::{
     brdf::Model,
     fit::{
-        Candidate, Objective,
+        Candidate, Objective, Polished,
         nodes::joined,
-        wire::{TableWire, read},
+        wire::{PolishedWire, ScoresWire, TableWire, read},
     },
     graph::{Blob, GraphEdit, Input, NodeId, PlanError},
     render::{knots::Knots, table::TransportTable},
@@ -83,6 +83,29 @@ pub(super) fn check_shard(model: &dyn Model, asked: Shard, output: &Blob) -> Res
         Some(value) => Err(wrong("finite radiance", value)),
         None => Ok(()),
     }
+}
+
+/// The scores of `count` candidates, the whole image's and the object's.
+pub(super) fn scores(output: &Blob, count: usize) -> Result<Vec<(f64, f64)>, PlanError> {
+    let ScoresWire(scores) = read("scores", output).map_err(|failure| wrong("scores", &failure))?;
+    if scores.len() != count {
+        return Err(wrong(format!("{count} scores"), &scores.len()));
+    }
+    scores.iter().try_for_each(|(image, object)| check_score(*image).and_then(|()| check_score(*object)))?;
+    Ok(scores)
+}
+
+/// The outcome of a round of polish.
+pub(super) fn polished(model: &dyn Model, output: &Blob) -> Result<Polished, PlanError> {
+    let polished = read::<PolishedWire>("polish", output).and_then(|wire| wire.polished(model));
+    let polished = polished.map_err(|failure| wrong("parameters with their scores", &failure))?;
+    check_score(polished.cssim)?;
+    check_score(polished.cssim_object)?;
+    Ok(polished)
+}
+
+fn check_score(score: f64) -> Result<(), PlanError> {
+    if score.is_finite() && score >= 0.0 { Ok(()) } else { Err(wrong("a score at or above 0", &score)) }
 }
 
 /// The output of a worker is not one of its node.
