@@ -4,6 +4,7 @@
 use std::process::ExitCode;
 
 pub mod access;
+mod batch;
 mod cli;
 pub mod comm;
 mod commands;
@@ -12,6 +13,7 @@ pub mod demo;
 mod fitting;
 pub mod inputs;
 pub mod limits;
+mod metrics;
 mod outputs;
 mod progress;
 pub mod reactor;

@@ -4,6 +4,7 @@
 use crate::settings::DisplayExposure;
 use anyhow::{Context, bail};
 use clap::{Arg, ArgAction, Command, ValueHint, error::ErrorKind};
+use serde::de::DeserializeOwned;
 use std::{collections::BTreeMap, ffi::OsString, fs, ops::Range, path::Path};
 use toml::{Spanned, Value};
 
@@ -27,21 +28,55 @@ pub(crate) fn read(command: &Command, path: &Path) -> anyhow::Result<Config> {
 }
 
 fn parse(command: &Command, path: &Path, text: &str) -> anyhow::Result<Config> {
-    let table: BTreeMap<Spanned<String>, Spanned<Value>> = toml::from_str(text).map_err(|error| {
-        let line = line_of(text, error.span().unwrap_or_default());
-        anyhow::anyhow!("{}:{line}: {}", path.display(), error.message().replace('\n', ", "))
-    })?;
+    let file = TomlFile { path, text };
+    let (config, problems) = of_table(command, &file, file.parse()?);
+    problems.into_iter().next().map_or(Ok(config), Err)
+}
+
+/// A table of settings whose keys and values know where they stand.
+pub(crate) type Table = BTreeMap<Spanned<String>, Spanned<Value>>;
+
+/// A TOML file, to name the line of whatever is wrong in it.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct TomlFile<'a> {
+    pub(crate) path: &'a Path,
+    pub(crate) text: &'a str,
+}
+
+impl TomlFile<'_> {
+    /// The content of the file.
+    ///
+    /// # Errors
+    /// If it is not TOML or not a `T`; the message names the file and the line.
+    pub(crate) fn parse<T: DeserializeOwned>(&self) -> anyhow::Result<T> {
+        toml::from_str(self.text).map_err(|error| {
+            self.at(error.span().unwrap_or_default(), &anyhow::anyhow!("{}", error.message().replace('\n', ", ")))
+        })
+    }
+
+    /// The error with the file and the line where a span begins in front.
+    pub(crate) fn at(&self, span: Range<usize>, error: &anyhow::Error) -> anyhow::Error {
+        anyhow::anyhow!("{}:{}: {error:#}", self.path.display(), self.line(span))
+    }
+
+    /// The line, from 1, on which a span begins.
+    pub(crate) fn line(&self, span: Range<usize>) -> usize {
+        self.text.bytes().take(span.start).filter(|&byte| byte == b'\n').count() + 1
+    }
+}
+
+/// What a table says, as arguments of a command, and everything that is wrong in it, in the order of the file.
+pub(crate) fn of_table(command: &Command, file: &TomlFile<'_>, table: Table) -> (Config, Vec<anyhow::Error>) {
     let mut entries: Vec<_> = table.into_iter().collect();
     entries.sort_by_key(|(key, _)| key.span().start);
-
-    let mut config = Config::default();
-    let mut seen = Vec::new();
+    let (mut config, mut seen, mut problems) = (Config::default(), Vec::new(), Vec::new());
     for (key, value) in entries {
-        let line = line_of(text, key.span());
-        entry(command, path, (key.get_ref(), value.into_inner()), &mut seen, &mut config)
-            .map_err(|error| anyhow::anyhow!("{}:{line}: {error:#}", path.display()))?;
+        let value = (key.get_ref().as_str(), value.into_inner());
+        if let Err(error) = entry(command, file.path, value, &mut seen, &mut config) {
+            problems.push(file.at(key.span(), &error));
+        }
     }
-    Ok(config)
+    (config, problems)
 }
 
 /// Adds one key and its value to what the file says.
@@ -137,16 +172,16 @@ fn check(command: &Command, arg: &Arg, token: &OsString) -> anyhow::Result<()> {
     let separator = arg.is_positional().then(|| OsString::from("--"));
     match lone.try_get_matches_from(separator.iter().chain([token])) {
         Err(error) if !matches!(error.kind(), ErrorKind::DisplayHelp | ErrorKind::DisplayVersion) => {
-            let text = error.render().to_string();
-            let message = text.split("\n\n").next().unwrap_or_default();
-            let lines: Vec<&str> = message.lines().map(str::trim).collect();
-            bail!("{}", lines.join(" ").trim_start_matches("error: "))
+            bail!("{}", first_paragraph(&error))
         }
         _ => Ok(()),
     }
 }
 
-/// The line, from 1, on which a span of the text starts.
-fn line_of(text: &str, span: Range<usize>) -> usize {
-    text.bytes().take(span.start).filter(|&byte| byte == b'\n').count() + 1
+/// What clap says first, on one line.
+pub(crate) fn first_paragraph(error: &clap::Error) -> String {
+    let text = error.render().to_string();
+    let message = text.split("\n\n").next().unwrap_or_default();
+    let lines: Vec<&str> = message.lines().map(str::trim).collect();
+    lines.join(" ").trim_start_matches("error: ").to_owned()
 }

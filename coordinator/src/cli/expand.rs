@@ -2,7 +2,7 @@
 
 use super::{config, tokens};
 use anyhow::bail;
-use clap::Command;
+use clap::{Args, Command, parser::ValueSource};
 use std::{ffi::OsString, path::Path};
 
 /// Replaces `command FILE.toml` by the flags and positional arguments in that file. The user's flags follow the
@@ -45,6 +45,29 @@ pub(crate) fn insert_flags(grammar: &Command, mut argv: Vec<OsString>, flags: Ve
         argv.splice(place + 1..place + 1, flags);
     }
     argv
+}
+
+/// The flags of `A` that an argument list for a subcommand gives, each as one token; defaults are none of them.
+///
+/// # Errors
+/// If the list does not parse.
+pub(crate) fn given_flags<A: Args>(grammar: Command, argv: &[OsString]) -> Result<Vec<OsString>, clap::Error> {
+    let matches = grammar.try_get_matches_from(argv)?;
+    let Some((_, matches)) = matches.subcommand() else { return Ok(Vec::new()) };
+    let flags = A::augment_args(Command::new("flags"));
+    let mut tokens = Vec::new();
+    for arg in flags.get_arguments() {
+        let (id, Some(long)) = (arg.get_id().as_str(), arg.get_long()) else { continue };
+        if matches.value_source(id) != Some(ValueSource::CommandLine) {
+            continue;
+        }
+        for value in matches.get_raw(id).into_iter().flatten() {
+            let mut token = OsString::from(format!("--{long}="));
+            token.push(value);
+            tokens.push(token);
+        }
+    }
+    Ok(tokens)
 }
 
 /// Whether the command's own positional argument is a TOML file.

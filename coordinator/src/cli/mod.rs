@@ -9,16 +9,18 @@ mod args;
 mod config;
 mod exit;
 mod expand;
+mod manifest;
 mod preset;
 mod report;
 mod tokens;
 
 pub use exit::Exit;
 pub(crate) use exit::NotThereYet;
+pub(crate) use manifest::Problems;
 
 use crate::settings::DemoSettings;
 use anyhow::Context;
-use args::{Cli, Command, FitArgs};
+use args::{Cli, Command, FitArgs, MethodArgs};
 use clap::{CommandFactory, Parser};
 use std::{
     ffi::OsString,
@@ -45,7 +47,11 @@ fn parse(argv: Vec<OsString>) -> anyhow::Result<Cli> {
     let mut grammar = Cli::command();
     grammar.build();
     let argv = expand::expand_config(&grammar, argv)?;
-    let cli = Cli::try_parse_from(&argv)?;
+    let mut cli = Cli::try_parse_from(&argv)?;
+    if let Command::Batch(args) = &mut cli.command {
+        args.given = expand::given_flags::<MethodArgs>(grammar, &argv)?;
+        return Ok(cli);
+    }
     let Some(preset) = cli.command.preset() else { return Ok(cli) };
     let argv = expand::insert_flags(&grammar, argv, preset::flags(preset));
     Ok(Cli::try_parse_from(argv)?)
@@ -61,7 +67,7 @@ fn start_tracing(filter: &str) -> anyhow::Result<()> {
 }
 
 fn dispatch(Cli { log, command }: Cli) -> anyhow::Result<ExitCode> {
-    use crate::commands::{access, compare, demo, fit, render, worker};
+    use crate::commands::{access, batch, compare, demo, fit, render, worker};
     match command {
         Command::Demo(args) => demo::run(DemoSettings { log: Some(log), ..args.into_settings()? }),
         Command::Fit(args) => {
@@ -73,7 +79,13 @@ fn dispatch(Cli { log, command }: Cli) -> anyhow::Result<ExitCode> {
         Command::Compare(args) => compare::run(args.into_settings()),
         Command::Access(args) => access::run(args.into_settings()),
         Command::Worker(args) => worker::run(args),
-        Command::Batch(_) => later("lookalike batch", "run `lookalike fit` once per photo"),
+        Command::Batch(args) => {
+            args.check()?;
+            let fits = manifest::read(&args.manifest, &args.given)?;
+            let mut settings = args.into_settings(fits)?;
+            settings.cluster.log = Some(log);
+            batch::run(settings)
+        }
         Command::Status(_) => {
             later("lookalike status", "a fit tells its progress on stderr, its result in OUT/fit.json")
         }

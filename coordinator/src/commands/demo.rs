@@ -46,6 +46,7 @@ pub(crate) fn run(settings: DemoSettings) -> anyhow::Result<ExitCode> {
         inputs,
         cluster: ClusterSettings { workers: settings.workers, log: settings.log, ..ClusterSettings::default() },
         progress: settings.progress,
+        metrics: None,
         out: out.clone(),
         out_name: out_name.clone(),
         max_cssim: None,

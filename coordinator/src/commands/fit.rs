@@ -2,11 +2,10 @@
 
 use crate::{
     fitting::{self, FitJob},
-    inputs::{LoadedCapture, load_capture, resolve_display_exposure, show_warnings},
+    inputs::{load_capture, resolve_display_exposure, show_warnings},
     outputs::OutFolder,
     settings::FitSettings,
 };
-use serde_json::{Value, json};
 use std::{process::ExitCode, sync::Arc, time::Instant};
 
 pub(crate) fn run(settings: FitSettings) -> anyhow::Result<ExitCode> {
@@ -18,12 +17,13 @@ pub(crate) fn run(settings: FitSettings) -> anyhow::Result<ExitCode> {
     let coverage = loaded.capture.scoring_coverage();
     let exposure = resolve_display_exposure(&settings.display_exposure, loaded.capture.photo(), &coverage)?;
     let job = FitJob {
-        inputs: inputs_json(&loaded, &settings),
+        inputs: loaded.to_json(),
         capture: Arc::new(loaded.capture),
         settings: settings.method,
         exposure,
         cluster: settings.cluster,
         progress: settings.progress,
+        metrics: settings.metrics,
         out,
         out_name: settings.out.display().to_string(),
         max_cssim: settings.max_cssim,
@@ -31,17 +31,4 @@ pub(crate) fn run(settings: FitSettings) -> anyhow::Result<ExitCode> {
         input_seconds: began.elapsed().as_secs_f64(),
     };
     Ok(fitting::run(job)?.code)
-}
-
-fn inputs_json(loaded: &LoadedCapture, settings: &FitSettings) -> Value {
-    let mut environment = loaded.environment.to_json();
-    environment["mapping"] = json!(loaded.mapping.name());
-    environment["rotation_deg"] = json!(settings.environment.rotation_deg);
-    let mut inputs = json!({ "photo": loaded.photo.to_json(), "environment": environment });
-    for (role, file) in [("mask", &loaded.mask), ("normals", &loaded.normals)] {
-        if let Some(file) = file {
-            inputs[role] = file.to_json();
-        }
-    }
-    inputs
 }

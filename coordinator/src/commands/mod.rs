@@ -2,6 +2,7 @@
 //! reported by the command line.
 
 pub(crate) mod access;
+pub(crate) mod batch;
 pub(crate) mod compare;
 pub(crate) mod demo;
 pub(crate) mod fit;

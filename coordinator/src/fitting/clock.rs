@@ -30,6 +30,11 @@ impl Clock {
         }
     }
 
+    /// The last stage ends now.
+    pub(crate) fn end(&mut self) {
+        self.ends[NAMES.len() - 1] = Some(self.total());
+    }
+
     /// Seconds of each stage that ran; a stage begins where the one before it ended.
     pub(crate) fn stages(&self) -> Vec<(&'static str, f64)> {
         let mut last = 0.0;

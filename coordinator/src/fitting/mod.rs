@@ -3,21 +3,25 @@
 mod clock;
 mod method;
 mod notes;
+mod results;
+mod running;
 
+pub(crate) use clock::Clock;
 pub(crate) use method::method;
+pub(crate) use notes::notes;
+pub(crate) use results::{final_parameters, final_score, final_scores, judge, write_results};
+pub(crate) use running::{run_to_end, runner_options};
 
 use crate::{
     cli::Exit,
-    outputs::{FitRecord, OutFolder, Pictures, Timing, candidates_csv, parameters_json, print_summary, write_pictures},
-    progress::{Display, display},
-    runner::{self, RunnerOptions},
-    settings::{ClusterSettings, MethodSettings, ProgressKind},
+    metrics::Metrics,
+    outputs::{FitRecord, OutFolder, Pictures, Timing, print_summary},
+    progress::display,
+    settings::{ClusterSettings, MethodSettings, MetricsAddress, ProgressKind},
 };
 use anyhow::Context;
-use clock::Clock;
 use lookalike::{
-    fit::{FitOutcome, FitPlanner, JudgedBy, Method, nodes},
-    image::metadata,
+    fit::{FitOutcome, FitPlanner},
     scene::Capture,
 };
 use serde_json::Value;
@@ -34,6 +38,7 @@ pub(crate) struct FitJob {
     pub(crate) inputs: Value,
     pub(crate) cluster: ClusterSettings,
     pub(crate) progress: ProgressKind,
+    pub(crate) metrics: Option<MetricsAddress>,
     pub(crate) out: OutFolder,
     pub(crate) out_name: String,
     /// A final score above this makes the exit code 1.
@@ -58,14 +63,19 @@ pub(crate) fn run(job: FitJob) -> anyhow::Result<Finished> {
     let planner = FitPlanner::new(Arc::clone(&job.capture), method.clone(), job.exposure)
         .context("the photo cannot be fitted")?
         .also_render(&job.also_render);
+    let metrics = job.metrics.map(Metrics::listen).transpose()?;
     let mut display = display(job.progress, planner.best());
     let mut clock = Clock::start();
-    let run = run_graph(&job, planner, &mut *display, &mut clock);
+    let options = runner_options(&job.cluster, &job.out);
+    let run = run_to_end(options, planner, metrics.as_ref(), |event| {
+        clock.note(event);
+        display.event(event);
+    });
     let problem = run.as_ref().err().map(|error| format!("{error:#}"));
     display.finish(problem.as_deref().map_or(Ok(()), Err));
     let (planner, summary) = run?;
     let outcome = planner.into_outcome().context("the graph ended without a result: please report this")?;
-    let notes = notes::notes(&method, &outcome);
+    let notes = notes(&method, &outcome);
     let mut seconds = vec![("inputs", job.input_seconds)];
     seconds.extend(clock.stages());
     seconds.push(("total", job.input_seconds + clock.total()));
@@ -77,8 +87,16 @@ pub(crate) fn run(job: FitJob) -> anyhow::Result<Finished> {
         attempts: summary.attempts,
         requeued: summary.requeued_nodes,
     };
-    let pictures = write_results(&job, &method, &outcome, &notes, &timing)?;
-    let record = record(&job, &method, &outcome, &notes);
+    let record = FitRecord {
+        settings: &job.settings,
+        method: &method,
+        capture: &job.capture,
+        inputs: &job.inputs,
+        outcome: &outcome,
+        display_exposure: job.exposure,
+        notes: &notes,
+    };
+    let pictures = write_results(&job.out, &record, &timing)?;
     print_summary(&record, &timing, &job.out_name).context("cannot write to stdout")?;
     let best = final_score(&method, &outcome);
     let missed = job.max_cssim.is_some_and(|limit| best > limit);
@@ -87,94 +105,4 @@ pub(crate) fn run(job: FitJob) -> anyhow::Result<Finished> {
     }
     let code = if missed { Exit::MissedMaxCssim } else { Exit::Done };
     Ok(Finished { outcome, pictures, code: code.into() })
-}
-
-fn run_graph(
-    job: &FitJob,
-    planner: FitPlanner,
-    display: &mut dyn Display,
-    clock: &mut Clock,
-) -> anyhow::Result<(FitPlanner, crate::core::RunSummary)> {
-    let mut options = RunnerOptions::new(job.cluster.workers.count(), job.out.file("access.json"));
-    options.listen = job.cluster.listen_for_others();
-    options.access = job.cluster.access.clone();
-    options.advertise = job.cluster.advertise.as_ref().map(ToString::to_string);
-    options.log.clone_from(&job.cluster.log);
-    options.policy.wait_for_workers = job.cluster.wait_for_workers;
-    options.policy.grace = job.cluster.grace;
-    let runtime = tokio::runtime::Builder::new_multi_thread()
-        .worker_threads(2)
-        .enable_all()
-        .build()
-        .context("cannot start the network runtime")?;
-    let run = runner::run(options, planner, Arc::new(nodes::registry()), |event| {
-        clock.note(event);
-        display.event(event);
-    });
-    runtime.block_on(run).map_err(|error| {
-        match error.exit_code() {
-            2 => anyhow::Error::new(error).context(Exit::BadInput),
-            // The heading says it all.
-            130 => Exit::Interrupted.into(),
-            _ => anyhow::Error::new(error).context(Exit::ClusterFailed),
-        }
-    })
-}
-
-fn record<'a>(job: &'a FitJob, method: &'a Method, outcome: &'a FitOutcome, notes: &'a [String]) -> FitRecord<'a> {
-    FitRecord {
-        settings: &job.settings,
-        method,
-        capture: &job.capture,
-        inputs: &job.inputs,
-        outcome,
-        display_exposure: job.exposure,
-        notes,
-    }
-}
-
-fn write_results(
-    job: &FitJob,
-    method: &Method,
-    outcome: &FitOutcome,
-    notes: &[String],
-    timing: &Timing,
-) -> anyhow::Result<Pictures> {
-    let pictures = Pictures::new(&job.capture, outcome, job.exposure);
-    let parameters = parameters_json(method.model, final_parameters(outcome)).to_string();
-    let about = [
-        (metadata::SOFTWARE, "lookalike".to_owned()),
-        (metadata::VERSION, env!("CARGO_PKG_VERSION").to_owned()),
-        (metadata::CONVENTIONS, "linear Rec. 709; +Y up, camera on +Z; alpha is the microfacet width".to_owned()),
-        (metadata::MODEL, method.model.name().to_owned()),
-        (metadata::PARAMETERS, parameters),
-        (metadata::DISPLAY_EXPOSURE, job.exposure.to_string()),
-        (metadata::SEED, method.seed.to_string()),
-    ];
-    let about: Vec<(String, String)> = about.into_iter().map(|(k, v)| (k.to_owned(), v)).collect();
-    write_pictures(&job.out, &pictures, &about)?;
-    job.out.write("candidates.csv", candidates_csv(method.model, &outcome.judged).as_bytes())?;
-    // Last, for it marks a finished fit.
-    let document = record(job, method, outcome, notes).json(timing);
-    let text = serde_json::to_string_pretty(&document).context("fit.json")? + "\n";
-    job.out.write("fit.json", text.as_bytes())?;
-    Ok(pictures)
-}
-
-fn judge(method: &Method) -> &'static str {
-    match method.judge {
-        JudgedBy::Image => "image",
-        JudgedBy::Object => "object",
-    }
-}
-
-fn final_parameters(outcome: &FitOutcome) -> &[f64] {
-    let winner = &outcome.judged[outcome.winner].candidate.parameters;
-    outcome.polished.as_ref().map_or(winner, |p| &p.parameters)
-}
-
-fn final_score(method: &Method, outcome: &FitOutcome) -> f64 {
-    let winner = &outcome.judged[outcome.winner];
-    let polished = outcome.polished.as_ref().map(|p| method.judge.pick(p.cssim, p.cssim_object));
-    polished.unwrap_or_else(|| method.judge.pick(winner.cssim, winner.cssim_object))
 }

@@ -4,13 +4,14 @@ use super::{
     InputFile, LoadedEnvironment, LoadedGeometry, LoadedMask, LoadedPhoto, file::cannot_use, load_environment,
     load_mask, load_normals, load_photo, sphere_geometry,
 };
-use crate::settings::{self, EnvironmentSettings, FitSettings, ViewSettings};
+use crate::settings::{self, BatchFit, EnvironmentSettings, FitSettings, ViewSettings};
 use anyhow::Context;
 use lookalike::{
     image::Encoding,
     light::Mapping,
     scene::{Capture, CaptureInput, Circle, CircleSource, Geometry, Mask, Placement, SceneError},
 };
+use serde_json::{Value, json};
 use std::path::Path;
 
 /// The files of a capture and how to see them: the part of [`FitSettings`] that this needs.
@@ -40,6 +41,18 @@ impl<'a> From<&'a FitSettings> for CaptureFiles<'a> {
     }
 }
 
+impl<'a> From<&'a BatchFit> for CaptureFiles<'a> {
+    fn from(fit: &'a BatchFit) -> Self {
+        Self {
+            photo: &fit.photo,
+            mask: fit.mask.as_deref(),
+            environment: &fit.environment,
+            view: &fit.view,
+            sphere: fit.sphere,
+        }
+    }
+}
+
 /// A checked capture with the origins of its parts.
 #[derive(Debug, Clone)]
 pub struct LoadedCapture {
@@ -53,6 +66,8 @@ pub struct LoadedCapture {
     pub environment: InputFile,
     /// The map's layout, given or recognised.
     pub mapping: Mapping,
+    /// How far the map was turned about +Y, in degrees.
+    pub rotation_deg: f64,
     /// The mask's file.
     pub mask: Option<InputFile>,
     /// The normal map's file.
@@ -63,18 +78,45 @@ pub struct LoadedCapture {
     pub warnings: Vec<String>,
 }
 
+impl LoadedCapture {
+    /// The `inputs` of `fit.json`.
+    #[must_use]
+    pub fn to_json(&self) -> Value {
+        let mut environment = self.environment.to_json();
+        environment["mapping"] = json!(self.mapping.name());
+        environment["rotation_deg"] = json!(self.rotation_deg);
+        let mut inputs = json!({ "photo": self.photo.to_json(), "environment": environment });
+        for (role, file) in [("mask", &self.mask), ("normals", &self.normals)] {
+            if let Some(file) = file {
+                inputs[role] = file.to_json();
+            }
+        }
+        inputs
+    }
+}
+
 /// Reads the photo of a fit with its mask, its shape and its light, and checks them against each other.
 ///
 /// # Errors
 /// Those of the loaders, and of [`Capture::new`] when the parts do not fit each other or nothing can be fitted to.
 pub fn load_capture(files: &CaptureFiles<'_>) -> anyhow::Result<LoadedCapture> {
+    load_capture_under(files, load_environment)
+}
+
+/// As [`load_capture`], with the light from `light`, which may have it already.
+///
+/// # Errors
+/// Those of [`load_capture`] and of `light`.
+pub fn load_capture_under(
+    files: &CaptureFiles<'_>,
+    light: impl FnOnce(&EnvironmentSettings) -> anyhow::Result<LoadedEnvironment>,
+) -> anyhow::Result<LoadedCapture> {
     let LoadedPhoto { image, clipped, encoding, source, mut warnings, .. } = load_photo(files.photo)?;
     let (width, height) = (image.width(), image.height());
     let mask = files.mask.map(|path| same_size(path, width, height)).transpose()?;
     let mask_values = mask.as_ref().map(|loaded| &loaded.mask);
     let (shape, placement) = shape(files, mask_values, width, height)?;
-    let LoadedEnvironment { environment, mapping, source: map, warnings: of_map } =
-        load_environment(files.environment)?;
+    let LoadedEnvironment { environment, mapping, source: map, warnings: of_map } = light(files.environment)?;
 
     warnings.extend(of_map);
     warnings.extend(shape.warnings);
@@ -91,6 +133,7 @@ pub fn load_capture(files: &CaptureFiles<'_>) -> anyhow::Result<LoadedCapture> {
         encoding,
         environment: map,
         mapping,
+        rotation_deg: files.environment.rotation_deg,
         mask: mask_source,
         normals: shape.normals,
         circle_source: placement.map(|placement| placement.source),

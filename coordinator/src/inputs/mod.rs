@@ -15,7 +15,7 @@ mod material;
 mod photo;
 mod warnings;
 
-pub use capture::{CaptureFiles, LoadedCapture, load_capture};
+pub use capture::{CaptureFiles, LoadedCapture, load_capture, load_capture_under};
 pub use environment::{LoadedEnvironment, load_environment};
 pub use exposure::{load_display_exposure, resolve_display_exposure};
 pub use file::InputFile;

@@ -80,6 +80,13 @@ impl OutFolder {
         Ok(Self { path: path.to_owned(), _lock: Arc::new(lock) })
     }
 
+    /// Makes a folder in this one, for the results of one of several fits.
+    pub(crate) fn sub(&self, name: &str) -> anyhow::Result<Self> {
+        let path = self.file(name);
+        fs::create_dir_all(&path).with_context(|| format!("cannot make the folder {}", path.display()))?;
+        Ok(Self { path, _lock: Arc::clone(&self._lock) })
+    }
+
     /// The path of a file in the folder.
     pub(crate) fn file(&self, name: &str) -> PathBuf {
         self.path.join(name)

@@ -13,6 +13,6 @@ pub(crate) use fit_json::{FitRecord, Timing, parameters_json};
 pub(crate) use folder::OutFolder;
 pub(crate) use pictures::{Pictures, write_pictures};
 pub(crate) use strip::{Panel, strip};
-pub(crate) use summary::{print_result, print_summary};
+pub(crate) use summary::{aligned, print_result, print_summary};
 
 pub(crate) use candidates_csv::candidates_csv;

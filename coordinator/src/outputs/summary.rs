@@ -72,7 +72,7 @@ fn row(model: &dyn Model, name: &str, gamma: &str, cssim: f64, object: f64, para
 }
 
 /// Columns as wide as their widest entry; the first column left, the others right.
-fn aligned(rows: &[Vec<String>]) -> String {
+pub(crate) fn aligned(rows: &[Vec<String>]) -> String {
     let columns = rows.iter().map(Vec::len).max().unwrap_or(0);
     let width = |c: usize| rows.iter().filter_map(|r| r.get(c)).map(String::len).max().unwrap_or(0);
     let widths: Vec<usize> = (0..columns).map(width).collect();

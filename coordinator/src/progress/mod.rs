@@ -1,18 +1,26 @@
 //! How a run is shown while it goes: bars on a terminal, plain lines elsewhere, JSON lines for programs. All on stderr.
 
 mod bars;
+mod fits;
 mod json;
 mod lines;
+mod many_bars;
+mod many_lines;
 mod stage;
+
+pub(crate) use fits::{FitCount, FitEvent};
 
 use crate::{comm::RunEvent, settings::ProgressKind};
 use lookalike::fit::BestScore;
 use std::{io::IsTerminal, sync::Arc};
 
 /// Something that watches a run.
-pub(crate) trait Display {
+pub(crate) trait Display: Send {
     /// Takes note of what happened.
     fn event(&mut self, event: &RunEvent);
+
+    /// Takes note of what happened to a fit of a batch.
+    fn fit(&mut self, _event: &FitEvent, _count: FitCount) {}
 
     /// A line of text for people, above any bars.
     fn say(&mut self, text: &str);
@@ -30,8 +38,21 @@ pub(crate) fn display(kind: ProgressKind, best: Arc<BestScore>) -> Box<dyn Displ
             Some(bars) => Box::new(bars),
             None => Box::new(lines::Lines::new(best)),
         },
-        ProgressKind::Json => Box::new(json::JsonLines),
+        ProgressKind::Json => Box::new(json::JsonLines::new(1)),
         ProgressKind::None => Box::new(Silent),
+    }
+}
+
+/// The display of a batch of so many fits that the user asked for.
+pub(crate) fn display_of_many(kind: ProgressKind, fits: usize) -> Box<dyn Display> {
+    match kind {
+        ProgressKind::Auto if !std::io::stderr().is_terminal() => Box::new(many_lines::ManyLines::new()),
+        ProgressKind::Bar | ProgressKind::Auto => match many_bars::ManyBars::new(fits) {
+            Some(bars) => Box::new(bars),
+            None => Box::new(many_lines::ManyLines::new()),
+        },
+        ProgressKind::Json => Box::new(json::JsonLines::new(fits)),
+        ProgressKind::None => Box::new(SilentMany),
     }
 }
 
@@ -45,6 +66,30 @@ impl Display for Silent {
     }
 
     fn finish(&mut self, _outcome: Result<(), &str>) {}
+}
+
+/// Nothing but what has to be told: fits that failed.
+struct SilentMany;
+
+impl Display for SilentMany {
+    fn event(&mut self, _event: &RunEvent) {}
+
+    fn fit(&mut self, event: &FitEvent, _count: FitCount) {
+        if let (FitEvent::Failed { .. }, Some(line)) = (event, event.line()) {
+            self.say(&line);
+        }
+    }
+
+    fn say(&mut self, text: &str) {
+        eprintln!("{text}");
+    }
+
+    fn finish(&mut self, _outcome: Result<(), &str>) {}
+}
+
+/// As [`remark`], for a batch: of a node that fails, its fit tells.
+fn remark_of_many(event: &RunEvent) -> Option<String> {
+    if matches!(event, RunEvent::NodeFailed { .. }) { None } else { remark(event) }
 }
 
 /// What people should be told about a run beyond the counts; `None` for everything that goes as planned.

@@ -1,7 +1,7 @@
 //! The stages of a fit as a user sees them, counted from the events of its nodes.
 
 use crate::comm::{NodeName, RunEvent};
-use lookalike::graph::NodeId;
+use lookalike::graph::{NodeId, split_label};
 use std::collections::BTreeMap;
 
 /// One line of the display.
@@ -30,10 +30,22 @@ impl Stage {
         }
     }
 
+    /// A shorter title.
+    pub(super) fn short(self) -> &'static str {
+        match self {
+            Self::SubsetTables => "subset",
+            Self::Searches => "searches",
+            Self::FullTables => "full table",
+            Self::Judging => "judging",
+            Self::Polish => "polish",
+            Self::Pictures => "pictures",
+        }
+    }
+
     /// The stage a node belongs to.
     fn of(name: &NodeName) -> Option<Self> {
         Some(match name.kind.as_str() {
-            "transport" if name.label.starts_with("transport in full") => Self::FullTables,
+            "transport" if split_label(&name.label).1.starts_with("transport in full") => Self::FullTables,
             "transport" => Self::SubsetTables,
             "search" => Self::Searches,
             "select" => Self::Judging,
@@ -91,6 +103,12 @@ impl Tally {
             _ => return None,
         };
         Some((stage, self.counts[&stage]))
+    }
+
+    /// The first stage that is not complete, else the last one.
+    pub(super) fn latest(&self) -> Option<(Stage, Count)> {
+        let open = self.counts.iter().find(|(_, count)| !count.is_complete());
+        open.or_else(|| self.counts.last_key_value()).map(|(stage, count)| (*stage, *count))
     }
 }
 

@@ -1,8 +1,8 @@
 //! The settings of `lookalike fit`.
 
 use super::{
-    Circle, ClusterSettings, CompressAtZero, DisplayExposure, EnvironmentSettings, Gammas, Judge, ModelName, Preset,
-    ProgressKind, Samples, Sampling, SearchKind, Start, ViewSettings,
+    Circle, ClusterSettings, CompressAtZero, DisplayExposure, EnvironmentSettings, Gammas, Judge, MetricsAddress,
+    ModelName, Preset, ProgressKind, Samples, Sampling, SearchKind, Start, ViewSettings,
 };
 use std::{num::NonZeroUsize, path::PathBuf};
 
@@ -31,6 +31,8 @@ pub struct FitSettings {
     pub cluster: ClusterSettings,
     /// How progress is shown.
     pub progress: ProgressKind,
+    /// Where metrics are served.
+    pub metrics: Option<MetricsAddress>,
 }
 
 /// The method of design section 1 and its options.

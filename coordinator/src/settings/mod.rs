@@ -7,6 +7,7 @@
 //! What is deliberately absent: files are not opened here, and nothing here depends on the command line's grammar.
 
 mod access;
+mod batch;
 mod camera;
 mod choices;
 mod circle;
@@ -16,12 +17,14 @@ mod demo;
 mod exposure;
 mod fit;
 mod gammas;
+mod metrics;
 mod model;
 mod render;
 mod samples;
 mod scene;
 
 pub use access::AccessSettings;
+pub use batch::{BatchFit, BatchSettings, OnFailure, StageTwo};
 pub use camera::CameraSpec;
 pub use choices::{CompressAtZero, EnvMapping, Judge, MetricKind, Preset, ProgressKind, Sampling, SearchKind, Start};
 pub use circle::Circle;
@@ -31,6 +34,7 @@ pub use demo::DemoSettings;
 pub use exposure::{Anchor, DisplayExposure, GainKind};
 pub use fit::{FitSettings, MethodSettings};
 pub use gammas::Gammas;
+pub use metrics::MetricsAddress;
 pub use model::{ModelName, ModelParams};
 pub use render::{Material, RenderSettings};
 pub use samples::Samples;

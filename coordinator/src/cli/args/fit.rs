@@ -6,7 +6,7 @@ use super::{
     method::MethodArgs,
     scene::{EnvironmentArgs, PhotoArgs, SphereArgs, ViewArgs},
 };
-use crate::settings::{FitSettings, ProgressKind};
+use crate::settings::{FitSettings, MetricsAddress, ProgressKind};
 use anyhow::bail;
 use clap::Args;
 use std::path::PathBuf;
@@ -51,7 +51,10 @@ struct OutputArgs {
 pub(crate) struct DiagnosticsArgs {
     /// How progress is shown on stderr
     #[arg(long, value_name = "PROGRESS", value_enum, default_value_t)]
-    progress: ProgressKind,
+    pub(super) progress: ProgressKind,
+    /// Serve metrics for Prometheus: IP:PORT, or PORT for the loopback interface
+    #[arg(long, value_name = "ADDR")]
+    pub(super) metrics: Option<MetricsAddress>,
 }
 
 impl FitArgs {
@@ -73,12 +76,13 @@ impl FitArgs {
             out: self.output.out,
             cluster: self.cluster.into_settings()?,
             progress: self.diagnostics.progress,
+            metrics: self.diagnostics.metrics,
         })
     }
 }
 
 /// Accepts a score of the metric: finite, at or above 0.
-fn score(text: &str) -> anyhow::Result<f64> {
+pub(super) fn score(text: &str) -> anyhow::Result<f64> {
     match text.parse::<f64>() {
         Ok(score) if score.is_finite() && score >= 0.0 => Ok(score),
         _ => bail!("expected a number at or above 0"),

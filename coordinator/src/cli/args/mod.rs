@@ -4,6 +4,7 @@
 //! version does not have yet stays in the grammar and answers with [`super::NotThereYet`], so that nothing is ignored silently.
 
 mod access;
+mod batch;
 mod cluster;
 mod compare;
 mod fit;
@@ -12,7 +13,9 @@ mod method;
 mod render;
 mod scene;
 
+pub(crate) use batch::{BatchArgs, EntryArgs};
 pub(crate) use fit::FitArgs;
+pub(crate) use method::MethodArgs;
 
 use crate::settings::{DemoSettings, Preset, ProgressKind, Workers};
 use anyhow::bail;
@@ -37,8 +40,8 @@ pub(crate) enum Command {
     Demo(DemoArgs),
     /// Fit a BRDF model to a photo of an object under known light
     Fit(Box<FitArgs>),
-    /// Fit many photos as one run (not there yet)
-    Batch(Box<later::BatchArgs>),
+    /// Fit many photos as one run
+    Batch(Box<BatchArgs>),
     /// Show the state of a running or finished run (not there yet)
     Status(later::StatusArgs),
     /// Render a sphere, or a map of normals, of one material under one light

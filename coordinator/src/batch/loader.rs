@@ -1,0 +1,96 @@
+//! A thread that reads the inputs of the fits in order, a little ahead of their turn.
+
+use super::{check::Checked, lights::Lights, prepare::Prepared};
+use crate::settings::{BatchFit, StageTwo};
+use anyhow::{Context, bail};
+use std::{
+    sync::{
+        Arc,
+        mpsc::{Receiver, RecvError, SyncSender, TryRecvError, sync_channel},
+    },
+    thread,
+};
+
+/// Fits that wait for their turn in memory, beside the one that is being read.
+const AHEAD: usize = 1;
+
+/// A fit whose turn has come: its number, and its inputs or what is wrong with them now.
+pub(super) type Loaded = (u32, anyhow::Result<Box<Prepared>>);
+
+/// The receiving end. The thread ends when this is dropped or all fits are read.
+#[derive(Debug)]
+pub(super) struct Loader {
+    loaded: Receiver<Loaded>,
+}
+
+/// What the thread works on.
+#[derive(Debug)]
+pub(super) struct Shelf {
+    pub(super) fits: Arc<[BatchFit]>,
+    pub(super) checks: Arc<[Checked]>,
+    pub(super) lights: Arc<Lights>,
+    pub(super) stage_two: StageTwo,
+}
+
+impl Loader {
+    /// Starts to read.
+    pub(super) fn start(shelf: Shelf) -> anyhow::Result<Self> {
+        let (sender, loaded) = sync_channel(AHEAD);
+        let read = move || read_all(&shelf, &sender);
+        thread::Builder::new().name("loader".into()).spawn(read).context("cannot start a thread")?;
+        Ok(Self { loaded })
+    }
+
+    /// The next fit, once it is there; `None` after the last one.
+    pub(super) fn wait(&self) -> Option<Loaded> {
+        self.loaded.recv().map_err(|RecvError| ()).ok()
+    }
+
+    /// The next fit, if it is there. `Err(true)` after the last one.
+    pub(super) fn look(&self) -> Result<Loaded, bool> {
+        self.loaded.try_recv().map_err(|error| error == TryRecvError::Disconnected)
+    }
+}
+
+fn read_all(shelf: &Shelf, sender: &SyncSender<Loaded>) {
+    for ((number, fit), checked) in (0..).zip(shelf.fits.iter()).zip(shelf.checks.iter()) {
+        let prepared = Prepared::new(fit, &shelf.lights, shelf.stage_two);
+        let unchanged = prepared.and_then(|prepared| {
+            same(&checked.inputs, &prepared.inputs)?;
+            Ok(Box::new(prepared))
+        });
+        if sender.send((number, unchanged)).is_err() {
+            // Nobody wants fits any more.
+            return;
+        }
+    }
+}
+
+/// Refuses inputs that were changed while the batch ran: which of the two would the results be of?
+fn same(before: &serde_json::Value, now: &serde_json::Value) -> anyhow::Result<()> {
+    let roles = now.as_object().into_iter().flatten();
+    for (role, file) in roles {
+        if before[role]["blake3"] != file["blake3"] {
+            let path = file["path"].as_str().unwrap_or_default();
+            bail!("the {role} {path} was changed since the batch began; run this fit again");
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    #[test]
+    fn inputs_that_were_changed_are_named() {
+        let before =
+            json!({ "photo": { "path": "a.exr", "blake3": "1" }, "environment": { "path": "m.hdr", "blake3": "2" } });
+        assert!(same(&before, &before).is_ok());
+        let mut now = before.clone();
+        now["environment"]["blake3"] = json!("3");
+        let message = same(&before, &now).unwrap_err().to_string();
+        assert!(message.starts_with("the environment m.hdr was changed since the batch began"), "{message}");
+    }
+}

@@ -1,0 +1,102 @@
+//! Many fits as one run.
+//!
+//! ```text
+//!   manifest ──► fits ──► check: read every file once, tell all that is wrong
+//!                           │
+//!                  loader (a thread): reads a fit's files again when its turn is near
+//!                           ▼
+//!                  supply ──► Many planners on one graph ──► runner
+//!                           │ a fit ends
+//!                  results (rayon): OUT/<name>/..., then the summaries
+//! ```
+//! The board knows how every fit is doing. Everybody tells it, and it tells the display, the metrics and the summaries.
+
+mod board;
+mod check;
+mod lights;
+mod loader;
+mod prepare;
+mod results;
+mod summary;
+mod supply;
+mod window;
+
+use crate::{
+    cli::Exit,
+    fitting::{run_to_end, runner_options},
+    inputs::show_warnings,
+    metrics::Metrics,
+    outputs::{OutFolder, print_result},
+    progress::display_of_many,
+    settings::{BatchSettings, OnFailure},
+};
+use anyhow::Context;
+use board::Board;
+use lights::Lights;
+use lookalike::graph::Many;
+use std::{process::ExitCode, sync::Arc};
+use supply::{Supply, SupplyOptions};
+use window::{Demand, Window};
+
+/// Runs a batch and writes its results.
+pub(crate) fn run(settings: BatchSettings) -> anyhow::Result<ExitCode> {
+    // Whatever can fail fails before any work is done.
+    let out = OutFolder::create(&settings.out)?;
+    summary::refuse_old(&out)?;
+    let metrics = settings.metrics.map(Metrics::listen).transpose()?;
+    let lights = Arc::new(Lights::default());
+    let checked = check::check(&settings, &lights)?;
+    show_warnings(&checked.warnings);
+
+    let fits: Arc<[_]> = settings.fits.into();
+    let mut display = display_of_many(settings.progress, fits.len());
+    metrics.iter().for_each(|metrics| display.say(&format!("metrics at {}", metrics.url())));
+    let board = Arc::new(Board::new(&fits, out.clone(), display, metrics.clone())?);
+    let workers = settings.cluster.workers.count();
+    let demand = Arc::new(Demand::expecting(workers));
+    let (supply, written) = Supply::new(SupplyOptions {
+        fits: Arc::clone(&fits),
+        checks: checked.fits.into(),
+        lights,
+        board: Arc::clone(&board),
+        window: Window::new(Arc::clone(&demand), settings.stage_two),
+        stage_two: settings.stage_two,
+        is_fail_fast: settings.on_failure == OnFailure::FailFast,
+        out: out.clone(),
+        out_name: settings.out.display().to_string(),
+    })?;
+    let options = runner_options(&settings.cluster, &out);
+    let run = run_to_end(options, Many::new(supply), metrics.as_ref(), |event| {
+        demand.note(event);
+        board.note(event);
+    });
+    // Also of a run that failed: what was computed is written.
+    let run = run.map(|(planner, summary)| (drop(planner), summary).1);
+    written.wait();
+    let outcome = finish(&board, run.map(|_| ()));
+    let summary = board.finish(outcome.as_ref().err())?;
+    print_result(&summary).context("cannot write to stdout")?;
+    outcome.map(|()| board.exit().into())
+}
+
+/// How the run ended, as the user is to be told. One that a failed fit ended has told that already.
+fn finish(board: &Board, run: anyhow::Result<()>) -> anyhow::Result<()> {
+    match run {
+        Err(error) if board.was_stopped_by_a_fit() => {
+            tracing::info!(%error, "the run was ended by a fit that failed");
+            Ok(())
+        }
+        other => other,
+    }
+}
+
+/// The exit code of a batch: a fit that failed outweighs one that missed its score.
+fn exit(count: &crate::progress::FitCount) -> Exit {
+    if count.failed > 0 {
+        Exit::SomeFitsFailed
+    } else if count.missed > 0 {
+        Exit::MissedMaxCssim
+    } else {
+        Exit::Done
+    }
+}

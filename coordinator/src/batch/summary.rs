@@ -1,0 +1,230 @@
+//! `summary.csv`, `summary.json` and the table at the end: one row per fit.
+
+use super::board::{Row, State};
+use crate::{
+    outputs::{OutFolder, aligned, parameters_json},
+    progress::FitCount,
+};
+use anyhow::{Context, bail};
+use lookalike::brdf::flat_names;
+use serde_json::{Value, json};
+use std::fmt::Write as _;
+
+/// The schema of `summary.json`.
+const SCHEMA: &str = "lookalike.batch/1";
+
+/// The names of the summaries.
+const CSV: &str = "summary.csv";
+const JSON: &str = "summary.json";
+
+/// All fits at a time.
+#[derive(Debug)]
+pub(super) struct Summary {
+    pub(super) rows: Vec<Row>,
+    pub(super) count: FitCount,
+    /// `running`, `finished` or `stopped`.
+    pub(super) state: &'static str,
+    pub(super) seconds: f64,
+}
+
+/// Refuses a folder that holds a batch.
+pub(super) fn refuse_old(out: &OutFolder) -> anyhow::Result<()> {
+    let old = out.file(JSON);
+    if old.exists() {
+        bail!("{} says that a batch was run there already: choose another --out, or remove it first", old.display());
+    }
+    Ok(())
+}
+
+/// Writes both summaries, each in one piece.
+pub(super) fn write(summary: &Summary, out: &OutFolder) -> anyhow::Result<()> {
+    let text = serde_json::to_string_pretty(&summary.json()).context(JSON)? + "\n";
+    out.write(CSV, summary.csv().as_bytes())?;
+    out.write(JSON, text.as_bytes())
+}
+
+impl Summary {
+    fn json(&self) -> Value {
+        let FitCount { total, running, done, missed, failed } = self.count;
+        json!({
+            "schema": SCHEMA,
+            "software": { "name": "lookalike", "version": env!("CARGO_PKG_VERSION") },
+            "state": self.state,
+            "seconds": milliseconds(self.seconds),
+            "count": { "total": total, "running": running, "done": done, "missed": missed, "failed": failed },
+            "fits": self.rows.iter().map(of_row).collect::<Vec<_>>(),
+        })
+    }
+
+    fn csv(&self) -> String {
+        let parameters = self.parameters();
+        let fixed = [
+            "name",
+            "photo",
+            "env",
+            "model",
+            "state",
+            "cssim",
+            "cssim_object",
+            "gamma",
+            "polished",
+            "seconds",
+            "error",
+        ];
+        let header = fixed.iter().map(|name| (*name).to_owned()).chain(parameters.iter().cloned());
+        let mut text = header.collect::<Vec<_>>().join(",") + "\n";
+        for row in &self.rows {
+            let numbers = match &row.state {
+                State::Done(scores) => [
+                    scores.cssim.to_string(),
+                    scores.cssim_object.to_string(),
+                    scores.gamma.to_string(),
+                    scores.is_polished.to_string(),
+                ],
+                _ => Default::default(),
+            };
+            let error = if let State::Failed(error) = &row.state { error.as_str() } else { "" };
+            let seconds = row.seconds.map(|seconds| milliseconds(seconds).to_string()).unwrap_or_default();
+            let texts = [&row.name, &row.photo, &row.env, row.model.name(), row.state.name()].map(quoted);
+            let cells = texts.into_iter().chain(numbers).chain([seconds, quoted(error)]);
+            let cells = cells.chain(parameters.iter().map(|name| parameter(row, name)));
+            text.push_str(&cells.collect::<Vec<_>>().join(","));
+            text.push('\n');
+        }
+        text
+    }
+
+    /// The parameters of all models, each once.
+    fn parameters(&self) -> Vec<String> {
+        let mut all: Vec<String> = Vec::new();
+        for name in self.rows.iter().flat_map(|row| flat_names(row.model.parameters())) {
+            if !all.contains(&name) {
+                all.push(name);
+            }
+        }
+        all
+    }
+
+    /// For people.
+    pub(super) fn table(&self) -> String {
+        let header = ["fit", "state", "CSSIM", "on object", "gamma", "seconds"];
+        let mut rows = vec![header.map(str::to_owned).to_vec()];
+        for row in &self.rows {
+            let mut cells = vec![row.name.clone(), row.state.name().to_owned()];
+            match &row.state {
+                State::Done(scores) => cells.extend([
+                    format!("{:.4}", scores.cssim),
+                    format!("{:.4}", scores.cssim_object),
+                    scores.gamma.to_string(),
+                ]),
+                _ => cells.extend(std::iter::repeat_n(String::new(), 3)),
+            }
+            cells.push(row.seconds.map(|seconds| format!("{seconds:.1}")).unwrap_or_default());
+            rows.push(cells);
+        }
+        let mut text = aligned(&rows);
+        for row in &self.rows {
+            if let State::Failed(error) = &row.state {
+                let _ = writeln!(text, "\n{} failed: {error}", row.name);
+            }
+        }
+        let _ = writeln!(text, "\n{} in {:.1} s", self.count.text(), self.seconds);
+        text
+    }
+}
+
+fn of_row(row: &Row) -> Value {
+    let mut object = json!({
+        "name": row.name, "photo": row.photo, "env": row.env, "model": row.model.name(), "state": row.state.name(),
+        "seconds": row.seconds.map(milliseconds),
+    });
+    let (scores, error) = match &row.state {
+        State::Done(scores) => (Some(scores), None),
+        State::Failed(error) => (None, Some(error)),
+        State::Waiting | State::Running | State::Stopped => (None, None),
+    };
+    object["cssim"] = json!(scores.map(|scores| scores.cssim));
+    object["cssim_object"] = json!(scores.map(|scores| scores.cssim_object));
+    object["gamma"] = json!(scores.map(|scores| scores.gamma));
+    object["parameters"] = json!(scores.map(|scores| parameters_json(row.model, &scores.parameters)));
+    object["polished"] = json!(scores.map(|scores| scores.is_polished));
+    object["error"] = json!(error);
+    object
+}
+
+/// A parameter of a fit by its flat name; empty where the fit has none.
+fn parameter(row: &Row, name: &str) -> String {
+    let State::Done(scores) = &row.state else { return String::new() };
+    let place = flat_names(row.model.parameters()).iter().position(|known| known == name);
+    place.and_then(|place| scores.parameters.get(place)).map(f64::to_string).unwrap_or_default()
+}
+
+fn milliseconds(seconds: f64) -> f64 {
+    (seconds * 1000.0).round() / 1000.0
+}
+
+/// A text as a cell: in quotes where commas, quotes or line feeds would break the table.
+fn quoted(text: &str) -> String {
+    if text.contains([',', '"', '\n', '\r']) { format!("\"{}\"", text.replace('"', "\"\"")) } else { text.to_owned() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{super::results::Scores, *};
+    use lookalike::brdf;
+
+    fn row(name: &str, model: &str, state: State) -> Row {
+        let (photo, env) = ("a, b.exr".to_owned(), "m.hdr".to_owned());
+        Row { name: name.to_owned(), photo, env, model: brdf::model(model).unwrap(), state, seconds: Some(1.23456) }
+    }
+
+    fn scores(parameters: Vec<f64>, is_missed: bool) -> State {
+        let (cssim, cssim_object, gamma) = (0.25, 0.125, 1.5);
+        State::Done(Scores { cssim, cssim_object, gamma, parameters, is_polished: true, is_missed })
+    }
+
+    fn summary() -> Summary {
+        let rows = vec![
+            row("one", "ggx", scores((1..=7).map(f64::from).collect(), false)),
+            row("two", "cook-torrance", scores((1..=8).map(f64::from).collect(), true)),
+            row("three", "ggx", State::Failed("it said \"no\"".to_owned())),
+        ];
+        let count = FitCount { total: 3, running: 0, done: 2, missed: 1, failed: 1 };
+        Summary { rows, count, state: "finished", seconds: 9.0 }
+    }
+
+    #[test]
+    fn csv_has_a_column_for_every_parameter_of_every_model() {
+        let csv = summary().csv();
+        let lines: Vec<&str> = csv.lines().collect();
+        let parameters = "kd.r,kd.g,kd.b,f0.r,f0.g,f0.b,alpha,ks.r,ks.g,ks.b,f0,m";
+        assert!(lines[0].ends_with(&format!(",seconds,error,{parameters}")), "{csv}");
+        assert_eq!(lines[1], "one,\"a, b.exr\",m.hdr,ggx,done,0.25,0.125,1.5,true,1.235,,1,2,3,4,5,6,7,,,,,");
+        assert_eq!(
+            lines[2],
+            "two,\"a, b.exr\",m.hdr,cook-torrance,missed,0.25,0.125,1.5,true,1.235,,1,2,3,,,,,4,5,6,7,8"
+        );
+        assert_eq!(lines[3], "three,\"a, b.exr\",m.hdr,ggx,failed,,,,,1.235,\"it said \"\"no\"\"\",,,,,,,,,,,,");
+    }
+
+    #[test]
+    fn json_says_null_where_there_is_nothing() {
+        let json = summary().json();
+        assert_eq!((&json["schema"], &json["count"]["failed"]), (&json!("lookalike.batch/1"), &json!(1)));
+        assert_eq!(
+            json["fits"][0]["parameters"],
+            json!({ "kd": [1.0, 2.0, 3.0], "f0": [4.0, 5.0, 6.0], "alpha": 7.0 })
+        );
+        assert_eq!((&json["fits"][1]["state"], &json["fits"][1]["error"]), (&json!("missed"), &Value::Null));
+        assert_eq!((&json["fits"][2]["cssim"], &json["fits"][2]["parameters"]), (&Value::Null, &Value::Null));
+    }
+
+    #[test]
+    fn table_tells_failures_below_the_fits() {
+        let table = summary().table();
+        assert!(
+            table.contains("three failed: it said \"no\"\n\n2 of 3 done, 1 missed, 1 failed in 9.0 s\n"),
+            "{table}"
+        );
+    }
+}

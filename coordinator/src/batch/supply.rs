@@ -1,0 +1,148 @@
+//! Where the parts of the run come from, and where they go: the loader's fits in, results out.
+
+use super::{
+    board::Board,
+    check::Checked,
+    lights::Lights,
+    loader::{Loaded, Loader, Shelf},
+    prepare::Prepared,
+    results::{Fitted, Inputs, Writers, Written},
+    window::Window,
+};
+use crate::{
+    outputs::OutFolder,
+    settings::{BatchFit, StageTwo},
+};
+use lookalike::{
+    fit::FitPlanner,
+    graph::{Next, Part, PartFailure, Parts, PlanError},
+};
+use std::{collections::BTreeMap, sync::Arc};
+
+/// What a supply is made of.
+#[derive(Debug)]
+pub(super) struct SupplyOptions {
+    pub(super) fits: Arc<[BatchFit]>,
+    /// One per fit.
+    pub(super) checks: Arc<[Checked]>,
+    pub(super) lights: Arc<Lights>,
+    pub(super) board: Arc<Board>,
+    pub(super) window: Window,
+    pub(super) stage_two: StageTwo,
+    pub(super) is_fail_fast: bool,
+    pub(super) out: OutFolder,
+    pub(super) out_name: String,
+}
+
+/// The fits of a batch as the parts of its run.
+#[derive(Debug)]
+pub(super) struct Supply {
+    options: SupplyOptions,
+    loader: Loader,
+    /// How many fits the loader has handed over.
+    taken: usize,
+    active: BTreeMap<u32, Active>,
+    writers: Writers,
+}
+
+/// What the results of a fit under way will need.
+#[derive(Debug)]
+struct Active {
+    inputs: Inputs,
+    pixels: usize,
+}
+
+impl Supply {
+    /// The supply, and the end that waits until all results are written, which the supply has to be dropped for.
+    pub(super) fn new(options: SupplyOptions) -> anyhow::Result<(Self, Written)> {
+        let loader = Loader::start(Shelf {
+            fits: Arc::clone(&options.fits),
+            checks: Arc::clone(&options.checks),
+            lights: Arc::clone(&options.lights),
+            stage_two: options.stage_two,
+        })?;
+        let (writers, written) =
+            Writers::new(Arc::clone(&options.board), options.out.clone(), options.out_name.clone());
+        Ok((Self { options, loader, taken: 0, active: BTreeMap::new(), writers }, written))
+    }
+
+    /// The part of a fit whose inputs are there; none if they are not usable any more.
+    fn begin(&mut self, (number, loaded): Loaded) -> Result<Option<Part<FitPlanner>>, PlanError> {
+        self.taken += 1;
+        let fit = &self.options.fits[number as usize];
+        let prepared = match loaded {
+            Ok(prepared) => *prepared,
+            Err(error) => {
+                self.give_up(number, &format!("{error:#}"))?;
+                return Ok(None);
+            }
+        };
+        let pixels = prepared.pixels();
+        let Prepared { capture, method, exposure, inputs, planner, seconds, .. } = prepared;
+        self.options.board.started(number, planner.best(), seconds);
+        let settings = fit.method.clone();
+        let inputs = Inputs { capture, settings, method, exposure, inputs, max_cssim: fit.max_cssim };
+        self.active.insert(number, Active { inputs, pixels });
+        Ok(Some(Part { number, name: fit.name.clone(), planner }))
+    }
+
+    fn give_up(&mut self, number: u32, error: &str) -> Result<(), PlanError> {
+        self.options.board.failed(number, error);
+        self.check_failures()
+    }
+
+    /// With `--fail-fast`, the error that ends the run once a fit has failed, wherever that was.
+    fn check_failures(&self) -> Result<(), PlanError> {
+        if self.options.is_fail_fast && self.options.board.stop_if_failed() {
+            return Err(PlanError::new("a fit failed, and --fail-fast ends the batch then"));
+        }
+        Ok(())
+    }
+}
+
+impl Parts for Supply {
+    type Planner = FitPlanner;
+
+    fn next(&mut self, wait: bool) -> Result<Next<FitPlanner>, PlanError> {
+        loop {
+            self.check_failures()?;
+            let loaded = if wait { self.loader.wait().ok_or(true) } else { self.loader.look() };
+            match loaded {
+                Ok(loaded) => {
+                    if let Some(part) = self.begin(loaded)? {
+                        return Ok(Next::Part(Box::new(part)));
+                    }
+                }
+                Err(true) if self.taken < self.options.fits.len() => {
+                    return Err(PlanError::new("the thread that reads the inputs is gone: please report this"));
+                }
+                Err(true) => return Ok(Next::End),
+                Err(false) => return Ok(Next::NotYet),
+            }
+        }
+    }
+
+    fn wants_more(&self, active: usize, ready: usize) -> bool {
+        let Some(next) = self.options.checks.get(self.taken) else { return true };
+        let pixels = self.active.values().map(|active| active.pixels).sum();
+        self.options.window.has_room(active, ready, pixels, next.pixels)
+    }
+
+    fn completed(&mut self, part: Part<FitPlanner>) -> Result<(), PlanError> {
+        let Some(active) = self.active.remove(&part.number) else { return Ok(()) };
+        match part.planner.into_outcome() {
+            Some(outcome) => {
+                let timing = self.options.board.computed(part.number);
+                let fitted = Fitted { number: part.number, name: part.name, inputs: active.inputs, outcome, timing };
+                self.writers.write(fitted);
+                self.check_failures()
+            }
+            None => self.give_up(part.number, "its nodes ended without a result: please report this"),
+        }
+    }
+
+    fn failed(&mut self, part: Part<FitPlanner>, failure: PartFailure) -> Result<(), PlanError> {
+        self.active.remove(&part.number);
+        self.give_up(part.number, &failure.to_string())
+    }
+}

@@ -1,0 +1,146 @@
+//! `lookalike batch`.
+
+use super::{
+    super::NotThereYet,
+    cluster::ClusterArgs,
+    fit::{DiagnosticsArgs, score},
+    method::MethodArgs,
+    scene::{EnvironmentArgs, PhotoArgs, SphereArgs, ViewArgs},
+};
+use crate::settings::{BatchFit, BatchSettings, OnFailure, Preset, StageTwo};
+use clap::{Args, Parser};
+use std::{ffi::OsString, path::PathBuf};
+
+#[derive(Debug, Args)]
+#[command(args_override_self = true, after_long_help = EXAMPLES)]
+pub(crate) struct BatchArgs {
+    /// TOML file that lists the fits
+    #[arg(value_name = "MANIFEST.toml")]
+    pub(crate) manifest: PathBuf,
+    /// They win over what the manifest says.
+    #[command(flatten)]
+    method: MethodArgs,
+    /// Flags of the method that were given, as they were typed.
+    #[arg(skip)]
+    pub(crate) given: Vec<OsString>,
+    /// Folder of results, one subfolder per fit; must not hold a run
+    #[arg(long, short, value_name = "DIR", help_heading = "Output")]
+    out: PathBuf,
+    /// Go on with the other fits when one fails [default]
+    #[arg(long, overrides_with = "fail_fast", help_heading = "Output")]
+    keep_going: bool,
+    /// End the run when one fit fails
+    #[arg(long, overrides_with = "keep_going", help_heading = "Output")]
+    fail_fast: bool,
+    /// Go on with the run that is in the folder (not there yet)
+    #[arg(long, help_heading = "Output")]
+    resume: bool,
+    #[command(flatten)]
+    cluster: ClusterArgs,
+    /// Where candidates are rendered, judged and polished; the results are the same
+    #[arg(long, value_name = "WHERE", value_enum, default_value_t, help_heading = "Workers")]
+    stage_two: StageTwo,
+    /// Submit the run to Slurm (not there yet)
+    #[arg(long, help_heading = "Workers")]
+    slurm: bool,
+    #[command(flatten)]
+    diagnostics: DiagnosticsArgs,
+}
+
+impl BatchArgs {
+    /// The settings, for fits that the manifest lists.
+    pub(crate) fn into_settings(self, fits: Vec<BatchFit>) -> anyhow::Result<BatchSettings> {
+        let DiagnosticsArgs { progress, metrics } = self.diagnostics;
+        Ok(BatchSettings {
+            manifest: self.manifest,
+            fits,
+            out: self.out,
+            stage_two: self.stage_two,
+            on_failure: if self.fail_fast { OnFailure::FailFast } else { OnFailure::KeepGoing },
+            metrics,
+            cluster: self.cluster.into_settings()?,
+            progress,
+        })
+    }
+
+    /// Refuses what this version does not have.
+    pub(crate) fn check(&self) -> anyhow::Result<()> {
+        if self.slurm {
+            let instead =
+                "run lookalike batch in a job of its own, and its workers with srun lookalike worker --access FILE";
+            return Err(NotThereYet { what: "--slurm", instead }.into());
+        }
+        if self.resume {
+            let instead = "start again with another --out, and leave out of the manifest what is done";
+            return Err(NotThereYet { what: "lookalike batch --resume", instead }.into());
+        }
+        Ok(())
+    }
+}
+
+/// One fit of a manifest: what `lookalike fit` takes but for its outputs and its workers, which the batch has for all.
+#[derive(Debug, Parser)]
+#[command(name = "fit", no_binary_name = true, args_override_self = true, disable_help_flag = true)]
+pub(crate) struct EntryArgs {
+    #[command(flatten)]
+    photo: PhotoArgs,
+    #[command(flatten)]
+    environment: EnvironmentArgs,
+    #[command(flatten)]
+    view: ViewArgs,
+    #[command(flatten)]
+    sphere: SphereArgs,
+    #[command(flatten)]
+    method: MethodArgs,
+    /// Count the fit as missed if the final CSSIM lies above this
+    #[arg(long, value_name = "X", value_parser = score, allow_negative_numbers = true)]
+    max_cssim: Option<f64>,
+}
+
+impl EntryArgs {
+    pub(crate) fn preset(&self) -> Option<Preset> {
+        self.method.preset
+    }
+
+    /// The settings of the fit `name`, which a line of the manifest asks for.
+    pub(crate) fn into_settings(self, name: String, line: usize) -> anyhow::Result<BatchFit> {
+        self.photo.check_gain()?;
+        self.sphere.check(&self.view)?;
+        Ok(BatchFit {
+            name,
+            line,
+            photo: self.photo.photo,
+            mask: self.photo.mask,
+            environment: self.environment.into_settings(),
+            view: self.view.into_settings(),
+            sphere: self.sphere.sphere,
+            display_exposure: self.method.display_exposure.clone(),
+            method: self.method.into_settings(),
+            max_cssim: self.max_cssim,
+        })
+    }
+}
+
+const EXAMPLES: &str = "\
+Examples:
+  lookalike batch balls.toml --out runs
+  lookalike batch balls.toml --out runs --seed 3 --fail-fast
+  lookalike batch balls.toml --out runs --workers 0 --listen 10.0.0.1:4100 --stage-two workers --metrics 9100
+
+where balls.toml is, for instance (its relative paths are relative to the file):
+  photos = \"balls/*.exr\"                  # every photo under every light with every model
+  environments = [\"garden.hdr\"]
+  models = [\"ggx\", \"cook-torrance\"]
+
+  [defaults]                              # any flag of lookalike fit
+  camera = \"perspective:30\"
+  samples = 512
+
+  [[fit]]                                 # one more
+  name = \"gold-again\"
+  photo = \"gold.exr\"
+  env = \"attic.hdr\"
+  sphere = [128, 128, 100]
+  max-cssim = 0.05
+
+docs/batch.md has the whole grammar. The exit code is 4 if a fit failed, else 1 if one missed its max-cssim, else 0.";

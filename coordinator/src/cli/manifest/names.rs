@@ -1,0 +1,101 @@
+//! Names of fits, which are names of folders.
+
+use anyhow::bail;
+use lookalike::graph::MAX_PART_NAME_BYTES;
+use std::{collections::BTreeMap, path::Path};
+
+/// The names that are taken, in lower case, with the lines that took them: some file systems cannot tell `A` from `a`.
+#[derive(Debug, Default)]
+pub(super) struct Names(BTreeMap<String, usize>);
+
+impl Names {
+    /// Takes a name for a fit of this line.
+    pub(super) fn claim(&mut self, name: &str, line: usize) -> anyhow::Result<()> {
+        check(name)?;
+        match self.0.insert(name.to_lowercase(), line) {
+            None => Ok(()),
+            Some(other) if other == line => {
+                bail!("two fits are named {name:?}; list a file once, or give each fit a name in a [[fit]] of its own")
+            }
+            Some(other) => bail!(
+                "two fits are named {name:?}, the other one on line {other}; give a [[fit]] another name, or a [[set]] one that \
+                 goes before the names of its fits"
+            ),
+        }
+    }
+}
+
+/// Files that a batch writes beside the folders of its fits, without what follows the dot.
+const TAKEN: [&str; 5] = ["access", "run", "status", "summary", "manifest"];
+
+/// Accepts what is one part of a path everywhere and one word in a log.
+pub(super) fn check(name: &str) -> anyhow::Result<()> {
+    if name.is_empty() || name.len() > MAX_PART_NAME_BYTES {
+        bail!("a name must have 1 to {MAX_PART_NAME_BYTES} bytes, found {}: {name:?}", name.len());
+    }
+    if !name.chars().all(is_plain) || name.starts_with(['.', '-']) || name.ends_with('.') {
+        let instead = plain(name);
+        bail!(
+            "the name {name:?} would not do for a folder everywhere; use letters, digits and . _ - + only, such as {instead:?}"
+        );
+    }
+    let stem = name.split('.').next().unwrap_or_default().to_lowercase();
+    if TAKEN.contains(&stem.as_str()) {
+        bail!("the name {name:?} is that of a file which the batch itself writes; use another one");
+    }
+    Ok(())
+}
+
+/// The name of a fit that was given none: of photo, light and model.
+pub(super) fn of_inputs(prefix: Option<&str>, photo: &Path, environment: &Path, model: &str) -> String {
+    let stem = |path: &Path| plain(&path.file_stem().unwrap_or_default().to_string_lossy());
+    let parts = [prefix.map(str::to_owned), Some(stem(photo)), Some(stem(environment)), Some(model.to_owned())];
+    parts.into_iter().flatten().collect::<Vec<_>>().join("-")
+}
+
+fn is_plain(c: char) -> bool {
+    c.is_alphanumeric() || matches!(c, '.' | '_' | '-' | '+')
+}
+
+fn plain(text: &str) -> String {
+    let plain: String = text.chars().map(|c| if is_plain(c) { c } else { '_' }).collect();
+    let plain = plain.trim_start_matches(['.', '-']).trim_end_matches('.');
+    if plain.is_empty() { "fit".to_owned() } else { plain.to_owned() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_are_made_of_the_inputs() {
+        let name = |photo: &str| of_inputs(None, Path::new(photo), Path::new("maps/grace cross.hdr"), "ggx");
+        assert_eq!(name("a/red ball.exr"), "red_ball-grace_cross-ggx");
+        assert_eq!(name(".exr"), "exr-grace_cross-ggx");
+        let with = of_inputs(Some("day"), Path::new("é.png"), Path::new("m.hdr"), "cook-torrance");
+        assert_eq!(with, "day-é-m-cook-torrance");
+        assert!(check(&with).is_ok());
+    }
+
+    #[test]
+    fn names_that_are_no_folders_everywhere_are_refused_with_one_that_is() {
+        for (name, instead) in
+            [("a/b", "a_b"), ("../up", "_up"), ("two words", "two_words"), (".hidden", "hidden"), ("a:b", "a_b")]
+        {
+            let message = check(name).unwrap_err().to_string();
+            assert!(message.contains(&format!("such as {instead:?}")), "{message}");
+            assert!(check(instead).is_ok());
+        }
+        for name in ["", "summary", "run.sqlite", "Access", "-x", &"x".repeat(500)] {
+            assert!(check(name).is_err(), "{name}");
+        }
+    }
+
+    #[test]
+    fn a_name_is_given_once_whatever_its_case() {
+        let mut names = Names::default();
+        names.claim("Gold", 3).unwrap();
+        let message = names.claim("gold", 7).unwrap_err().to_string();
+        assert!(message.contains("the other one on line 3"), "{message}");
+    }
+}

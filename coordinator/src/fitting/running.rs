@@ -1,0 +1,56 @@
+//! A run from its settings to its end: what a fit and a batch have in common.
+
+use crate::{
+    cli::Exit,
+    comm::RunEvent,
+    core::RunSummary,
+    metrics::Metrics,
+    outputs::OutFolder,
+    runner::{self, RunnerOptions},
+    settings::ClusterSettings,
+};
+use anyhow::Context;
+use lookalike::{fit::nodes, graph::Planner};
+use std::sync::Arc;
+
+/// How a run with these settings treats its workers; its access file goes to `out`.
+pub(crate) fn runner_options(cluster: &ClusterSettings, out: &OutFolder) -> RunnerOptions {
+    let mut options = RunnerOptions::new(cluster.workers.count(), out.file("access.json"));
+    options.listen = cluster.listen_for_others();
+    options.access = cluster.access.clone();
+    options.advertise = cluster.advertise.as_ref().map(ToString::to_string);
+    options.log.clone_from(&cluster.log);
+    options.policy.wait_for_workers = cluster.wait_for_workers;
+    options.policy.grace = cluster.grace;
+    options
+}
+
+/// Runs a planner to its end. Its errors carry their exit code.
+pub(crate) fn run_to_end<P: Planner>(
+    options: RunnerOptions,
+    planner: P,
+    metrics: Option<&Metrics>,
+    mut observer: impl FnMut(&RunEvent),
+) -> anyhow::Result<(P, RunSummary)> {
+    let runtime = tokio::runtime::Builder::new_multi_thread()
+        .worker_threads(2)
+        .enable_all()
+        .build()
+        .context("cannot start the network runtime")?;
+    if let Some(metrics) = metrics {
+        let _guard = runtime.enter();
+        runtime.spawn(metrics.serve()?);
+    }
+    let run = runner::run(options, planner, Arc::new(nodes::registry()), |event| {
+        metrics.into_iter().for_each(|metrics| metrics.note(event));
+        observer(event);
+    });
+    runtime.block_on(run).map_err(|error| {
+        match error.exit_code() {
+            2 => anyhow::Error::new(error).context(Exit::BadInput),
+            // The heading says it all.
+            130 => Exit::Interrupted.into(),
+            _ => anyhow::Error::new(error).context(Exit::ClusterFailed),
+        }
+    })
+}

@@ -1,0 +1,90 @@
+//! As much of HTTP/1.1 as a scraper needs: one GET or HEAD per connection, one page. Bounded in time, size and number, for anybody
+//! who can connect may ask.
+
+use super::text::MEDIA_TYPE;
+use std::{io, sync::Arc, time::Duration};
+use tokio::{
+    io::{AsyncReadExt, AsyncWriteExt},
+    net::{TcpListener, TcpStream},
+    sync::Semaphore,
+    time::{sleep, timeout},
+};
+use tracing::debug;
+
+/// Requests that are answered at a time; more wait in the system's queue.
+const AT_A_TIME: usize = 8;
+/// How long a request and its answer may take.
+const PATIENCE: Duration = Duration::from_secs(5);
+/// The longest head of a request.
+const MOST_HEAD_BYTES: usize = 8 << 10;
+/// The pause after the system refuses to accept a connection, such as for want of file descriptors.
+const ACCEPT_PAUSE: Duration = Duration::from_millis(100);
+
+/// Answers requests with what `page` says at their time.
+pub(super) async fn serve(listener: TcpListener, page: impl Fn() -> String + Send + Sync + 'static) {
+    let (places, page) = (Arc::new(Semaphore::new(AT_A_TIME)), Arc::new(page));
+    loop {
+        let Ok(place) = Arc::clone(&places).acquire_owned().await else { return };
+        match listener.accept().await {
+            Ok((stream, _)) => {
+                let page = Arc::clone(&page);
+                tokio::spawn(async move {
+                    // Nobody but the scraper cares how it ended.
+                    let _ = timeout(PATIENCE, answer(stream, &*page)).await;
+                    drop(place);
+                });
+            }
+            Err(error) => {
+                debug!(%error, "cannot accept a request for metrics");
+                sleep(ACCEPT_PAUSE).await;
+            }
+        }
+    }
+}
+
+async fn answer(mut stream: TcpStream, page: impl Fn() -> String) -> io::Result<()> {
+    let head = read_head(&mut stream).await?;
+    stream.write_all(&response(&head, page)).await?;
+    stream.shutdown().await
+}
+
+/// Everything before the empty line, or what came within the bound.
+async fn read_head(stream: &mut TcpStream) -> io::Result<Vec<u8>> {
+    let mut head = Vec::new();
+    while !head.windows(4).any(|four| four == b"\r\n\r\n") && head.len() < MOST_HEAD_BYTES {
+        let mut part = [0; 1024];
+        match stream.read(&mut part).await? {
+            0 => break,
+            read => head.extend_from_slice(&part[..read]),
+        }
+    }
+    Ok(head)
+}
+
+/// The answer to a request with this head.
+pub(super) fn response(head: &[u8], page: impl Fn() -> String) -> Vec<u8> {
+    let line = head.split(|byte| *byte == b'\r').next().unwrap_or_default();
+    let line = String::from_utf8_lossy(line);
+    let words: Vec<&str> = line.split(' ').collect();
+    let [method, target, version] = words[..] else {
+        return message("400 Bad Request", "", "expected a request\n", true);
+    };
+    if !version.starts_with("HTTP/1.") {
+        return message("400 Bad Request", "", "expected HTTP/1.1\n", true);
+    }
+    if method != "GET" && method != "HEAD" {
+        return message("405 Method Not Allowed", "Allow: GET, HEAD\r\n", "expected GET\n", true);
+    }
+    let with_body = method == "GET";
+    match target.split('?').next() {
+        Some("/metrics") => message("200 OK", "", &page(), with_body),
+        _ => message("404 Not Found", "", "the metrics are at /metrics\n", with_body),
+    }
+}
+
+fn message(status: &str, header: &str, body: &str, with_body: bool) -> Vec<u8> {
+    let length = body.len();
+    let shown = if with_body { body } else { "" };
+    let head = format!("HTTP/1.1 {status}\r\nContent-Type: {MEDIA_TYPE}\r\nContent-Length: {length}\r\n{header}");
+    format!("{head}Connection: close\r\n\r\n{shown}").into_bytes()
+}

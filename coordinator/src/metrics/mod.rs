@@ -1,0 +1,77 @@
+//! `--metrics`: the counters of a run for Prometheus, over HTTP in its text format.
+//!
+//! What is counted is told by the events of the run and by the states of the fits, so that nothing else knows of metrics. They are
+//! for people: nothing of them reaches a result. docs/batch.md lists their names, which are a contract.
+
+mod book;
+mod histogram;
+mod http;
+mod text;
+
+use crate::{cli::Exit, comm::RunEvent, settings::MetricsAddress};
+use anyhow::Context;
+use book::Book;
+use std::{
+    net::{SocketAddr, TcpListener},
+    sync::{Arc, Mutex, PoisonError},
+    time::Instant,
+};
+
+/// The metrics of a run, and where they are served. Clones are the same metrics.
+#[derive(Debug, Clone)]
+pub(crate) struct Metrics {
+    book: Arc<Mutex<Book>>,
+    listener: Arc<TcpListener>,
+    address: SocketAddr,
+}
+
+impl Metrics {
+    /// Takes the address; requests wait until [`Metrics::serve`] answers them.
+    ///
+    /// # Errors
+    /// If it cannot be listened on.
+    pub(crate) fn listen(address: MetricsAddress) -> anyhow::Result<Self> {
+        let bind = || {
+            let listener = TcpListener::bind(address.0)?;
+            listener.set_nonblocking(true)?;
+            Ok::<_, std::io::Error>((listener.local_addr()?, listener))
+        };
+        let cannot = || format!("cannot serve metrics on {address}; is the address this machine's, and the port free?");
+        let (address, listener) = bind().with_context(cannot).context(Exit::BadInput)?;
+        Ok(Self { book: Arc::new(Mutex::new(Book::new(Instant::now()))), listener: Arc::new(listener), address })
+    }
+
+    /// What to type into a browser.
+    pub(crate) fn url(&self) -> String {
+        format!("http://{}/metrics", self.address)
+    }
+
+    /// Takes note of what happened.
+    pub(crate) fn note(&self, event: &RunEvent) {
+        self.with_book(|book| book.note(event, Instant::now()));
+    }
+
+    /// How many fits there are in each state.
+    pub(crate) fn set_fits(&self, fits: &[(&'static str, usize)]) {
+        self.with_book(|book| book.set_fits(fits));
+    }
+
+    /// Answers requests for as long as it is polled. To be called inside a tokio runtime.
+    ///
+    /// # Errors
+    /// If the runtime refuses the socket.
+    pub(crate) fn serve(&self) -> anyhow::Result<impl Future<Output = ()> + Send + use<>> {
+        let listener = self.listener.try_clone().and_then(tokio::net::TcpListener::from_std);
+        let listener = listener.context("cannot serve metrics")?;
+        let metrics = self.clone();
+        Ok(http::serve(listener, move || metrics.with_book(|book| text::page(book, Instant::now()))))
+    }
+
+    fn with_book<T>(&self, use_it: impl FnOnce(&mut Book) -> T) -> T {
+        // A panic cannot leave the numbers half changed in a way that matters.
+        use_it(&mut self.book.lock().unwrap_or_else(PoisonError::into_inner))
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,73 @@
+//! The settings of `lookalike batch`.
+
+use super::{
+    Circle, ClusterSettings, DisplayExposure, EnvironmentSettings, MethodSettings, MetricsAddress, ProgressKind,
+    ViewSettings,
+};
+use std::path::PathBuf;
+
+/// Many fits as one run.
+#[derive(Debug, Clone, PartialEq)]
+pub struct BatchSettings {
+    /// The file that lists the fits.
+    pub manifest: PathBuf,
+    /// The fits, in the order in which they are to be done; at least one, and no two of one name.
+    pub fits: Vec<BatchFit>,
+    /// The folder of results.
+    pub out: PathBuf,
+    /// Where candidates are judged and polished.
+    pub stage_two: StageTwo,
+    /// What happens when a fit fails.
+    pub on_failure: OnFailure,
+    /// Where metrics are served.
+    pub metrics: Option<MetricsAddress>,
+    /// Who computes.
+    pub cluster: ClusterSettings,
+    /// How progress is shown.
+    pub progress: ProgressKind,
+}
+
+/// One photo of a batch, its light, and how to fit it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct BatchFit {
+    /// Its name, which is also that of its folder: a part of a path on any file system.
+    pub name: String,
+    /// The line of the manifest that asks for it.
+    pub line: usize,
+    /// The photo.
+    pub photo: PathBuf,
+    /// Which pixels show the object; none means all that the silhouette covers.
+    pub mask: Option<PathBuf>,
+    /// The light.
+    pub environment: EnvironmentSettings,
+    /// Camera and shape.
+    pub view: ViewSettings,
+    /// Where the sphere lies; none means fitted to the mask, else the inscribed circle.
+    pub sphere: Option<Circle>,
+    /// How to fit.
+    pub method: MethodSettings,
+    /// Exposure before the metric.
+    pub display_exposure: DisplayExposure,
+    /// A final CSSIM above this makes the exit code 1; finite, at or above 0.
+    pub max_cssim: Option<f64>,
+}
+
+/// Where what follows the searches of a fit runs: judging its candidates, polish, pictures.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, clap::ValueEnum)]
+pub enum StageTwo {
+    /// In the coordinator's own process
+    #[default]
+    Coordinator,
+    /// On workers, each fit on one at a time
+    Workers,
+}
+
+/// What a batch does when one of its fits fails.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum OnFailure {
+    /// It goes on with the others.
+    #[default]
+    KeepGoing,
+    /// It ends.
+    FailFast,
+}
