@@ -124,8 +124,8 @@ fn bad_usage_is_code_two_and_says_what_is_possible() {
 fn what_is_not_there_yet_says_so_and_what_to_do() {
     let fit = "fit ball.exr --env garden.hdr --out run";
     for (arguments, phrases) in [
-        ("batch all.toml --out runs".to_owned(), &["lookalike batch is not there yet", "once per photo"][..]),
-        ("batch all.toml --out runs --slurm --metrics 127.0.0.1:9100 --keep-going".into(), &["not there yet"]),
+        ("batch all.toml --out runs --slurm".to_owned(), &["--slurm is not there yet", "srun lookalike worker"][..]),
+        ("batch all.toml --out runs --resume".into(), &["lookalike batch --resume is not there yet"]),
         ("status run --json".into(), &["lookalike status is not there yet", "fit.json"]),
         ("check ball.exr --env garden.hdr".into(), &["lookalike check is not there yet"]),
         ("export run --format materialx -o m.mtlx".into(), &["lookalike export is not there yet"]),

@@ -75,6 +75,17 @@ struct Node {
     holders: usize,
 }
 
+/// What the inputs of a new node are like.
+#[derive(Default)]
+struct Inputs {
+    /// Blobs that are there.
+    read: Vec<BlobHash>,
+    /// Nodes that are open.
+    awaited: Vec<NodeId>,
+    /// A node that has failed.
+    failed: Option<NodeId>,
+}
+
 impl Graph {
     /// A graph without nodes and blobs.
     #[must_use]
@@ -116,7 +127,7 @@ impl Graph {
         check_limit("label", spec.label.len(), MAX_NAME_BYTES)?;
         check_limit("parameters", spec.parameters.len(), MAX_PARAMETER_BYTES)?;
         check_limit("inputs", spec.inputs.len(), MAX_INPUTS)?;
-        let (read, awaited, failed_input) = self.look_at_inputs(&spec)?;
+        let Inputs { read, awaited, failed } = self.look_at_inputs(&spec)?;
         let node = NodeId(self.nodes.len() as u64);
         for source in &awaited {
             self.at_mut(*source).dependents.push(node);
@@ -128,7 +139,7 @@ impl Graph {
         self.nodes.push(Node { spec, state: NodeState::Waiting, awaited_inputs, dependents: Vec::new(), holders: 1 });
         self.open += 1;
         self.changes.push_back(Change::Added(node));
-        if let Some(source) = failed_input {
+        if let Some(source) = failed {
             self.fail(node, self.input_failed(source));
         } else if awaited_inputs == 0 {
             self.make_ready(node);
@@ -136,10 +147,9 @@ impl Graph {
         Ok(node)
     }
 
-    /// The blobs that a new node reads and that are there, the nodes it waits for, and an input that has failed.
-    fn look_at_inputs(&self, spec: &NodeSpec) -> Result<(Vec<BlobHash>, Vec<NodeId>, Option<NodeId>), PlanError> {
+    fn look_at_inputs(&self, spec: &NodeSpec) -> Result<Inputs, PlanError> {
         let label = || spec.label.clone();
-        let (mut read, mut awaited, mut failed) = (Vec::new(), Vec::new(), None);
+        let Inputs { mut read, mut awaited, mut failed } = Inputs::default();
         for input in &spec.inputs {
             match *input {
                 Input::Blob(hash) if self.blob(hash).is_none() => {
@@ -157,7 +167,7 @@ impl Graph {
                 },
             }
         }
-        Ok((read, awaited, failed))
+        Ok(Inputs { read, awaited, failed })
     }
 
     /// Hold a node once more, unless it is too late: it has failed, or its output was let go. Whether it is held.

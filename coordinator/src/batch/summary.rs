@@ -109,7 +109,8 @@ impl Summary {
     pub(super) fn table(&self) -> String {
         let header = ["fit", "state", "CSSIM", "on object", "gamma", "seconds"];
         let mut rows = vec![header.map(str::to_owned).to_vec()];
-        for row in &self.rows {
+        let has_begun = |row: &&Row| !matches!(row.state, State::Waiting | State::Stopped);
+        for row in self.rows.iter().filter(has_begun) {
             let mut cells = vec![row.name.clone(), row.state.name().to_owned()];
             match &row.state {
                 State::Done(scores) => cells.extend([
@@ -128,7 +129,9 @@ impl Summary {
                 let _ = writeln!(text, "\n{} failed: {error}", row.name);
             }
         }
-        let _ = writeln!(text, "\n{} in {:.1} s", self.count.text(), self.seconds);
+        let stopped = self.rows.iter().filter(|row| matches!(row.state, State::Stopped)).count();
+        let stopped = if stopped > 0 { format!(", {stopped} not done") } else { String::new() };
+        let _ = writeln!(text, "\n{}{stopped} in {:.1} s", self.count.text(), self.seconds);
         text
     }
 }

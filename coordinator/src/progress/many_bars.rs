@@ -64,12 +64,13 @@ impl ManyBars {
         let height = usize::from(console_height());
         let most = MOST_ROWS.min(height.saturating_sub(OTHER_LINES)).max(1);
         let mut shown = self.fits.values().filter(|row| row.bar.is_some()).count();
-        for (place, row) in self.fits.values_mut().enumerate() {
+        // Fits begin in order, so that a new row is the last one.
+        for row in self.fits.values_mut() {
             if shown >= most {
                 break;
             }
             if row.bar.is_none() {
-                let bar = self.all.insert(place, ProgressBar::new(1000));
+                let bar = self.all.insert_before(&self.total, ProgressBar::new(1000));
                 bar.set_style(style("{prefix:<30} {msg:<34} {percent:>8}% {wide_bar:.cyan/blue}"));
                 bar.set_prefix(shortened(&row.name));
                 row.bar = Some(bar);
@@ -81,10 +82,18 @@ impl ManyBars {
         self.more.set_message(if hidden > 0 { format!("and {hidden} more under way") } else { String::new() });
     }
 
+    /// Takes a row away.
+    fn clear(&self, row: Row) {
+        if let Some(bar) = row.bar {
+            bar.finish_and_clear();
+            self.all.remove(&bar);
+        }
+    }
+
     fn end(&mut self, number: u32, event: &FitEvent) {
         if let Some(row) = self.fits.remove(&number) {
             self.numbers.remove(&row.name);
-            row.bar.into_iter().for_each(|bar| bar.finish_and_clear());
+            self.clear(row);
         }
         self.owners.retain(|_, owner| *owner != number);
         if let Some(line) = event.line() {
@@ -156,7 +165,7 @@ impl Display for ManyBars {
 
     fn finish(&mut self, _outcome: Result<(), &str>) {
         for row in std::mem::take(&mut self.fits).into_values() {
-            row.bar.into_iter().for_each(|bar| bar.finish_and_clear());
+            self.clear(row);
         }
         self.more.finish_and_clear();
         self.total.disable_steady_tick();

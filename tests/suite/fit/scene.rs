@@ -17,19 +17,19 @@ use std::{
 use tempfile::TempDir;
 
 /// Columns and rows of the photo.
-pub(super) const SIZE: usize = 48;
+pub(crate) const SIZE: usize = 48;
 
 /// A cheap fit: few pixels, few gammas, one worker.
-pub(super) const QUICK: &str = "--samples 32 --gammas 1:2:0.5 --workers 1 --progress none";
+pub(crate) const QUICK: &str = "--samples 32 --gammas 1:2:0.5 --workers 1 --progress none";
 
 /// A folder with `photo.exr` and `map.exr`.
-pub(super) fn folder() -> TempDir {
+pub(crate) fn folder() -> TempDir {
     static PHOTO: OnceLock<Image> = OnceLock::new();
     folder_with(PHOTO.get_or_init(|| photo(SIZE)))
 }
 
 /// As [`folder`], with a photo of another size.
-pub(super) fn folder_of_size(size: usize) -> TempDir {
+pub(crate) fn folder_of_size(size: usize) -> TempDir {
     folder_with(&photo(size))
 }
 
@@ -58,33 +58,33 @@ fn photo(size: usize) -> Image {
 }
 
 /// Fits `photo.exr` under `map.exr` into the folder `out`.
-pub(super) fn fit(folder: &Path, out: &str, flags: &str) -> Answer {
+pub(crate) fn fit(folder: &Path, out: &str, flags: &str) -> Answer {
     lookalike(folder, &format!("fit photo.exr --env map.exr --out {out} {flags}"))
 }
 
 /// The results of a fit: those of [`QUICK`] and more flags, which win.
-pub(super) fn quick(flags: &str) -> Value {
+pub(crate) fn quick(flags: &str) -> Value {
     let folder = folder();
     fit(folder.path(), "out", &format!("{QUICK} {flags}")).done();
     fit_json(&folder.path().join("out"))
 }
 
 /// `fit.json` of a folder of results.
-pub(super) fn fit_json(out: &Path) -> Value {
+pub(crate) fn fit_json(out: &Path) -> Value {
     serde_json::from_slice(&fs::read(out.join("fit.json")).unwrap()).unwrap()
 }
 
 /// `fit.json` without its `timing`, which must be there, as text.
-pub(super) fn without_timing(out: &Path) -> String {
+pub(crate) fn without_timing(out: &Path) -> String {
     let mut json = fit_json(out);
     json.as_object_mut().unwrap().remove("timing").expect("a timing block");
     serde_json::to_string_pretty(&json).unwrap()
 }
 
-pub(super) fn picture(path: &Path) -> Decoded {
+pub(crate) fn picture(path: &Path) -> Decoded {
     decode("result", &fs::read(path).unwrap()).unwrap()
 }
 
-pub(super) fn number(value: &Value) -> f64 {
+pub(crate) fn number(value: &Value) -> f64 {
     value.as_f64().unwrap_or_else(|| panic!("not a number: {value}"))
 }

@@ -1,0 +1,38 @@
+//! A fit of a batch is the same fit as alone, bit for bit, wherever its second stage runs and whatever it shares with others.
+
+use super::{QUICK, batch, folder, scene, states, summary};
+use crate::program::lookalike;
+use std::fs;
+
+const PICTURES: [&str; 5] = ["match.exr", "match.png", "reference.png", "difference.png", "candidates.csv"];
+
+#[test]
+fn fits_of_a_batch_are_the_fits_alone_wherever_they_are_judged() {
+    let manifest = format!(
+        "photos = ['photo.exr', 'red.exr']\nenvironments = 'map.exr'\nmodels = ['ggx', 'cook-torrance']\n[defaults]\n{QUICK}\
+         [[fit]]\nname = 'again'\nphoto = 'photo.exr'\nenv = 'map.exr'\njudge = 'object'\n"
+    );
+    let folder = folder(&manifest);
+    batch(&folder, "here", "--workers 2").done();
+    batch(&folder, "there", "--workers 3 --stage-two workers").done();
+    let alone = [
+        ("photo-map-ggx", "photo.exr", ""),
+        ("photo-map-cook-torrance", "photo.exr", "--model cook-torrance"),
+        ("red-map-ggx", "red.exr", ""),
+        ("red-map-cook-torrance", "red.exr", "--model cook-torrance"),
+        ("again", "photo.exr", "--judge object"),
+    ];
+    for (name, photo, flags) in alone {
+        let quick = "--samples 32 --gammas 1:2:0.5 --workers 1 --progress none";
+        lookalike(folder.path(), &format!("fit {photo} --env map.exr --out alone/{name} {quick} {flags}")).done();
+        let at = |run: &str| folder.path().join(run).join(name);
+        for run in ["here", "there"] {
+            assert_eq!(scene::without_timing(&at("alone")), scene::without_timing(&at(run)), "{name} {run}");
+            for file in PICTURES {
+                let [one, same] = ["alone", run].map(|run| fs::read(at(run).join(file)).unwrap());
+                assert!(one == same, "{file} of {name} {run}");
+            }
+        }
+    }
+    assert_eq!(states(&summary(&folder.path().join("there"))), ["done"; 5]);
+}
