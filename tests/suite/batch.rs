@@ -14,13 +14,16 @@ use serde_json::Value;
 use std::{fs, path::Path};
 use tempfile::TempDir;
 
+/// Columns and rows of the photos.
+const SIZE: usize = 32;
+
 /// Settings of a cheap fit.
 const QUICK: &str = "samples = 32\ngammas = '1:2:0.5'\n";
 
 /// A folder with two photos of one scene (`photo.exr`, and `red.exr`, the same through a red glass), one that is too small to be
 /// judged (`tiny.exr`: its fit fails in the run), the light `map.exr` and a manifest.
 fn folder(manifest: &str) -> TempDir {
-    let folder = scene::folder();
+    let folder = scene::folder_of_size(SIZE);
     let photo = scene::picture(&folder.path().join("photo.exr")).image;
     let (width, height) = (photo.width(), photo.height());
     let red = image(width, height, |c, r| {

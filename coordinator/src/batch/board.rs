@@ -86,6 +86,8 @@ struct Inner {
     clocks: BTreeMap<u32, FitClock>,
     display: Box<dyn Display>,
     workers_joined: usize,
+    /// How the run is doing: `running`, `finished` or `stopped`.
+    state: &'static str,
     /// Whether a failed fit has ended the run.
     is_stopped: bool,
     began: Instant,
@@ -124,11 +126,12 @@ impl Board {
             clocks: BTreeMap::new(),
             display,
             workers_joined: 0,
+            state: "running",
             is_stopped: false,
             began: Instant::now(),
         };
         let board = Self { inner: Mutex::new(inner), metrics, out, writing: Mutex::new(()) };
-        board.write_summaries("running")?;
+        board.write_summaries()?;
         board.lock().show_metrics(board.metrics.as_ref());
         Ok(board)
     }
@@ -216,9 +219,10 @@ impl Board {
         inner.display.finish(problem.as_deref().map_or(Ok(()), Err));
         inner.show_metrics(self.metrics.as_ref());
         let is_whole = inner.rows.iter().all(|row| !matches!(row.state, State::Stopped));
+        inner.state = if is_whole { "finished" } else { "stopped" };
         drop(inner);
-        self.write_summaries(if is_whole { "finished" } else { "stopped" })?;
-        Ok(self.summary("").table())
+        self.write_summaries()?;
+        Ok(self.summary().table())
     }
 
     /// The exit code that the fits ask for.
@@ -231,27 +235,26 @@ impl Board {
         self.inner.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn summary(&self, state: &'static str) -> Summary {
+    fn summary(&self) -> Summary {
         let inner = self.lock();
-        Summary { rows: inner.rows.clone(), count: inner.count(), state, seconds: inner.began.elapsed().as_secs_f64() }
+        let (rows, count, state) = (inner.rows.clone(), inner.count(), inner.state);
+        Summary { rows, count, state, seconds: inner.began.elapsed().as_secs_f64() }
     }
 
     /// Writes the summaries without letting the caller wait for the disk.
     fn write_summaries_soon(self: &Arc<Self>) {
         let board = Arc::clone(self);
         rayon::spawn(move || {
-            if let Err(error) = board.write_summaries("running") {
+            if let Err(error) = board.write_summaries() {
                 warn!("{error:#}");
             }
         });
     }
 
-    fn write_summaries(&self, state: &'static str) -> anyhow::Result<()> {
+    /// Writes the summaries as of now: one that comes late, after the end of the run, repeats the last ones.
+    fn write_summaries(&self) -> anyhow::Result<()> {
         let _writing = self.writing.lock().unwrap_or_else(PoisonError::into_inner);
-        // One that comes late has nothing newer to say, but a word that is not true any more.
-        let is_over = self.lock().rows.iter().any(|row| matches!(row.state, State::Stopped));
-        let state = if is_over { "stopped" } else { state };
-        summary::write(&self.summary(state), &self.out)
+        summary::write(&self.summary(), &self.out)
     }
 }
 

@@ -43,7 +43,12 @@ pub(super) fn check(settings: &BatchSettings, lights: &Lights) -> anyhow::Result
         match found {
             Ok((checked, of_fit)) => {
                 fits.push(checked);
-                warnings.extend(of_fit);
+                // Fits of one photo or one light have them in common.
+                for warning in of_fit {
+                    if !warnings.contains(&warning) {
+                        warnings.push(warning);
+                    }
+                }
             }
             Err(error) => {
                 let text = format!("{error:#}");

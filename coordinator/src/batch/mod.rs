@@ -28,7 +28,7 @@ use crate::{
     metrics::Metrics,
     outputs::{OutFolder, print_result},
     progress::display_of_many,
-    settings::{BatchSettings, OnFailure},
+    settings::{BatchSettings, OnFailure, ProgressKind},
 };
 use anyhow::Context;
 use board::Board;
@@ -46,10 +46,12 @@ pub(crate) fn run(settings: BatchSettings) -> anyhow::Result<ExitCode> {
     let metrics = settings.metrics.map(Metrics::listen).transpose()?;
     let lights = Arc::new(Lights::default());
     let checked = check::check(&settings, &lights)?;
-    show_warnings(&checked.warnings);
-
     let fits: Arc<[_]> = settings.fits.into();
     let mut display = display_of_many(settings.progress, fits.len());
+    match settings.progress {
+        ProgressKind::Json => checked.warnings.iter().for_each(|text| display.say(&format!("warning: {text}"))),
+        _ => show_warnings(&checked.warnings),
+    }
     metrics.iter().for_each(|metrics| display.say(&format!("metrics at {}", metrics.url())));
     let board = Arc::new(Board::new(&fits, out.clone(), display, metrics.clone())?);
     let workers = settings.cluster.workers.count();

@@ -80,7 +80,10 @@ fn scrape(address: &str) -> String {
 
 #[test]
 fn metrics_tell_what_waits_for_workers() {
-    let folder = folder(&format!("photos = ['photo.exr', 'red.exr']\nenvironments = 'map.exr'\n[defaults]\n{QUICK}"));
+    // With one node at first, two fits give a worker enough to do.
+    let models = "models = ['ggx', 'cook-torrance']";
+    let folder =
+        folder(&format!("photos = ['photo.exr', 'red.exr']\nenvironments = 'map.exr'\n{models}\n[defaults]\n{QUICK}"));
     let process = start(&folder, "--workers 0 --metrics 0");
     let coordinator = process.id();
     let (mut address, mut page) = (None, None);
@@ -98,8 +101,9 @@ fn metrics_tell_what_waits_for_workers() {
     let page = page.unwrap();
     for sample in [
         "lookalike_workers 0",
-        "lookalike_fits{state=\"waiting\"} 1",
-        "lookalike_fits{state=\"running\"} 1",
+        "lookalike_fits{state=\"waiting\"} 2",
+        "lookalike_fits{state=\"running\"} 2",
+        "lookalike_nodes{kind=\"transport\",state=\"ready\"} 2",
         "lookalike_fits{state=\"done\"} 0",
     ] {
         assert!(page.lines().any(|line| line == sample), "{sample} in:\n{page}");
