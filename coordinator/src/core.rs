@@ -4,9 +4,10 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
-use lookalike::graph::{BlobHash, Graph, NodeId, WorkerId};
+use lookalike::graph::{BlobHash, Graph, NodeId, NodeKey, WorkerId};
 
 use crate::comm::{Lease, NodeName, Site};
+use crate::recall::Recall;
 
 /// How the coordinator treats workers and nodes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -44,6 +45,8 @@ impl Default for Policy {
 pub struct RunSummary {
     /// How many nodes were completed.
     pub completed_nodes: usize,
+    /// How many of them had been completed by an earlier coordinator of this run.
+    pub recalled_nodes: usize,
     /// How many nodes failed.
     pub failed_nodes: usize,
     /// How many leases were given out, and how often a node was run by the coordinator.
@@ -80,6 +83,8 @@ pub struct Core {
     /// How the last local worker ended, once none will be started again and no other can join.
     pub(crate) given_up: Option<String>,
     pub(crate) summary: RunSummary,
+    /// What earlier coordinators of this run have left.
+    pub(crate) recall: Option<Box<dyn Recall>>,
 }
 
 /// What the coordinator knows of a node beside the graph.
@@ -91,6 +96,8 @@ pub(crate) struct Record {
     pub(crate) started_at: Option<Duration>,
     /// Where its output came from.
     pub(crate) finished_by: Option<Site>,
+    /// What it computes: known once it is ready, where the run is remembered.
+    pub(crate) key: Option<NodeKey>,
 }
 
 /// A worker that has joined.
@@ -124,7 +131,14 @@ impl Core {
             starving: None,
             given_up: None,
             summary: RunSummary::default(),
+            recall: None,
         }
+    }
+
+    /// Complete nodes from what earlier coordinators of this run have left, wherever there is something.
+    #[must_use]
+    pub fn with_recall(self, recall: Box<dyn Recall>) -> Self {
+        Self { recall: Some(recall), ..self }
     }
 
     /// The graph of the run.

@@ -62,6 +62,15 @@ pub enum Event {
         /// The output.
         output: Blob,
     },
+    /// A worker has the output of a node that an earlier coordinator of this run gave it; its hash was verified.
+    Recovered {
+        /// The worker.
+        worker: WorkerId,
+        /// The node, by its number of today.
+        node: NodeId,
+        /// The output.
+        output: Blob,
+    },
     /// A node has no output and never will: its own error.
     Failed {
         /// Where it ran.
@@ -123,6 +132,10 @@ pub fn handle(
         Event::Finished { site, node, attempt, output } => {
             finished(core, (site, node, attempt), output, now, outbox)?;
         }
+        Event::Recovered { worker, node, output } => {
+            renew(core, worker, now);
+            accept(core, Site::Worker(worker), node, output, now, outbox)?;
+        }
         Event::Failed { site, node, attempt, failure } => {
             if answered(core, (site, node, attempt), now, outbox) && core.graph.is_open(node) {
                 retract(core, node, outbox);
@@ -180,7 +193,31 @@ fn refused(core: &mut Core, node: NodeId, error: PlanError) -> RunError {
     RunError::WrongResult { name: Box::new(core.name(node)), site, error }
 }
 
+/// Complete a node from what an earlier coordinator of this run has left. Whether there was something.
+fn recall(core: &mut Core, node: NodeId, outbox: &mut Outbox) -> bool {
+    let Some(key) = core.graph.key(node) else { return false };
+    let Some(memory) = core.recall.as_mut().map(|recall| recall.recall(key)) else { return false };
+    if let Some(record) = core.record(node) {
+        record.key = Some(key);
+        record.crashes = memory.crashes;
+    }
+    let Some(output) = memory.output else { return false };
+    let bytes = output.len();
+    if core.graph.complete(node, output) != Completion::Accepted {
+        return false;
+    }
+    core.summary.recalled_nodes += 1;
+    outbox.tell(RunEvent::NodeRecalled { name: core.name(node), bytes });
+    true
+}
+
 fn make_ready(core: &mut Core, node: NodeId, now: Duration, outbox: &mut Outbox) {
+    if core.recall.is_some() {
+        if recall(core, node, outbox) {
+            return;
+        }
+        outbox.tell(RunEvent::NodeReady { node });
+    }
     let is_for_worker = core.graph.spec(node).is_none_or(|spec| spec.placement == Placement::Worker);
     if is_for_worker {
         core.queue.insert(node);
@@ -271,9 +308,18 @@ type Answer = (Site, NodeId, u32);
 
 fn finished(core: &mut Core, answer: Answer, output: Blob, now: Duration, outbox: &mut Outbox) -> Result<(), RunError> {
     let (site, node, _) = answer;
-    if !answered(core, answer, now, outbox) {
-        return Ok(());
-    }
+    if answered(core, answer, now, outbox) { accept(core, site, node, output, now, outbox) } else { Ok(()) }
+}
+
+/// Take an output, wherever it comes from.
+fn accept(
+    core: &mut Core,
+    site: Site,
+    node: NodeId,
+    output: Blob,
+    now: Duration,
+    outbox: &mut Outbox,
+) -> Result<(), RunError> {
     let bytes = output.len();
     let hash = output.hash();
     if matches!(site, Site::Worker(_)) {

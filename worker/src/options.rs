@@ -6,6 +6,8 @@ use std::time::Duration;
 
 use clap::Args;
 
+use crate::ending::Leash;
+
 /// The flags of `lookalike-worker` and `lookalike worker`.
 #[derive(Clone, Debug, Args)]
 pub struct Arguments {
@@ -28,6 +30,10 @@ pub struct Arguments {
     /// End when stdin ends: the coordinator holds the other end of the pipe
     #[arg(long, hide = true)]
     pub leash: bool,
+
+    /// With --leash: do not end when the coordinator was killed, but wait for the next one as long as --reconnect-for says
+    #[arg(long, requires = "leash", hide = true)]
+    pub survive: bool,
 }
 
 impl Arguments {
@@ -39,7 +45,11 @@ impl Arguments {
             threads,
             reconnect_for: self.reconnect_for,
             address: self.address,
-            leash: self.leash,
+            leash: match (self.leash, self.survive) {
+                (false, _) => Leash::None,
+                (true, false) => Leash::Tight,
+                (true, true) => Leash::Loose,
+            },
             ..WorkerOptions::new(self.access)
         }
     }
@@ -56,8 +66,8 @@ pub struct WorkerOptions {
     pub threads: NonZeroUsize,
     /// How long to try to reach the coordinator before giving up.
     pub reconnect_for: Duration,
-    /// End when stdin ends.
-    pub leash: bool,
+    /// What the end of stdin means.
+    pub leash: Leash,
     /// How many bytes of blobs to keep beyond those that assigned nodes need.
     pub cached_blob_bytes: usize,
     /// How many bytes of blobs (counted encoded) to keep decoded.
@@ -73,7 +83,7 @@ impl WorkerOptions {
             address: None,
             threads: NonZeroUsize::MIN,
             reconnect_for: Duration::from_mins(10),
-            leash: false,
+            leash: Leash::None,
             cached_blob_bytes: 256 << 20,
             decoded_blob_bytes: 128 << 20,
         }

@@ -15,7 +15,7 @@ use std::time::Duration;
 
 use lookalike::graph::{Blob, WorkerId};
 use lookalike::protocol::{
-    FrameReader, HandshakeError, Hello, ProofKey, RunName, Secret, ToCoordinator, ToWorker, bounded_text,
+    FrameReader, HandshakeError, Hello, LeaseName, ProofKey, RunName, Secret, ToCoordinator, ToWorker, bounded_text,
 };
 use lookalike_worker::tls::{TlsError, Transport, channel_binding};
 use lookalike_worker::wire::{Incoming, WireError, greet_worker};
@@ -44,6 +44,8 @@ pub(crate) enum Inbound {
     Joined { worker: WorkerId, hello: Hello, outgoing: UnboundedSender<Outgoing> },
     /// Something happened.
     Event(Event),
+    /// An answer to a lease of an earlier coordinator of this run: the output, whose hash was verified, or none.
+    Late { worker: WorkerId, lease: LeaseName, output: Option<Blob> },
     /// Something to tell the user that the reactor does not care about.
     Tell(RunEvent),
 }
