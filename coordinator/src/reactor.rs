@@ -62,6 +62,13 @@ pub enum Event {
         /// The output.
         output: Blob,
     },
+    /// A worker that is about to join executes a node already: an earlier coordinator of this run gave it.
+    Continues {
+        /// The worker.
+        worker: WorkerId,
+        /// The node, by its number of today.
+        node: NodeId,
+    },
     /// A worker has the output of a node that an earlier coordinator of this run gave it; its hash was verified.
     Recovered {
         /// The worker.
@@ -132,6 +139,7 @@ pub fn handle(
         Event::Finished { site, node, attempt, output } => {
             finished(core, (site, node, attempt), output, now, outbox)?;
         }
+        Event::Continues { worker, node } => core.continued.push((worker, node)),
         Event::Recovered { worker, node, output } => {
             renew(core, worker, now);
             accept(core, Site::Worker(worker), node, output, now, outbox)?;
@@ -242,6 +250,11 @@ fn join(core: &mut Core, worker: WorkerId, threads: usize, process: u32, now: Du
     core.workers.insert(worker, member);
     core.summary.workers_joined += 1;
     outbox.tell(RunEvent::WorkerJoined { worker, threads, process });
+    for (_, node) in core.continued.extract_if(.., |(continuing, _)| *continuing == worker).collect::<Vec<_>>() {
+        if core.queue.remove(&node) {
+            assign(core, worker, node, outbox);
+        }
+    }
 }
 
 /// Take back what a worker held. The nodes it executed are suspects if it may have died of them.

@@ -107,7 +107,7 @@ impl LocalWorkers {
         for _ in orphans.len()..self.count {
             let process =
                 self.spawn().map_err(|source| RunError::Spawn { program: self.command.program.clone(), source })?;
-            first.push(Place::Child(process));
+            first.push(Place::Child(Box::new(process)));
         }
         let mut given_up = JoinSet::new();
         for place in first {
@@ -125,7 +125,7 @@ impl LocalWorkers {
     async fn keep_alive(self, first: Place, inbound: Sender<Inbound>, stop: CancellationToken) -> Option<String> {
         let mut quick_deaths = 0;
         let mut next = match first {
-            Place::Child(process) => Ok(process),
+            Place::Child(process) => Ok(*process),
             Place::Orphan(orphan) => match self.keep_orphan(orphan, &inbound, &stop).await {
                 true => self.spawn(),
                 false => return None,
@@ -235,7 +235,7 @@ async fn drain(mut keepers: JoinSet<Option<String>>) {
 /// A worker in its place.
 enum Place {
     /// A process of ours.
-    Child(Process),
+    Child(Box<Process>),
     /// A process of an earlier coordinator.
     Orphan(Orphan),
 }

@@ -101,7 +101,12 @@ impl Tasks {
                 Stage::Answered(_) => {}
             }
         }
-        self.tasks.values().filter_map(Task::answer).collect()
+        let mut actions: Vec<_> = self.tasks.values().filter_map(Task::answer).collect();
+        if is_same_run {
+            // At once: perhaps it is another coordinator, which waits for this before it gives out anything.
+            actions.push(Action::Send(ToCoordinator::Heartbeat { executing: self.executing() }));
+        }
+        actions
     }
 
     /// A node was assigned.

@@ -63,7 +63,7 @@ fn start_tracing(filter: &str) -> anyhow::Result<()> {
 }
 
 fn dispatch(Cli { log, command }: Cli) -> anyhow::Result<ExitCode> {
-    use crate::commands::{access, compare, demo, fit, render, worker};
+    use crate::commands::{access, compare, demo, fit, render, status, worker};
     match command {
         Command::Demo(args) => demo::run(DemoSettings { log: Some(log), ..args.into_settings()? }),
         Command::Fit(args) => {
@@ -76,9 +76,7 @@ fn dispatch(Cli { log, command }: Cli) -> anyhow::Result<ExitCode> {
         Command::Access(args) => access::run(args.into_settings()),
         Command::Worker(args) => worker::run(args),
         Command::Batch(_) => later("lookalike batch", "run `lookalike fit` once per photo"),
-        Command::Status(_) => {
-            later("lookalike status", "a fit tells its progress on stderr, its result in OUT/fit.json")
-        }
+        Command::Status(args) => status::run(&args.into_settings()),
         Command::Check(_) => later("lookalike check", "`lookalike fit` refuses inputs that it cannot use"),
         Command::Export(_) => later("lookalike export", "the parameters are in OUT/fit.json"),
         Command::Study(_) => later("lookalike study", "run `lookalike fit` once per photo"),

@@ -24,9 +24,14 @@ pub(crate) struct Past {
     pub(crate) listen: Option<SocketAddr>,
     /// The processes that were started as local workers; most of them are gone.
     pub(crate) local_workers: Vec<u32>,
+    /// The processes of the workers that were connected when their coordinator died, and may still be there.
+    pub(crate) workers: Vec<u32>,
     /// How many nodes have a result.
     pub(crate) results: usize,
 }
+
+/// How long a worker tries to reach its coordinator by default; the longest of them is remote.
+const LONGEST_WAIT_MS: i64 = 10 * 60 * 1000;
 
 /// Begin a new journal.
 pub(super) fn begin(path: &Path, identity: &RunIdentity, run: RunName) -> Result<(Connection, Loaded), JournalError> {
@@ -106,5 +111,12 @@ fn past(connection: &Connection, results: usize) -> rusqlite::Result<Past> {
     past.listen = listen.optional()?.and_then(|listen| listen.parse().ok());
     let mut statement = connection.prepare("SELECT DISTINCT process FROM local_workers ORDER BY process")?;
     past.local_workers = statement.query_map([], |row| row.get(0))?.collect::<rusqlite::Result<_>>()?;
+    // An epoch that ended in order has told its workers to end.
+    let mut statement = connection.prepare(
+        "SELECT DISTINCT process FROM workers JOIN epochs USING (epoch)
+         WHERE ended_ms IS NULL AND left_ms IS NULL AND seen_ms > ?1 ORDER BY process",
+    )?;
+    let since = unix_ms() - LONGEST_WAIT_MS;
+    past.workers = statement.query_map([since], |row| row.get(0))?.collect::<rusqlite::Result<_>>()?;
     Ok(past)
 }

@@ -6,7 +6,7 @@ use std::path::Path;
 /// Whether a folder lies on a file system that other machines may write to.
 #[cfg(target_os = "linux")]
 pub(super) fn is_shared(folder: &Path) -> bool {
-    nix::sys::statfs::statfs(folder).is_ok_and(|system| is_network(i64::from(system.filesystem_type().0)))
+    nix::sys::statfs::statfs(folder).is_ok_and(|system| is_network(i128::from(system.filesystem_type().0)))
 }
 
 /// Whether a folder lies on a file system that other machines may write to: not known here.
@@ -36,9 +36,9 @@ const NETWORK: [(&str, u32); 14] = [
 ];
 
 #[cfg(target_os = "linux")]
-fn is_network(kind: i64) -> bool {
+fn is_network(kind: i128) -> bool {
     // The kernel's type is signed on some machines: only the low 32 bits count.
-    NETWORK.iter().any(|(_, magic)| kind & 0xFFFF_FFFF == i64::from(*magic))
+    NETWORK.iter().any(|(_, magic)| kind & 0xFFFF_FFFF == i128::from(*magic))
 }
 
 #[cfg(all(test, target_os = "linux"))]
@@ -49,7 +49,7 @@ mod tests {
     fn network_file_systems_are_known_by_their_numbers() {
         assert!(is_network(0x6969) && is_network(0xFE53_4D42));
         // As a signed 32-bit number.
-        assert!(is_network(i64::from(0xFF53_4D42_u32.cast_signed())));
+        assert!(is_network(i128::from(0xFF53_4D42_u32.cast_signed())));
         // ext4, tmpfs, xfs.
         assert!(![0xEF53, 0x0102_1994, 0x5846_5342].into_iter().any(is_network));
         assert!(!is_shared(Path::new("/proc")));

@@ -32,6 +32,7 @@ pub(super) async fn serve(greeted: Greeted, worker: WorkerId, peer: SocketAddr, 
     let mut reader = Reader {
         worker,
         epoch: gate.epoch,
+        has_reported: gate.epoch == 1,
         incoming,
         output: None,
         pending_blobs: Arc::clone(&pending_blobs),
@@ -82,6 +83,8 @@ struct Reader {
     worker: WorkerId,
     /// That of this coordinator.
     epoch: u64,
+    /// Whether it has told what it does for earlier ones.
+    has_reported: bool,
     incoming: Incoming<ReadHalf<Connection>>,
     /// The output that is being received.
     output: Option<(LeaseName, IncomingBlob)>,
@@ -121,6 +124,11 @@ impl Reader {
             }
         };
         Ok(Inbound::Event(match message {
+            ToCoordinator::Heartbeat { executing } if !self.has_reported => {
+                self.has_reported = true;
+                let earlier = executing.iter().map(|node| node.lease).filter(|lease| lease.epoch < self.epoch);
+                return Ok(Inbound::Reported { worker, executing: earlier.collect() });
+            }
             ToCoordinator::Heartbeat { executing } => {
                 // What was begun for an earlier coordinator has another number there.
                 let executing = executing.iter().filter(|node| node.lease.epoch == self.epoch);

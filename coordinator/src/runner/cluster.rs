@@ -46,6 +46,8 @@ pub(crate) struct Takeover {
     listen: Option<SocketAddr>,
     /// Its local workers that are still alive.
     orphans: Vec<u32>,
+    /// The processes of its workers that may come back, from wherever.
+    pub(crate) survivors: Vec<u32>,
     /// How many nodes have their results already.
     pub(crate) results: usize,
 }
@@ -53,8 +55,11 @@ pub(crate) struct Takeover {
 impl Takeover {
     /// What there is to be taken over.
     pub(crate) fn of(past: &Past) -> Self {
-        let orphans = past.local_workers.iter().copied().filter(|process| is_worker_alive(*process));
-        Self { listen: past.listen, orphans: orphans.collect(), results: past.results }
+        let is_local = |process: &u32| past.local_workers.contains(process);
+        let orphans =
+            past.local_workers.iter().copied().filter(|process| is_worker_alive(*process)).collect::<Vec<_>>();
+        let survivors = past.workers.iter().copied().filter(|process| !is_local(process) || orphans.contains(process));
+        Self { listen: past.listen, survivors: survivors.collect(), orphans, results: past.results }
     }
 }
 

@@ -78,6 +78,12 @@ impl Memory {
         Ok(self.waiting.pop_front().unwrap_or_default())
     }
 
+    /// The number that a node of an earlier epoch has today.
+    pub(super) fn today(&self, lease: LeaseName) -> Option<NodeId> {
+        let key = self.journal.as_ref()?.past.keys.get(&(lease.epoch, lease.node))?;
+        self.today.get(key).copied()
+    }
+
     /// A worker has answered to a lease of an earlier epoch: what that means today.
     pub(super) fn late_answer(
         &mut self,

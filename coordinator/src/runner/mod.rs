@@ -17,6 +17,7 @@ mod here;
 mod interrupt;
 mod memory;
 mod options;
+mod survivors;
 
 use std::error::Error as _;
 use std::sync::Arc;
@@ -35,6 +36,7 @@ use self::here::Here;
 use self::interrupt::Interrupt;
 use self::memory::{Group, Memory};
 pub use self::options::RunnerOptions;
+use self::survivors::{Arrival, Survivors};
 use crate::comm::{Action, Lease, Outbox, RunEvent};
 use crate::core::{Core, RunSummary};
 use crate::journal::Journal;
@@ -90,6 +92,7 @@ pub async fn run<P: Planner>(
         observer,
         here: Here::new(registry, results_sender),
         memory: Memory::new(journal),
+        survivors: None,
         began: Instant::now(),
     };
     let begin = Begin { options, run, takeover };
@@ -121,6 +124,8 @@ struct Driver<P, O> {
     observer: O,
     here: Here,
     memory: Memory,
+    /// The workers of an earlier coordinator, as long as they are waited for.
+    survivors: Option<Survivors>,
     began: Instant,
 }
 
@@ -144,6 +149,7 @@ impl<P: Planner, O: FnMut(&RunEvent)> Driver<P, O> {
             }
             let may_act = !is_over && self.memory.has_room();
             let deadline = self.core.next_deadline().map(|deadline| self.began + deadline);
+            let return_time = self.survivors.as_ref().map(|survivors| survivors.until);
             tokio::select! {
                 // What has come is looked at before the time is: a late look must not make a worker late.
                 biased;
@@ -159,6 +165,7 @@ impl<P: Planner, O: FnMut(&RunEvent)> Driver<P, O> {
                     self.here.tell_progress(&mut self.observer);
                     continue;
                 }
+                () = sleep_or_wait(return_time), if may_act => {}
                 () = sleep_or_wait(deadline), if may_act => events.push(Inbound::Event(Event::DeadlinePassed)),
             }
             more(&mut inbound, &mut events);
@@ -183,11 +190,13 @@ impl<P: Planner, O: FnMut(&RunEvent)> Driver<P, O> {
         self.collect(&mut group, None, now);
         if started.is_ok() && !self.core.is_finished() {
             let is_new = takeover.is_none();
+            let survivors = takeover.as_ref().map(|takeover| takeover.survivors.clone()).unwrap_or_default();
             match Cluster::start(&options, (run, self.core.epoch), takeover, inbound).await {
                 Ok(cluster) => {
                     (self.observer)(&RunEvent::Listening { address: cluster.address.clone() });
                     group.batch.listens(cluster.bound.to_string());
                     self.cluster = Some(cluster);
+                    self.survivors = Survivors::expect(survivors, Instant::now());
                 }
                 Err(error) => {
                     if is_new {
@@ -208,17 +217,31 @@ impl<P: Planner, O: FnMut(&RunEvent)> Driver<P, O> {
     /// Act upon events, as one group.
     fn handle_all(&mut self, events: &mut Vec<Inbound>) -> Result<(), RunError> {
         let mut group = Group::default();
-        let mut outcome = Ok(());
-        for inbound in events.drain(..) {
-            let Some(event) = self.event(inbound, &mut group) else { continue };
-            outcome = self.handle(event, &mut group);
-            if outcome.is_err() {
-                break;
+        let mut handle_all = || {
+            for inbound in events.drain(..) {
+                if let Some(event) = self.event(inbound, &mut group) {
+                    self.handle(event, &mut group)?;
+                }
             }
-        }
+            let back = self.survivors.take_if(|survivors| survivors.are_complete(Instant::now()));
+            let arrivals = back.map(Survivors::into_arrivals).unwrap_or_default();
+            arrivals.into_iter().try_for_each(|arrival| self.welcome(arrival, &mut group))
+        };
+        let outcome = handle_all();
         // Also after an error: what was said before it shall be heard.
         self.submit(group);
         outcome
+    }
+
+    /// Let a worker in that had to wait for others.
+    fn welcome(&mut self, arrival: Arrival, group: &mut Group) -> Result<(), RunError> {
+        let Arrival { worker, threads, process, executing } = arrival;
+        for lease in executing.unwrap_or_default() {
+            if let Some(node) = self.memory.today(lease) {
+                self.handle(Event::Continues { worker, node }, group)?;
+            }
+        }
+        self.handle(Event::WorkerJoined { worker, threads, process }, group)
     }
 
     fn handle(&mut self, event: Event, group: &mut Group) -> Result<(), RunError> {
@@ -262,16 +285,26 @@ impl<P: Planner, O: FnMut(&RunEvent)> Driver<P, O> {
     fn event(&mut self, inbound: Inbound, group: &mut Group) -> Option<Event> {
         match inbound {
             Inbound::Event(event) => {
-                if let (Event::WorkerLeft { worker, .. }, Some(cluster)) = (&event, &mut self.cluster) {
-                    cluster.dismiss(*worker);
+                if let Event::WorkerLeft { worker, .. } = &event {
+                    self.cluster.iter_mut().for_each(|cluster| cluster.dismiss(*worker));
+                    self.survivors.iter_mut().for_each(|survivors| survivors.left(*worker));
                 }
                 Some(event)
             }
             Inbound::Joined { worker, hello, outgoing } => {
-                let is_wanted =
-                    self.cluster.as_mut().is_some_and(|cluster| cluster.admit(worker, hello.process, outgoing));
+                let (process, cluster) = (hello.process, self.cluster.as_mut()?);
                 let threads = usize::try_from(hello.threads).unwrap_or(usize::MAX).clamp(1, MAX_THREADS);
-                is_wanted.then_some(Event::WorkerJoined { worker, threads, process: hello.process })
+                let is_wanted = cluster.admit(worker, process, outgoing);
+                match &mut self.survivors {
+                    Some(survivors) if is_wanted => survivors.joined(worker, threads, process),
+                    Some(survivors) => survivors.dismissed(process),
+                    None => return is_wanted.then_some(Event::WorkerJoined { worker, threads, process }),
+                }
+                None
+            }
+            Inbound::Reported { worker, executing } => {
+                self.survivors.iter_mut().for_each(|survivors| survivors.reported(worker, executing.clone()));
+                Some(Event::Heartbeat { worker, executing: Vec::new() })
             }
             Inbound::Late { worker, lease, output } => Some(self.memory.late_answer(worker, lease, output, group)),
             Inbound::Tell(event) => {
