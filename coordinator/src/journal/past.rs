@@ -113,8 +113,8 @@ fn past(connection: &Connection, results: usize) -> rusqlite::Result<Past> {
     past.local_workers = statement.query_map([], |row| row.get(0))?.collect::<rusqlite::Result<_>>()?;
     // An epoch that ended in order has told its workers to end.
     let mut statement = connection.prepare(
-        "SELECT DISTINCT process FROM workers JOIN epochs USING (epoch)
-         WHERE ended_ms IS NULL AND left_ms IS NULL AND seen_ms > ?1 ORDER BY process",
+        "SELECT DISTINCT workers.process FROM workers JOIN epochs USING (epoch)
+         WHERE ended_ms IS NULL AND left_ms IS NULL AND seen_ms > ?1 ORDER BY 1",
     )?;
     let since = unix_ms() - LONGEST_WAIT_MS;
     past.workers = statement.query_map([since], |row| row.get(0))?.collect::<rusqlite::Result<_>>()?;

@@ -18,6 +18,9 @@ use super::unix_ms;
 /// How often `status.json` is written at most.
 const STATUS_INTERVAL: Duration = Duration::from_secs(1);
 
+/// How often it is written when nothing happens.
+const QUIET_INTERVAL: Duration = Duration::from_secs(20);
+
 /// Looking at all nodes may take at most one part in so many of the thread's time.
 const STATUS_SHARE: u32 = 20;
 
@@ -50,13 +53,8 @@ impl Writer {
     /// Do what is asked for until the end, or until nobody asks any more.
     pub(super) fn run(mut self) -> Result<(), JournalError> {
         loop {
-            let patience = self.next_status.saturating_duration_since(Instant::now());
-            let command = if self.is_news {
-                self.commands.recv_timeout(patience)
-            } else {
-                self.commands.recv().map_err(|_| RecvTimeoutError::Disconnected)
-            };
-            match command {
+            let soon = self.next_status.saturating_duration_since(Instant::now());
+            match self.commands.recv_timeout(if self.is_news { soon } else { QUIET_INTERVAL }) {
                 Ok(Command::Commit(batch)) => {
                     let outcome = self.commit(&batch);
                     self.is_news = true;
@@ -67,7 +65,8 @@ impl Writer {
                 Ok(Command::Close(ended)) => return self.close(ended.as_deref()),
                 // The coordinator's future was dropped.
                 Err(RecvTimeoutError::Disconnected) => return self.close(Some("it was dropped")),
-                Err(RecvTimeoutError::Timeout) => {}
+                // Somebody is still here.
+                Err(RecvTimeoutError::Timeout) => self.is_news = true,
             }
             if self.is_news && Instant::now() >= self.next_status {
                 self.tell_status();
