@@ -253,6 +253,9 @@ fn join(core: &mut Core, worker: WorkerId, threads: usize, process: u32, now: Du
     for (_, node) in core.continued.extract_if(.., |(continuing, _)| *continuing == worker).collect::<Vec<_>>() {
         if core.queue.remove(&node) {
             assign(core, worker, node, outbox);
+            // It has begun: nobody else shall get it for having idle threads.
+            let attempt = core.record(node).map_or(0, |record| record.attempts);
+            started(core, worker, node, attempt, now, outbox);
         }
     }
 }
