@@ -25,7 +25,7 @@ use tokio_util::sync::CancellationToken;
 use tracing::{info, trace};
 
 use self::cluster::Cluster;
-pub use self::error::RunError;
+pub use self::error::{NodeAnswer, RunError};
 use self::interrupt::Interrupt;
 pub use self::options::RunnerOptions;
 use crate::comm::{Action, Lease, Outbox, RunEvent, Site};
