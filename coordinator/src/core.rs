@@ -91,7 +91,7 @@ pub(crate) struct Record {
     pub(crate) candidate: Option<Box<Candidate>>,
     /// Where its output came from.
     pub(crate) finished_by: Option<Site>,
-    /// How often it has lost its last worker, for whatever reason but a drain.
+    /// How often it has lost a worker that executed it, for whatever reason but a drain.
     pub(crate) losses: u32,
     pub(crate) deaths: Deaths,
 }

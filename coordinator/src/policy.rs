@@ -99,6 +99,14 @@ pub enum PolicyError {
         /// The given time.
         found: Duration,
     },
+    /// A time that nobody lives to see, such as a typing error gives.
+    #[error("{flag}: expected at most a year, found {}", humantime::format_duration(*.found))]
+    TooLong {
+        /// The flag.
+        flag: &'static str,
+        /// The given time.
+        found: Duration,
+    },
     /// A count that has to be at least 1.
     #[error("{flag}: expected 1 or more, found 0")]
     Zero {
@@ -138,6 +146,16 @@ impl Policy {
         if !beats.contains(&self.heartbeat) {
             return Err(PolicyError::Heartbeat { found: self.heartbeat });
         }
+        let times = [
+            ("--lost-after", self.lost_after),
+            ("--speculate-after", self.speculation.after),
+            ("--drain-time", self.drain_time),
+            ("--wait-for-workers", self.wait_for_workers),
+            ("--grace", self.grace),
+        ];
+        if let Some((flag, found)) = times.into_iter().find(|(_, time)| *time > LONGEST) {
+            return Err(PolicyError::TooLong { flag, found });
+        }
         if self.lost_after < 2 * self.heartbeat {
             return Err(PolicyError::LostAfter { expected: 2 * self.heartbeat, found: self.lost_after });
         }
@@ -158,6 +176,9 @@ impl Policy {
     }
 }
 
+/// The longest time that a policy may name.
+const LONGEST: Duration = Duration::from_hours(24 * 366);
+
 /// Beyond this, no node is ever slow.
 const MOST_FACTOR: f64 = 1e6;
 
@@ -176,6 +197,7 @@ mod tests {
         let late = said(|policy| policy.heartbeat = Duration::from_secs(3));
         assert!(late.starts_with("--lost-after: expected at least two heartbeats, 6s, found 5s"), "{late}");
         assert!(said(|policy| policy.heartbeat = Duration::ZERO).contains("--heartbeat"));
+        assert!(said(|policy| policy.grace = Duration::MAX).starts_with("--grace: expected at most a year"));
         assert!(said(|policy| policy.node_crashes = 0).contains("--node-crashes: expected 1 or more"));
         assert!(said(|policy| policy.suspect_after = 0).contains("--suspect-after"));
         assert!(said(|policy| policy.spare_leases = 5000).contains("--spare-leases"));

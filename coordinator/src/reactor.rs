@@ -239,4 +239,6 @@ fn watch_starvation(core: &mut Core, now: Duration, outbox: &mut Outbox) -> Resu
 #[cfg(test)]
 mod property_tests;
 #[cfg(test)]
+mod storm_tests;
+#[cfg(test)]
 mod tests;

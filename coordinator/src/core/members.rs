@@ -297,10 +297,28 @@ impl Members {
         stalled.filter_map(|(_, worker)| Some((*worker, self.get(*worker)?)))
     }
 
-    /// Since when the first one is stalled of those that are so only since after `since`.
-    pub(crate) fn next_stalled(&self, since: Duration) -> Option<Duration> {
-        let after = (since, WorkerId(u64::MAX));
-        self.stalled.range(after..).next().map(|(begin, _)| *begin)
+    /// Since when the first one is stalled of those that are so only since after `since`; of all if there is no such time.
+    pub(crate) fn next_stalled(&self, since: Option<Duration>) -> Option<Duration> {
+        let first = match since {
+            Some(since) => self.stalled.range((since, WorkerId(u64::MAX))..).next(),
+            None => self.stalled.first(),
+        };
+        first.map(|(begin, _)| *begin)
+    }
+
+    /// That every index says what the members say.
+    #[cfg(test)]
+    pub(crate) fn check(&self) {
+        let mut anew = Self::new(self.spare_leases);
+        for (worker, member) in &self.by_id {
+            anew.enter(&member.keys(*worker, self.spare_leases), *worker);
+            anew.deadlines.insert((member.deadline, *worker));
+        }
+        assert!(self.ranking.iter().eq(&anew.ranking), "{:?}", self.ranking);
+        assert_eq!(self.fresh, anew.fresh);
+        assert_eq!(self.surplus, anew.surplus);
+        assert_eq!(self.stalled, anew.stalled);
+        assert_eq!(self.deadlines, anew.deadlines);
     }
 
     fn enter(&mut self, keys: &Keys, worker: WorkerId) {

@@ -2,9 +2,7 @@
 
 use std::time::Duration;
 
-use lookalike::graph::{
-    Blob, BlobHash, Completion, FailureReason, NodeFailure, NodeId, NodeSpec, NodeState, WorkerId,
-};
+use lookalike::graph::{Blob, BlobHash, Completion, FailureReason, NodeFailure, NodeId, NodeSpec, NodeState, WorkerId};
 
 use super::{membership, schedule};
 use crate::comm::{Action, Departure, Outbox, RunEvent, Site};
@@ -113,27 +111,24 @@ fn verify(
     // Whoever may kill its workers runs as often as it has to and not more.
     let is_suspect = core.is_suspect(node);
     let Some(record) = core.record(node) else { return Ok(()) };
-    let is_cared_for = !record.holders.is_empty();
-    match record.candidate.take() {
-        None if is_suspect => accept(core, node, result, now, outbox),
-        None => {
-            record.candidate = Some(Box::new(result));
-            if !is_cared_for {
-                schedule::await_now(core, node, now);
-            }
-            Ok(())
+    let first = match record.candidate.take() {
+        None if is_suspect => return accept(core, node, result, now, outbox),
+        None => result,
+        Some(first) if first.output != result.output => {
+            return Err(differ(core, node, (first.site, first.output.hash()), &result));
         }
-        Some(first) if first.output != result.output => Err(differ(core, node, (first.site, first.output.hash()), &result)),
-        // Sent again by a worker that did not hear our thanks: no second computation.
-        Some(first) if first.attempt == result.attempt => {
-            record.candidate = Some(first);
-            Ok(())
-        }
-        Some(first) => {
+        Some(first) if first.attempt != result.attempt => {
             core.summary.verified_nodes += 1;
-            accept(core, node, *first, now, outbox)
+            return accept(core, node, *first, now, outbox);
         }
+        // Sent again by a worker that did not hear our thanks: no second computation.
+        Some(first) => *first,
+    };
+    record.candidate = Some(Box::new(first));
+    if record.holders.is_empty() {
+        schedule::await_now(core, node, now);
     }
+    Ok(())
 }
 
 /// Take the output of a node that is waiting for its verification as it is; `false` if there is none.

@@ -8,7 +8,7 @@ use super::{answers, quarantine, schedule};
 use crate::comm::{Action, Departure, Outbox, RunEvent};
 use crate::core::{Core, Place};
 
-/// The pause after a node has lost its worker for the second time; each further one is twice as long.
+/// The pause after a node in execution has lost its worker for the second time; each further one is twice as long.
 const FIRST_DELAY: Duration = Duration::from_millis(100);
 
 /// The longest of these pauses.
@@ -43,10 +43,10 @@ pub(super) fn leave(core: &mut Core, worker: WorkerId, departure: &Departure, no
     if departure.is_suspicious() && !was_asked {
         quarantine::count_death(core, &member, now, outbox);
     }
-    for node in member.leases.into_keys() {
+    for (node, held) in member.leases {
         core.forget_holder(worker, node);
         if let Some(record) = core.record(node) {
-            record.losses += u32::from(!was_asked);
+            record.losses += u32::from(!was_asked && held.started_at.is_some());
         }
         requeue(core, node, worker, now, outbox);
     }
@@ -87,7 +87,7 @@ fn requeue(core: &mut Core, node: NodeId, worker: WorkerId, now: Duration, outbo
     outbox.tell(RunEvent::NodeRequeued { name: core.name(node), worker, crashes: deaths.total() });
 }
 
-/// Let a node wait in its place; after each loss a little longer, so that what always fails does not spin.
+/// Let a node wait in its place; after each loss while it was executed a little longer, so that what always fails does not spin.
 fn await_worker(core: &mut Core, node: NodeId, now: Duration) {
     let losses = core.look(node).map_or(0, |record| record.losses);
     let doublings = losses.saturating_sub(2).min(16);

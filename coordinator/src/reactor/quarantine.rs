@@ -15,6 +15,10 @@ use lookalike::graph::NodeId;
 use crate::comm::{Outbox, RunEvent};
 use crate::core::{Core, Member};
 
+/// How many deaths of a suspect's workers are excused for one that would count: where a machine fails all the time, a node that
+/// kills its workers has to fail in the end.
+const EXCUSES_PER_CRASH: u32 = 10;
+
 /// How many unexplained deaths are remembered.
 const REMEMBERED: usize = 8;
 
@@ -25,8 +29,7 @@ pub(super) fn count_death(core: &mut Core, member: &Member, now: Duration, outbo
     if let Some((suspect, since)) = executing.iter().find(|(node, _)| member.alone_with == Some(*node)) {
         return count_death_alone(core, *suspect, *since);
     }
-    let was_bad_before = |node: NodeId| core.look(node).is_some_and(|record| record.deaths.total() > 0);
-    if !executing.iter().any(|(node, _)| was_bad_before(*node)) {
+    if !executing.iter().any(|(node, _)| core.is_suspect(*node)) {
         core.unexplained.push_back((now, executing.iter().map(|(node, _)| *node).collect()));
         if core.unexplained.len() > REMEMBERED {
             core.unexplained.pop_front();
@@ -49,9 +52,8 @@ pub(super) fn count_death(core: &mut Core, member: &Member, now: Duration, outbo
 /// A suspect's worker has died, which it had for itself since then.
 fn count_death_alone(core: &mut Core, suspect: NodeId, since: Duration) {
     let lately = since.saturating_sub(core.policy.lost_after);
-    let others_die =
-        core.unexplained.iter().any(|(when, executed)| *when >= lately && !executed.contains(&suspect));
-    let most_excuses = core.policy.node_crashes.saturating_mul(2);
+    let others_die = core.unexplained.iter().any(|(when, executed)| *when >= lately && !executed.contains(&suspect));
+    let most_excuses = core.policy.node_crashes.saturating_mul(EXCUSES_PER_CRASH);
     let Some(record) = core.record(suspect) else { return };
     if others_die && record.deaths.excused < most_excuses {
         record.deaths.excused += 1;

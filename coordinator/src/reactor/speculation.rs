@@ -23,8 +23,7 @@ pub(super) fn speculate(core: &mut Core, now: Duration, outbox: &mut Outbox) {
         let running = core.pace.slowest(policy, now, |node| idle.for_node(core, node).is_some());
         let node = running.or_else(|| unbegun(core, &idle, now.checked_sub(policy.after)?));
         let Some((node, worker)) = node.and_then(|node| Some((node, idle.for_node(core, node)?))) else {
-            let stalled = core.members.next_stalled(now.saturating_sub(policy.after));
-            let stalled = stalled.map(|since| since + policy.after).filter(|due| *due > now);
+            let stalled = core.members.next_stalled(now.checked_sub(policy.after)).map(|since| since + policy.after);
             core.next_slow = core.pace.next_slow(policy, now).into_iter().chain(stalled).min();
             return;
         };
