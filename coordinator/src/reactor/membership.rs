@@ -55,6 +55,7 @@ pub(super) fn leave(core: &mut Core, worker: WorkerId, departure: &Departure, no
 /// A worker begins with nothing more: take back what it has not begun with.
 pub(super) fn drain(core: &mut Core, worker: WorkerId, now: Duration, outbox: &mut Outbox) {
     renew(core, worker, now);
+    core.clearing = core.clearing.filter(|clearing| *clearing != worker);
     let unbegun = core.members.change(worker, |member| {
         let is_news = !std::mem::replace(&mut member.is_draining, true);
         is_news.then(|| member.waiting.clone())
