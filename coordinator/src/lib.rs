@@ -14,6 +14,7 @@ pub mod inputs;
 pub mod journal;
 pub mod limits;
 mod outputs;
+pub mod policy;
 mod progress;
 pub mod reactor;
 pub mod recall;

@@ -4,13 +4,15 @@ use std::fmt;
 
 use lookalike::graph::{Blob, NodeKey};
 
+use crate::core::Deaths;
+
 /// What is known of a node from earlier.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Memory {
     /// Its output, if it has one: the node need not run again.
     pub output: Option<Blob>,
-    /// How many workers have died while they executed it.
-    pub crashes: u32,
+    /// The workers that have died while they executed it.
+    pub deaths: Deaths,
 }
 
 /// Remembers the nodes of earlier coordinators of a run: the journal, or a test.

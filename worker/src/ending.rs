@@ -5,6 +5,15 @@ use std::io::{self, Read};
 use tokio_util::sync::CancellationToken;
 use tracing::info;
 
+/// The wishes that this process shall end.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Wishes {
+    /// Cancelled by the first SIGTERM or Ctrl-C: finish what is begun, then end.
+    pub(crate) drain: CancellationToken,
+    /// Cancelled by the second, and as the leash says: end at once.
+    pub(crate) end: CancellationToken,
+}
+
 /// What the end of stdin means to a worker.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Leash {
@@ -16,27 +25,29 @@ pub enum Leash {
     Loose,
 }
 
-/// A token that is cancelled when this process shall end: by SIGTERM or Ctrl-C, and as the leash says.
-pub(crate) fn watch_for_the_end(leash: Leash) -> io::Result<CancellationToken> {
-    let token = CancellationToken::new();
-    let on_signal = token.clone();
+/// From now on, what asks this process to end is a wish.
+pub(crate) fn watch_for_the_end(leash: Leash) -> io::Result<Wishes> {
+    let wishes = Wishes::default();
+    let Wishes { drain, end } = wishes.clone();
     let mut signals = EndSignals::listen()?;
     tokio::spawn(async move {
         signals.next().await;
-        on_signal.cancel();
+        drain.cancel();
+        signals.next().await;
+        end.cancel();
     });
     if leash != Leash::None {
-        let on_end = token.clone();
+        let end = wishes.end.clone();
         let watch = move || {
             if is_the_end(leash, io::stdin().lock()) {
-                on_end.cancel();
+                end.cancel();
             } else {
                 info!("the coordinator was killed; waiting for another one");
             }
         };
         std::thread::Builder::new().name("leash".into()).spawn(watch)?;
     }
-    Ok(token)
+    Ok(wishes)
 }
 
 /// Wait for the coordinator's end of the leash. Whether this process shall end.

@@ -3,10 +3,10 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-use lookalike::graph::{Blob, FailureReason, NodeId, NodeKey, NodeState};
+use lookalike::graph::{Blob, FailureReason, NodeId, NodeKey, NodeState, WorkerId};
 
 use crate::comm::{Action, RunEvent, Site};
-use crate::core::{Core, Record};
+use crate::core::{Core, Deaths, Record};
 
 /// The worker's number of what runs in the coordinator itself. Workers count from 1.
 const HERE: u64 = 0;
@@ -38,7 +38,7 @@ pub(super) struct NodeRow {
     pub(super) added: Option<(String, String)>,
     pub(super) state: State,
     pub(super) attempts: u32,
-    pub(super) crashes: u32,
+    pub(super) deaths: Deaths,
     pub(super) key: Option<NodeKey>,
     pub(super) error: Option<String>,
 }
@@ -99,18 +99,23 @@ pub(crate) struct Batch {
 impl Batch {
     /// Take note of what the reactor has said. `output` is what the event brought, if it brought an output; the graph may
     /// have let it go by now.
-    pub(crate) fn note(&mut self, action: &Action, core: &Core, output: Option<&Blob>, now: Duration) {
+    pub(crate) fn note(&mut self, action: &Action, core: &Core, output: Option<&(NodeId, Blob)>, now: Duration) {
         match action {
             Action::Assign { worker, lease } => self.begin(lease.node, lease.attempt, worker.0, now),
             Action::RunHere { node, attempt } => self.begin(*node, *attempt, HERE, now),
             Action::Cancel { worker, lease } => self.end(lease.node, Some(worker.0), Outcome::Cancelled, now),
             Action::Tell(event) => self.note_event(event, core, output, now),
-            Action::SendBlob { .. } | Action::Acknowledge { .. } | Action::Drop { .. } => {}
+            Action::Acknowledge { worker, node, .. } => {
+                let has_failed = matches!(core.graph.state(*node), Some(NodeState::Failed(_)));
+                let outcome = if has_failed { Outcome::Failed } else { Outcome::Finished };
+                self.end(*node, Some(worker.0), outcome, now);
+            }
+            Action::SendBlob { .. } | Action::Drop { .. } => {}
         }
     }
 
     /// Take note of something that was told without the reactor.
-    pub(crate) fn note_event(&mut self, event: &RunEvent, core: &Core, output: Option<&Blob>, now: Duration) {
+    pub(crate) fn note_event(&mut self, event: &RunEvent, core: &Core, output: Option<&(NodeId, Blob)>, now: Duration) {
         match event {
             RunEvent::NodeAdded { name } => {
                 self.touch(name.node, core).added = Some((name.kind.clone(), name.label.clone()));
@@ -120,14 +125,18 @@ impl Batch {
             RunEvent::NodeRecalled { name, .. } => self.touch(name.node, core).state = State::Recalled,
             RunEvent::NodeFinished { name, site, .. } => {
                 let key = self.touch(name.node, core).key;
-                self.end(name.node, Some(number_of(*site)), Outcome::Finished, now);
-                self.results.extend(key.zip(output.cloned()));
+                if *site == Site::Coordinator {
+                    self.end(name.node, Some(HERE), Outcome::Finished, now);
+                }
+                let brought = output.filter(|(node, _)| *node == name.node).map(|(_, output)| output);
+                self.results.extend(key.zip(brought.or_else(|| core.graph.output(name.node)).cloned()));
             }
             RunEvent::NodeFailed { name, reason } => {
                 self.touch(name.node, core).error = Some(reason.to_string());
                 let is_own = matches!(reason, FailureReason::Node(_));
                 self.end(name.node, None, if is_own { Outcome::Failed } else { Outcome::Lost }, now);
             }
+            RunEvent::NodeSuspected { name, .. } => _ = self.touch(name.node, core),
             RunEvent::NodeRequeued { name, worker, .. } => {
                 self.touch(name.node, core);
                 self.end(name.node, Some(worker.0), Outcome::Lost, now);
@@ -188,26 +197,24 @@ impl Batch {
         let unknown = Record::default();
         let index = usize::try_from(node.0).unwrap_or(usize::MAX);
         let record = core.records.get(index).unwrap_or(&unknown);
-        let (attempts, crashes, key) = (record.attempts, record.crashes, record.key);
+        let (attempts, deaths, key) = (record.attempts, record.deaths, record.key);
+        let is_executing = |worker: &WorkerId| {
+            let held = core.members.get(*worker).and_then(|member| member.leases.get(&node));
+            held.is_some_and(|held| held.started_at.is_some())
+        };
+        let is_running = || record.here_since.is_some() || record.holders.iter().any(is_executing);
         let state = match core.graph.state(node) {
             Some(NodeState::Completed(_)) => State::Completed,
             Some(NodeState::Failed(_)) => State::Failed,
-            Some(NodeState::Ready) if record.holder.is_some() && record.started_at.is_some() => State::Running,
+            Some(NodeState::Ready) if is_running() => State::Running,
             Some(NodeState::Ready) => State::Ready,
             Some(NodeState::Waiting) | None => State::Waiting,
         };
-        let new = || NodeRow { added: None, state, attempts, crashes, key, error: None };
+        let new = || NodeRow { added: None, state, attempts, deaths, key, error: None };
         let row = self.nodes.entry(node.0).or_insert_with(new);
         // What an earlier coordinator completed stays recalled.
         let state = if row.state == State::Recalled { State::Recalled } else { state };
-        (row.state, row.attempts, row.crashes, row.key) = (state, attempts, crashes, key);
+        (row.state, row.attempts, row.deaths, row.key) = (state, attempts, deaths, key);
         row
-    }
-}
-
-fn number_of(site: Site) -> u64 {
-    match site {
-        Site::Worker(worker) => worker.0,
-        Site::Coordinator => HERE,
     }
 }

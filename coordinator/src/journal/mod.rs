@@ -55,6 +55,7 @@ pub use self::lock::{LOCK_FILE, LockError, RunLock};
 pub(crate) use self::past::Past;
 pub(crate) use self::schema::remove;
 use self::writer::{Command, Writer};
+use crate::core::Deaths;
 use crate::recall::{Memory, Recall};
 
 /// The journal's file in a folder of results.
@@ -135,8 +136,8 @@ impl Journal {
 
     /// What the reactor asks for the outputs of earlier epochs.
     pub(crate) fn recall(&self) -> Box<dyn Recall> {
-        let crashes = self.past.crashes.clone();
-        Box::new(Recollection { known: Arc::clone(&self.known), crashes, commands: self.commands.clone() })
+        let deaths = self.past.deaths.clone();
+        Box::new(Recollection { known: Arc::clone(&self.known), deaths, commands: self.commands.clone() })
     }
 
     /// Write a batch, after those before. [`Self::committed`] tells when it is written.
@@ -176,20 +177,20 @@ impl Journal {
 #[derive(Debug)]
 struct Recollection {
     known: Known,
-    crashes: HashMap<NodeKey, u32>,
+    deaths: HashMap<NodeKey, Deaths>,
     commands: Sender<Command>,
 }
 
 impl Recall for Recollection {
     fn recall(&mut self, key: NodeKey) -> Memory {
-        let crashes = self.crashes.get(&key).copied().unwrap_or(0);
+        let deaths = self.deaths.get(&key).copied().unwrap_or_default();
         let is_known = self.known.lock().unwrap_or_else(PoisonError::into_inner).contains(&key);
         let read = || {
             let (sender, answer) = sync_channel(1);
             self.commands.send(Command::Read(key, sender)).ok()?;
             answer.recv().ok()?
         };
-        Memory { output: if is_known { read() } else { None }, crashes }
+        Memory { output: if is_known { read() } else { None }, deaths }
     }
 }
 

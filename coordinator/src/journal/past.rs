@@ -12,14 +12,15 @@ use super::error::JournalError;
 use super::identity::RunIdentity;
 use super::lock::host;
 use super::{Loaded, schema, unix_ms};
+use crate::core::Deaths;
 
 /// What earlier epochs have left.
 #[derive(Debug, Default)]
 pub(crate) struct Past {
     /// The key of each node that may have been given out, by epoch and number.
     pub(crate) keys: HashMap<(u64, u64), NodeKey>,
-    /// How many workers died while they executed a node, where any did.
-    pub(crate) crashes: HashMap<NodeKey, u32>,
+    /// The workers that died while they executed a node, where any did.
+    pub(crate) deaths: HashMap<NodeKey, Deaths>,
     /// Where the last one listened.
     pub(crate) listen: Option<SocketAddr>,
     /// The processes that were started as local workers; most of them are gone.
@@ -92,15 +93,16 @@ fn results(connection: &Connection) -> rusqlite::Result<HashMap<NodeKey, i64>> {
 
 fn past(connection: &Connection, results: usize) -> rusqlite::Result<Past> {
     let mut past = Past { results, ..Past::default() };
-    let mut statement = connection.prepare("SELECT epoch, node, key, crashes FROM nodes WHERE key IS NOT NULL")?;
+    let mut statement = connection
+        .prepare("SELECT epoch, node, key, deaths, deaths_alone, deaths_excused FROM nodes WHERE key IS NOT NULL")?;
     let mut rows = statement.query([])?;
     while let Some(row) = rows.next()? {
         let (epoch, node, key): (u64, u64, _) = (row.get(0)?, row.get(1)?, NodeKey(row.get(2)?));
-        let crashes: u32 = row.get(3)?;
+        let deaths = Deaths { in_company: row.get(3)?, alone: row.get(4)?, excused: row.get(5)? };
         past.keys.insert((epoch, node), key);
-        if crashes > 0 {
-            let most = past.crashes.entry(key).or_default();
-            *most = crashes.max(*most);
+        // Each epoch counts on from the one before.
+        if deaths.total() > past.deaths.get(&key).map_or(0, |most| most.total()) {
+            past.deaths.insert(key, deaths);
         }
     }
     let listen = connection.query_row(

@@ -45,7 +45,9 @@ CREATE TABLE nodes (
     label       TEXT NOT NULL,
     state       INTEGER NOT NULL,
     attempts    INTEGER NOT NULL,
-    crashes     INTEGER NOT NULL,
+    deaths      INTEGER NOT NULL,
+    deaths_alone    INTEGER NOT NULL,
+    deaths_excused  INTEGER NOT NULL,
     key         BLOB,
     error       TEXT,
     PRIMARY KEY (epoch, node)
@@ -85,7 +87,7 @@ CREATE VIEW node_list AS
     SELECT epoch, node, kind, label,
            CASE state WHEN 0 THEN 'waiting' WHEN 1 THEN 'ready' WHEN 2 THEN 'running' WHEN 3 THEN 'completed'
                       WHEN 4 THEN 'recalled' ELSE 'failed' END AS state,
-           attempts, crashes, lower(hex(key)) AS key, error
+           attempts, deaths + deaths_alone + deaths_excused AS deaths, lower(hex(key)) AS key, error
     FROM nodes;
 CREATE VIEW attempt_list AS
     SELECT epoch, node, attempt, worker, begun_ms, ended_ms,

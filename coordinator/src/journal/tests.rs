@@ -14,6 +14,7 @@ use super::status::{RunState, Status};
 use super::*;
 
 const NAME: RunName = RunName([7; 16]);
+const DEATHS: Deaths = Deaths { in_company: 2, alone: 1, excused: 3 };
 
 fn identity() -> RunIdentity {
     RunIdentity::default().with("--seed", "0")
@@ -35,7 +36,14 @@ fn output(byte: u8) -> Blob {
 fn completed(node: u8) -> Batch {
     let mut batch = Batch::default();
     let added = Some(("search".to_owned(), format!("search {node}")));
-    let row = NodeRow { added, state: State::Completed, attempts: 1, crashes: 0, key: Some(key(node)), error: None };
+    let row = NodeRow {
+        added,
+        state: State::Completed,
+        attempts: 1,
+        deaths: Deaths::default(),
+        key: Some(key(node)),
+        error: None,
+    };
     batch.nodes.insert(u64::from(node), row);
     batch.keep(key(node), output(node));
     batch
@@ -64,7 +72,7 @@ fn next_epoch_finds_results_deaths_and_the_address() {
     let mut journal = begun(&folder);
     assert_eq!((journal.run, journal.epoch), (NAME, 1));
     let mut batch = completed(1);
-    let suspect = NodeRow { state: State::Ready, crashes: 2, ..completed(2).nodes.remove(&2).unwrap() };
+    let suspect = NodeRow { state: State::Ready, deaths: DEATHS, ..completed(2).nodes.remove(&2).unwrap() };
     batch.nodes.insert(2, suspect);
     batch.listens("127.0.0.1:4100".into());
     batch.local_workers = vec![4711, 4712];
@@ -78,8 +86,8 @@ fn next_epoch_finds_results_deaths_and_the_address() {
     assert_eq!(again.past.local_workers, [4711, 4712]);
     assert_eq!(again.past.keys.get(&(1, 2)), Some(&key(2)));
     let mut recall = again.recall();
-    assert_eq!(recall.recall(key(1)), Memory { output: Some(output(1)), crashes: 0 });
-    assert_eq!(recall.recall(key(2)), Memory { output: None, crashes: 2 });
+    assert_eq!(recall.recall(key(1)), Memory { output: Some(output(1)), ..Memory::default() });
+    assert_eq!(recall.recall(key(2)), Memory { output: None, deaths: DEATHS });
     assert_eq!(recall.recall(key(3)), Memory::default());
 }
 

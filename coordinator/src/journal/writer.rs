@@ -14,6 +14,7 @@ use super::batch::{Batch, NodeRow};
 use super::error::JournalError;
 use super::status;
 use super::unix_ms;
+use crate::core::Deaths;
 
 /// How often `status.json` is written at most.
 const STATUS_INTERVAL: Duration = Duration::from_secs(1);
@@ -177,21 +178,24 @@ fn write(
 }
 
 fn write_node(transaction: &Transaction<'_>, epoch: u64, node: u64, row: &NodeRow) -> rusqlite::Result<()> {
-    let NodeRow { added, state, attempts, crashes, key, error } = row;
+    let NodeRow { added, state, attempts, deaths, key, error } = row;
+    let Deaths { in_company, alone, excused } = deaths;
     let (state, key) = (*state as u8, key.as_ref().map(|key| key.0));
     match added {
         Some((kind, label)) => transaction
             .prepare_cached(
-                "INSERT INTO nodes (epoch, node, kind, label, state, attempts, crashes, key, error)
-                 VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9)",
+                "INSERT INTO nodes
+                     (epoch, node, kind, label, state, attempts, deaths, deaths_alone, deaths_excused, key, error)
+                 VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11)",
             )?
-            .execute(params![epoch, node, kind, label, state, attempts, crashes, key, error])?,
+            .execute(params![epoch, node, kind, label, state, attempts, in_company, alone, excused, key, error])?,
         None => transaction
             .prepare_cached(
-                "UPDATE nodes SET state = ?3, attempts = ?4, crashes = ?5, key = ?6, error = ?7
+                "UPDATE nodes SET state = ?3, attempts = ?4, deaths = ?5, deaths_alone = ?6, deaths_excused = ?7, key = ?8,
+                     error = ?9
                  WHERE epoch = ?1 AND node = ?2",
             )?
-            .execute(params![epoch, node, state, attempts, crashes, key, error])?,
+            .execute(params![epoch, node, state, attempts, in_company, alone, excused, key, error])?,
     };
     Ok(())
 }

@@ -8,7 +8,7 @@ use lookalike::graph::{Blob, Graph, Input, NodeId, NodeKey, NodeSpec, Placement,
 use super::tests::{Script, node};
 use super::{Event, handle, start};
 use crate::comm::{Action, Departure, Outbox, RunEvent};
-use crate::core::{Core, Policy};
+use crate::core::{Core, Deaths, Policy};
 use crate::recall::{Memory, Recall};
 use crate::runner::RunError;
 
@@ -86,7 +86,7 @@ impl Bench {
 }
 
 fn output(byte: u8) -> Memory {
-    Memory { output: Some(Blob::new(vec![byte])), crashes: 0 }
+    Memory { output: Some(Blob::new(vec![byte])), ..Memory::default() }
 }
 
 #[test]
@@ -110,7 +110,11 @@ fn run_whose_nodes_are_all_remembered_is_finished_at_once() {
 
 #[test]
 fn deaths_are_remembered() {
-    let mut bench = Bench::new(&[("x", Placement::Worker, Memory { output: None, crashes: 1 })]);
+    let mut bench = Bench::new(&[(
+        "x",
+        Placement::Worker,
+        Memory { output: None, deaths: Deaths { in_company: 1, ..Deaths::default() } },
+    )]);
     bench.join(A);
     bench.handle(Event::Started { worker: A, node: NodeId(0), attempt: 1 }).unwrap();
     let said = bench.handle(Event::WorkerLeft { worker: A, departure: Departure::Lost }).unwrap();

@@ -9,7 +9,7 @@ use std::time::SystemTime;
 use lookalike::graph::WorkerId;
 use lookalike::protocol::{RunName, ToWorker};
 use tokio::net::TcpListener;
-use tokio::sync::mpsc::{Sender, UnboundedSender};
+use tokio::sync::mpsc::Sender;
 use tokio::sync::watch;
 use tokio::task::{JoinHandle, JoinSet};
 use tokio_rustls::TlsAcceptor;
@@ -18,7 +18,7 @@ use tokio_util::sync::CancellationToken;
 use super::{RunError, RunnerOptions};
 use crate::access::{Credentials, CredentialsError};
 use crate::journal::Past;
-use crate::rpc::{Gate, Inbound, Outgoing, serve_forever};
+use crate::rpc::{Gate, Inbound, Mailbox, Outgoing, serve_forever};
 use crate::spawn::{LocalWorkers, WorkerCommand, is_worker_alive, threads_per_worker};
 use crate::tls::server_config;
 
@@ -29,7 +29,7 @@ pub(crate) struct Cluster {
     pub(crate) address: String,
     /// Where the coordinator listens.
     pub(crate) bound: SocketAddr,
-    members: BTreeMap<WorkerId, (u32, UnboundedSender<Outgoing>)>,
+    members: BTreeMap<WorkerId, (u32, Mailbox)>,
     /// The processes of the members.
     present: watch::Sender<BTreeSet<u32>>,
     /// Workers of an earlier coordinator that are not wanted any more.
@@ -83,7 +83,7 @@ impl Cluster {
             limits: options.limits,
             run,
             epoch,
-            heartbeat: options.heartbeat,
+            policy: options.policy,
             inbound: inbound.clone(),
         };
         let mut orphans = takeover.map(|takeover| takeover.orphans).unwrap_or_default();
@@ -97,13 +97,12 @@ impl Cluster {
 
     /// A worker can be sent to from now on. Whether it is wanted: one that an earlier coordinator had started, and that is one too
     /// many now, is told to end.
-    pub(crate) fn admit(&mut self, worker: WorkerId, process: u32, outgoing: UnboundedSender<Outgoing>) -> bool {
+    pub(crate) fn admit(&mut self, worker: WorkerId, process: u32, mailbox: Mailbox) -> bool {
         if self.surplus.contains(&process) {
-            // A worker that is gone needs no word.
-            let _ = outgoing.send(Outgoing::Message(ToWorker::Stop { reason: "fewer workers are wanted now".into() }));
+            mailbox.send(Outgoing::Message(ToWorker::Stop { reason: "fewer workers are wanted now".into() }));
             return false;
         }
-        self.members.insert(worker, (process, outgoing));
+        self.members.insert(worker, (process, mailbox));
         self.present.send_modify(|present| _ = present.insert(process));
         true
     }
@@ -111,13 +110,14 @@ impl Cluster {
     /// Send to a worker. One that has left meanwhile gets nothing: the reactor will hear of it.
     pub(crate) fn send(&self, worker: WorkerId, outgoing: Outgoing) {
         if let Some((_, member)) = self.members.get(&worker) {
-            let _ = member.send(outgoing);
+            member.send(outgoing);
         }
     }
 
-    /// Send nothing more to a worker and close its connection.
+    /// Send nothing more to a worker and close its connection, whether or not it has read what was sent before.
     pub(crate) fn dismiss(&mut self, worker: WorkerId) {
-        if let Some((process, _)) = self.members.remove(&worker) {
+        if let Some((process, member)) = self.members.remove(&worker) {
+            member.close();
             let is_back = self.members.values().any(|(other, _)| *other == process);
             if !is_back {
                 self.present.send_modify(|present| _ = present.remove(&process));
@@ -128,7 +128,7 @@ impl Cluster {
     /// Tell all workers that the run is over, and wait until connections and local processes are gone.
     pub(crate) async fn stop(mut self, reason: &str) {
         for (_, member) in std::mem::take(&mut self.members).into_values() {
-            let _ = member.send(Outgoing::Message(ToWorker::Stop { reason: reason.to_owned() }));
+            member.send(Outgoing::Message(ToWorker::Stop { reason: reason.to_owned() }));
         }
         self.stop.cancel();
         let _ = (&mut self.serving).await;

@@ -31,7 +31,7 @@ use tokio_util::sync::CancellationToken;
 use tracing::{info, trace};
 
 use self::cluster::{Cluster, Takeover};
-pub use self::error::RunError;
+pub use self::error::{NodeAnswer, RunError};
 use self::here::Here;
 use self::interrupt::Interrupt;
 use self::memory::{Group, Memory};
@@ -249,7 +249,9 @@ impl<P: Planner, O: FnMut(&RunEvent)> Driver<P, O> {
         self.here.forget(&event);
         let now = self.now();
         let output = match &event {
-            Event::Finished { output, .. } | Event::Recovered { output, .. } => Some(output.clone()),
+            Event::Finished { node, output, .. } | Event::Recovered { node, output, .. } => {
+                Some((*node, output.clone()))
+            }
             _ => None,
         };
         let outcome = reactor::handle(&mut self.core, &mut self.planner, event, now, &mut self.outbox);
@@ -259,7 +261,7 @@ impl<P: Planner, O: FnMut(&RunEvent)> Driver<P, O> {
     }
 
     /// Move what the reactor has said into the group, and tell the journal.
-    fn collect(&mut self, group: &mut Group, output: Option<&Blob>, now: Duration) {
+    fn collect(&mut self, group: &mut Group, output: Option<&(NodeId, Blob)>, now: Duration) {
         let actions = self.outbox.take();
         if self.memory.is_kept() {
             actions.iter().for_each(|action| group.batch.note(action, &self.core, output, now));
@@ -291,10 +293,10 @@ impl<P: Planner, O: FnMut(&RunEvent)> Driver<P, O> {
                 }
                 Some(event)
             }
-            Inbound::Joined { worker, hello, outgoing } => {
+            Inbound::Joined { worker, hello, mailbox } => {
                 let (process, cluster) = (hello.process, self.cluster.as_mut()?);
                 let threads = usize::try_from(hello.threads).unwrap_or(usize::MAX).clamp(1, MAX_THREADS);
-                let is_wanted = cluster.admit(worker, process, outgoing);
+                let is_wanted = cluster.admit(worker, process, mailbox);
                 match &mut self.survivors {
                     Some(survivors) if is_wanted => survivors.joined(worker, threads, process),
                     Some(survivors) => survivors.dismissed(process),
@@ -307,6 +309,11 @@ impl<P: Planner, O: FnMut(&RunEvent)> Driver<P, O> {
                 Some(Event::Heartbeat { worker, executing: Vec::new() })
             }
             Inbound::Late { worker, lease, output } => Some(self.memory.late_answer(worker, lease, output, group)),
+            Inbound::Ask { lease, answer } => {
+                // Whoever asked may be gone.
+                let _ = answer.send(self.core.was_given_out(NodeId(lease.node), lease.attempt));
+                None
+            }
             Inbound::Tell(event) => {
                 group.batch.note_event(&event, &self.core, None, self.now());
                 group.actions.push(Action::Tell(event));
