@@ -6,7 +6,8 @@ use std::time::Duration;
 
 use lookalike::graph::{Blob, FailureReason, NodeId, WorkerId};
 
-/// A worker's permission, and duty, to execute a node.
+/// A worker's permission, and duty, to execute a node. It ends with an answer, when it is cancelled, or with its worker's
+/// membership, which lasts as long as the worker is heard of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Lease {
     /// The node.
@@ -15,9 +16,6 @@ pub struct Lease {
     pub attempt: u32,
     /// Counts the coordinator processes of this run, from 1.
     pub epoch: u64,
-    /// When it ends, unless the worker is heard of before: time since the run began. Every sign of life of a worker renews
-    /// all its leases.
-    pub deadline: Duration,
 }
 
 /// One thing to do.
@@ -58,7 +56,7 @@ pub enum Action {
         /// The attempt it answered for.
         attempt: u32,
     },
-    /// Close the connection of this worker; it is no member any more.
+    /// Close the connection of this worker at once; it is no member any more.
     Drop {
         /// The worker.
         worker: WorkerId,
@@ -81,6 +79,8 @@ pub enum Departure {
     Lost,
     /// It was not heard of for too long.
     Silent,
+    /// It did not read what was sent to it.
+    TooSlow,
     /// It said goodbye: somebody asked it to end.
     Goodbye,
     /// It broke the protocol.
@@ -88,12 +88,27 @@ pub enum Departure {
 }
 
 impl Departure {
-    /// Whether the nodes that the worker executed may have caused it.
+    /// Whether the nodes that the worker executed may have caused it. How a local process ended would not tell more: a node
+    /// that takes all memory and somebody with `kill -9` leave the same status behind.
     #[must_use]
     pub fn is_suspicious(&self) -> bool {
         match self {
             Self::Lost | Self::Violation(_) => true,
-            Self::Silent | Self::Goodbye => false,
+            Self::Silent | Self::TooSlow | Self::Goodbye => false,
+        }
+    }
+}
+
+impl Departure {
+    /// It in one word of a closed list, for programs.
+    #[must_use]
+    pub fn word(&self) -> &'static str {
+        match self {
+            Self::Lost => "lost",
+            Self::Silent => "silent",
+            Self::TooSlow => "too-slow",
+            Self::Goodbye => "goodbye",
+            Self::Violation(_) => "violation",
         }
     }
 }
@@ -103,6 +118,7 @@ impl fmt::Display for Departure {
         match self {
             Self::Lost => formatter.write_str("its connection ended"),
             Self::Silent => formatter.write_str("it was not heard of for too long"),
+            Self::TooSlow => formatter.write_str("it did not read what was sent to it"),
             Self::Goodbye => formatter.write_str("it was asked to end"),
             Self::Violation(what) => write!(formatter, "it broke the protocol: {what}"),
         }
@@ -153,6 +169,18 @@ pub enum RunEvent {
         /// What the access file tells the workers.
         address: String,
     },
+    /// An earlier coordinator of this run is gone on with.
+    Resumed {
+        /// Counts the coordinator processes of the run, from 1.
+        epoch: u64,
+        /// How many nodes have their output in the journal.
+        results: usize,
+    },
+    /// A local worker process was started.
+    LocalWorkerStarted {
+        /// Its process id.
+        process: u32,
+    },
     /// A worker has joined.
     WorkerJoined {
         /// Its number.
@@ -168,6 +196,11 @@ pub enum RunEvent {
         worker: WorkerId,
         /// Why.
         departure: Departure,
+    },
+    /// A worker was asked to end: it finishes what it executes and gets nothing more.
+    WorkerDraining {
+        /// Its number.
+        worker: WorkerId,
     },
     /// A local worker process ended by itself.
     LocalWorkerEnded {
@@ -190,7 +223,7 @@ pub enum RunEvent {
         /// The node.
         name: NodeName,
     },
-    /// All inputs of a node are there: it waits for a place to run.
+    /// The inputs of a node are there. Told of runs that are remembered only.
     NodeReady {
         /// The node.
         node: NodeId,
@@ -201,6 +234,18 @@ pub enum RunEvent {
         node: NodeId,
         /// The worker.
         worker: WorkerId,
+    },
+    /// A node has the output that it got from an earlier coordinator of this run.
+    NodeRecalled {
+        /// The node.
+        name: NodeName,
+        /// The size of the output in bytes.
+        bytes: usize,
+    },
+    /// Nobody needs the output of a node any more, not even a coordinator that goes on with this run: only its hash is kept.
+    NodeReleased {
+        /// The node.
+        name: NodeName,
     },
     /// A node begins to run.
     NodeStarted {
@@ -249,6 +294,20 @@ pub enum RunEvent {
         worker: WorkerId,
         /// How many workers have died while they executed it.
         crashes: u32,
+    },
+    /// Workers have died while they executed this node, so from now on it runs alone.
+    NodeSuspected {
+        /// The node.
+        name: NodeName,
+        /// How many workers.
+        deaths: u32,
+    },
+    /// A slow node runs on a second worker as well.
+    NodeSpeculated {
+        /// The node.
+        name: NodeName,
+        /// The second worker.
+        worker: WorkerId,
     },
     /// A blob goes to a worker.
     BlobSent {

@@ -3,6 +3,7 @@
 mod ending;
 mod manifest;
 mod outputs;
+mod resume;
 mod same_bits;
 mod watching;
 

@@ -12,6 +12,7 @@ mod batch;
 mod cli;
 mod cluster;
 mod compare;
+mod faults;
 mod fit;
 mod hostile;
 mod network;
@@ -20,4 +21,5 @@ mod program;
 #[cfg(feature = "slow")]
 mod recovery;
 mod render;
+mod resume;
 mod tidy;

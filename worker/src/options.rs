@@ -6,6 +6,8 @@ use std::time::Duration;
 
 use clap::Args;
 
+use crate::ending::Leash;
+
 /// The flags of `lookalike-worker` and `lookalike worker`.
 #[derive(Clone, Debug, Args)]
 pub struct Arguments {
@@ -21,6 +23,11 @@ pub struct Arguments {
     #[arg(long, value_name = "TIME", default_value = "10min", value_parser = humantime::parse_duration)]
     pub reconnect_for: Duration,
 
+    /// How long to finish what is being computed when asked to end by SIGTERM or Ctrl-C, before it goes to others; asked twice,
+    /// the worker ends at once [default: as the coordinator says, 30s]
+    #[arg(long, value_name = "TIME", value_parser = humantime::parse_duration)]
+    pub drain_time: Option<Duration>,
+
     /// Connect to this HOST:PORT instead of the access file's; for workers on the coordinator's own machine
     #[arg(long, value_name = "ADDR", hide = true)]
     pub address: Option<String>,
@@ -28,6 +35,10 @@ pub struct Arguments {
     /// End when stdin ends: the coordinator holds the other end of the pipe
     #[arg(long, hide = true)]
     pub leash: bool,
+
+    /// With --leash: do not end when the coordinator was killed, but wait for the next one as long as --reconnect-for says
+    #[arg(long, requires = "leash", hide = true)]
+    pub survive: bool,
 }
 
 impl Arguments {
@@ -38,8 +49,13 @@ impl Arguments {
         WorkerOptions {
             threads,
             reconnect_for: self.reconnect_for,
+            drain_time: self.drain_time,
             address: self.address,
-            leash: self.leash,
+            leash: match (self.leash, self.survive) {
+                (false, _) => Leash::None,
+                (true, false) => Leash::Tight,
+                (true, true) => Leash::Loose,
+            },
             ..WorkerOptions::new(self.access)
         }
     }
@@ -56,8 +72,10 @@ pub struct WorkerOptions {
     pub threads: NonZeroUsize,
     /// How long to try to reach the coordinator before giving up.
     pub reconnect_for: Duration,
-    /// End when stdin ends.
-    pub leash: bool,
+    /// How long to finish what executes when asked to end; `None`: as the coordinator says.
+    pub drain_time: Option<Duration>,
+    /// What the end of stdin means.
+    pub leash: Leash,
     /// How many bytes of blobs to keep beyond those that assigned nodes need.
     pub cached_blob_bytes: usize,
     /// How many bytes of blobs (counted encoded) to keep decoded.
@@ -73,7 +91,8 @@ impl WorkerOptions {
             address: None,
             threads: NonZeroUsize::MIN,
             reconnect_for: Duration::from_mins(10),
-            leash: false,
+            drain_time: None,
+            leash: Leash::None,
             cached_blob_bytes: 256 << 20,
             decoded_blob_bytes: 128 << 20,
         }

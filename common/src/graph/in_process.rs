@@ -66,7 +66,7 @@ fn notify<P: Planner>(
 ) -> Result<(), PlanError> {
     while let Some(change) = graph.next_change() {
         match change {
-            Change::Added(_) => {}
+            Change::Added(_) | Change::Forgotten(_) => {}
             Change::Ready(node) => {
                 let priority = graph.spec(node).map_or(0, |spec| spec.priority);
                 ready.insert((priority, node));

@@ -4,7 +4,8 @@
 //! - Nodes of earlier parts run first, so that early parts end early.
 //! - A node that two parts ask for runs once; equal blobs are one blob anyway.
 //! - A node that fails ends its part; the others go on. What only that part wanted is cancelled.
-//! - A part ends when it waits for nothing any more, as a run does. What it held is released.
+//! - A part ends when it waits for nothing any more, as a run does. What it held is released, and forgotten for good once what was made
+//!   of it is safe.
 //!
 //! What a part makes of its outputs does not depend on the other parts: alone, it would get the same ones.
 
@@ -13,7 +14,7 @@ use std::collections::BTreeMap;
 use thiserror::Error;
 
 use super::{
-    Blob, FailureReason, GraphEdit, NodeId, PlanError, Planner,
+    Blob, FailureReason, GraphEdit, NodeId, NodeSpec, PlanError, Planner,
     sharing::{PartId, Sharing},
 };
 
@@ -83,6 +84,12 @@ pub trait Parts {
     /// # Errors
     /// What ends the run.
     fn failed(&mut self, part: Part<Self::Planner>, failure: PartFailure) -> Result<(), PlanError>;
+
+    /// The parts that have become safe since the last call: they have ended well, and never have to be run again, whatever happens to
+    /// this run. What only they needed is forgotten for good.
+    fn newly_safe(&mut self) -> Vec<u32> {
+        Vec::new()
+    }
 }
 
 /// The planner of all parts.
@@ -105,7 +112,14 @@ impl<S: Parts> Many<S> {
         self.parts
     }
 
-    /// Let parts begin as long as there is too little to do.
+    /// Forget what nobody will need again, and let parts begin as long as there is too little to do.
+    fn go_on(&mut self, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
+        for number in self.parts.newly_safe() {
+            self.sharing.settle(number, graph.graph());
+        }
+        self.begin_parts(graph)
+    }
+
     fn begin_parts(&mut self, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
         while !self.is_exhausted {
             let is_idle = self.active.is_empty();
@@ -183,7 +197,7 @@ impl<S: Parts> Many<S> {
 
 impl<S: Parts> Planner for Many<S> {
     fn start(&mut self, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
-        self.begin_parts(graph)
+        self.go_on(graph)
     }
 
     fn completed(&mut self, node: NodeId, output: &Blob, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
@@ -191,7 +205,7 @@ impl<S: Parts> Planner for Many<S> {
             self.tell(number, node, output, graph)?;
         }
         self.tell_late(graph)?;
-        self.begin_parts(graph)
+        self.go_on(graph)
     }
 
     fn failed(&mut self, node: NodeId, reason: &FailureReason, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
@@ -200,7 +214,11 @@ impl<S: Parts> Planner for Many<S> {
             let (kind, label) = (kind.clone(), split_label(&label).1.to_owned());
             self.give_up(number, PartFailure::Node { kind, label, reason: reason.clone() }, graph)?;
         }
-        self.begin_parts(graph)
+        self.go_on(graph)
+    }
+
+    fn is_verified_by_repetition(&self, spec: &NodeSpec) -> bool {
+        self.active.get(&spec.priority).is_none_or(|part| part.planner.is_verified_by_repetition(spec))
     }
 }
 

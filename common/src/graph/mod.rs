@@ -23,6 +23,7 @@ mod context;
 mod decoded;
 mod edit;
 mod in_process;
+mod key;
 mod many;
 mod node;
 mod planner;
@@ -36,6 +37,7 @@ pub use context::RunContext;
 pub use decoded::DecodedCache;
 pub use edit::GraphEdit;
 pub use in_process::{Execution, run_in_process};
+pub use key::NodeKey;
 use many::part_label;
 pub use many::{MAX_PART_NAME_BYTES, Many, Next, Part, PartFailure, Parts, split_label};
 pub use node::{

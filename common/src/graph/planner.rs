@@ -4,7 +4,7 @@ use std::error::Error as StdError;
 
 use thiserror::Error;
 
-use super::{Blob, BlobHash, FailureReason, GraphEdit, NodeId};
+use super::{Blob, BlobHash, FailureReason, GraphEdit, NodeId, NodeSpec};
 
 /// Decides which nodes a run has. The run ends when no node is open.
 ///
@@ -32,6 +32,13 @@ pub trait Planner {
     fn failed(&mut self, node: NodeId, reason: &FailureReason, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
         let (kind, label) = graph.spec(node).map(|spec| (spec.kind.clone(), spec.label.clone())).unwrap_or_default();
         Err(PlanError::NodeFailed { kind, label, reason: reason.clone() })
+    }
+
+    /// Whether a second run of this node would tell whether its output is right, for the share of nodes that a run verifies.
+    /// Not worth it where [`completed`](Self::completed) computes the output's claims again. By default every node.
+    fn is_verified_by_repetition(&self, spec: &NodeSpec) -> bool {
+        let _ = spec;
+        true
     }
 }
 

@@ -17,6 +17,10 @@ pub(super) struct Sharing {
     holdings: BTreeMap<PartId, Holdings>,
     /// Nodes that were complete before a planner asked for them: it has to be told.
     late: VecDeque<(PartId, NodeId)>,
+    /// Everything that planners whose results are not safe have ever asked for.
+    asked: BTreeMap<PartId, BTreeSet<NodeId>>,
+    /// How many of these planners have asked for a node.
+    users: BTreeMap<NodeId, usize>,
 }
 
 /// A node that some planner holds.
@@ -61,6 +65,26 @@ impl Sharing {
     /// Whether a planner waits for nothing any more.
     pub(super) fn is_idle(&self, part: PartId) -> bool {
         self.holdings.get(&part).is_none_or(|holdings| holdings.awaited.is_empty())
+    }
+
+    /// What a planner has made of its nodes is safe: nodes that no other one has asked for, or only such whose results are safe too,
+    /// are forgotten.
+    pub(super) fn settle(&mut self, part: PartId, graph: &mut Graph) {
+        for node in self.asked.remove(&part).unwrap_or_default() {
+            let Some(users) = self.users.get_mut(&node) else { continue };
+            *users -= 1;
+            if *users == 0 {
+                self.users.remove(&node);
+                graph.forget(node);
+            }
+        }
+    }
+
+    /// A planner asks for a node.
+    fn ask(&mut self, part: PartId, node: NodeId) {
+        if self.asked.entry(part).or_default().insert(node) {
+            *self.users.entry(node).or_default() += 1;
+        }
     }
 
     /// A planner needs nothing any more.
@@ -125,6 +149,7 @@ impl PartEdit<'_> {
         let node = graph.add_node(NodeSpec { label, priority: part, ..spec })?;
         self.sharing.by_key.insert(key, node);
         self.sharing.nodes.insert(node, Shared { key, parts: vec![part], is_told: false });
+        self.sharing.ask(part, node);
         self.holdings().nodes.insert(node);
         self.holdings().awaited.insert(node);
         Ok(node)
@@ -137,9 +162,10 @@ impl PartEdit<'_> {
         if self.holdings().nodes.contains(&node) || !graph.hold(node) {
             return None;
         }
+        let part = self.part;
+        self.sharing.ask(part, node);
         self.holdings().nodes.insert(node);
         self.holdings().awaited.insert(node);
-        let part = self.part;
         let shared = self.sharing.nodes.get_mut(&node)?;
         shared.parts.push(part);
         if shared.is_told {

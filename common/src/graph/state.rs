@@ -10,7 +10,7 @@ use std::collections::VecDeque;
 
 use super::{
     Blob, BlobHash, FailureReason, Input, MAX_BLOB_BYTES, MAX_INPUTS, MAX_NAME_BYTES, MAX_PARAMETER_BYTES, NodeFailure,
-    NodeId, NodeSpec, Placement, PlanError, store::BlobStore,
+    NodeId, NodeKey, NodeSpec, Placement, PlanError, store::BlobStore,
 };
 
 /// Where a node is on its way.
@@ -37,6 +37,8 @@ pub enum Change {
     Completed(NodeId),
     /// It failed, itself or through an input.
     Failed(NodeId),
+    /// Its output will never be needed again, not even by a run that begins anew from what this one has left.
+    Forgotten(NodeId),
 }
 
 /// What became of an output that was handed to [`Graph::complete`].
@@ -208,6 +210,14 @@ impl Graph {
         self.is_open(node) && self.get(node).is_some_and(|held| held.holders == 0 && !is_awaited(held))
     }
 
+    /// Say that the output of a completed node will never be needed again, not even by a run that begins anew from what this one has
+    /// left. It has to be released as well.
+    pub fn forget(&mut self, node: NodeId) {
+        if matches!(self.state(node), Some(NodeState::Completed(_))) {
+            self.changes.push_back(Change::Forgotten(node));
+        }
+    }
+
     fn make_ready(&mut self, node: NodeId) {
         let waiting = self.at_mut(node);
         waiting.state = NodeState::Ready;
@@ -329,6 +339,21 @@ impl Graph {
             Input::OutputOf(source) => self.output(source).cloned(),
         };
         self.get(node)?.spec.inputs.iter().map(blob_of).collect()
+    }
+
+    /// What a node computes; `None` while an input is missing. It stays the same when blobs are gone.
+    #[must_use]
+    pub fn key(&self, node: NodeId) -> Option<NodeKey> {
+        let spec = self.spec(node)?;
+        let hash_of = |input: &Input| match *input {
+            Input::Blob(hash) => Some(hash),
+            Input::OutputOf(source) => match self.state(source)? {
+                NodeState::Completed(hash) => Some(*hash),
+                _ => None,
+            },
+        };
+        let inputs: Vec<BlobHash> = spec.inputs.iter().map(hash_of).collect::<Option<_>>()?;
+        Some(NodeKey::of(&spec.kind, &spec.parameters, inputs))
     }
 
     /// Whether a node has neither an output nor a failure yet.

@@ -103,25 +103,27 @@ struct FitClock {
 }
 
 impl Board {
-    /// A board of fits that wait, with their first summaries.
+    /// A board of fits that wait, or are complete, which their results say with their seconds; with their first summaries.
     pub(super) fn new(
         fits: &[BatchFit],
+        complete: Vec<Option<(Scores, f64)>>,
         out: OutFolder,
         display: Box<dyn Display>,
         metrics: Option<Metrics>,
     ) -> anyhow::Result<Self> {
-        let row = |fit: &BatchFit| {
+        let row = |(fit, complete): (&BatchFit, Option<(Scores, f64)>)| {
+            let (scores, seconds) = complete.unzip();
             Ok::<_, brdf::ParameterError>(Row {
                 name: fit.name.clone(),
                 photo: fit.photo.to_string_lossy().into_owned(),
                 env: fit.environment.path.to_string_lossy().into_owned(),
                 model: brdf::model(fit.method.model.as_str())?,
-                state: State::Waiting,
-                seconds: None,
+                state: scores.map_or(State::Waiting, State::Done),
+                seconds,
             })
         };
         let inner = Inner {
-            rows: fits.iter().map(row).collect::<Result<_, _>>()?,
+            rows: fits.iter().zip(complete).map(row).collect::<Result<_, _>>()?,
             numbers: (0..).zip(fits).map(|(number, fit)| (fit.name.clone(), number)).collect(),
             clocks: BTreeMap::new(),
             display,
@@ -205,6 +207,11 @@ impl Board {
     /// Whether the run was ended because a fit had failed.
     pub(super) fn was_stopped_by_a_fit(&self) -> bool {
         self.lock().is_stopped
+    }
+
+    /// Whether every fit has results.
+    pub(super) fn is_complete(&self) -> bool {
+        self.lock().rows.iter().all(|row| matches!(row.state, State::Done(_)))
     }
 
     /// The run is over: the last summaries, and the same as text.

@@ -15,6 +15,8 @@ pub(super) struct Checked {
     pub(super) inputs: Value,
     /// Pixels of its photo.
     pub(super) pixels: usize,
+    /// What may not change when the batch is gone on with, by name.
+    pub(super) identity: Vec<(&'static str, String)>,
 }
 
 /// All fits, as they were found, and what the user should know.
@@ -34,8 +36,8 @@ pub(super) fn check(settings: &BatchSettings, lights: &Lights) -> anyhow::Result
         .par_iter()
         .map(|fit| {
             let prepared = Prepared::new(fit, lights, settings.stage_two)?;
-            let pixels = prepared.pixels();
-            Ok((Checked { inputs: prepared.inputs, pixels }, prepared.warnings))
+            let (pixels, identity) = (prepared.pixels(), prepared.identity(fit)?);
+            Ok((Checked { inputs: prepared.inputs, pixels, identity }, prepared.warnings))
         })
         .collect();
     let (mut fits, mut warnings, mut problems) = (Vec::new(), Vec::new(), Vec::<(String, Vec<&BatchFit>)>::new());

@@ -27,6 +27,8 @@ pub(super) struct Loader {
 #[derive(Debug)]
 pub(super) struct Shelf {
     pub(super) fits: Arc<[BatchFit]>,
+    /// The numbers of those to be read, in order.
+    pub(super) open: Arc<[u32]>,
     pub(super) checks: Arc<[Checked]>,
     pub(super) lights: Arc<Lights>,
     pub(super) stage_two: StageTwo,
@@ -53,7 +55,8 @@ impl Loader {
 }
 
 fn read_all(shelf: &Shelf, sender: &SyncSender<Loaded>) {
-    for ((number, fit), checked) in (0..).zip(shelf.fits.iter()).zip(shelf.checks.iter()) {
+    for &number in shelf.open.iter() {
+        let (fit, checked) = (&shelf.fits[number as usize], &shelf.checks[number as usize]);
         let prepared = Prepared::new(fit, &shelf.lights, shelf.stage_two);
         let unchanged = prepared.and_then(|prepared| {
             same(&checked.inputs, &prepared.inputs)?;

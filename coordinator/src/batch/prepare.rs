@@ -2,7 +2,7 @@
 
 use super::lights::Lights;
 use crate::{
-    fitting::method,
+    fitting::{FitIdentity, method},
     inputs::{CaptureFiles, load_capture_under, resolve_display_exposure},
     settings::{BatchFit, StageTwo},
 };
@@ -55,6 +55,12 @@ impl Prepared {
         }
         let (warnings, seconds) = (loaded.warnings, began.elapsed().as_secs_f64());
         Ok(Self { capture, method, exposure, inputs, planner, warnings, seconds })
+    }
+
+    /// What may not change when the batch is gone on with, by name.
+    pub(super) fn identity(&self, fit: &BatchFit) -> anyhow::Result<Vec<(&'static str, String)>> {
+        let (inputs, capture, settings, exposure) = (&self.inputs, &*self.capture, &fit.method, self.exposure);
+        FitIdentity { inputs, capture, settings, exposure, also_render: &[] }.parts()
     }
 
     /// Pixels of the photo.

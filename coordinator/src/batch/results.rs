@@ -12,7 +12,7 @@ use lookalike::{
 };
 use serde_json::Value;
 use std::sync::{
-    Arc,
+    Arc, Mutex, PoisonError,
     mpsc::{Receiver, Sender, channel},
 };
 
@@ -60,6 +60,8 @@ pub(super) struct Writers {
     out_name: String,
     /// Every result that is being written holds a clone.
     open: Sender<()>,
+    /// Fits whose results were written since somebody asked.
+    safe: Arc<Mutex<Vec<u32>>>,
 }
 
 /// Waits for the writers.
@@ -76,16 +78,25 @@ impl Written {
 impl Writers {
     pub(super) fn new(board: Arc<Board>, out: OutFolder, out_name: String) -> (Self, Written) {
         let (open, written) = channel();
-        (Self { board, out, out_name, open }, Written(written))
+        (Self { board, out, out_name, open, safe: Arc::default() }, Written(written))
+    }
+
+    /// The fits whose results were written since the last call.
+    pub(super) fn newly_safe(&self) -> Vec<u32> {
+        std::mem::take(&mut self.safe.lock().unwrap_or_else(PoisonError::into_inner))
     }
 
     /// Begins to write the results of a fit.
     pub(super) fn write(&self, fitted: Fitted) {
         let (board, out, open) = (Arc::clone(&self.board), self.out.clone(), self.open.clone());
+        let safe = Arc::clone(&self.safe);
         let out_name = format!("{}/{}", self.out_name, fitted.name);
         rayon::spawn(move || {
             match write(&out, out_name, &fitted) {
-                Ok(scores) => board.finished(fitted.number, scores),
+                Ok(scores) => {
+                    board.finished(fitted.number, scores);
+                    safe.lock().unwrap_or_else(PoisonError::into_inner).push(fitted.number);
+                }
                 Err(error) => board.failed(fitted.number, &format!("{error:#}")),
             }
             drop(open);

@@ -5,7 +5,7 @@ use crate::{
     outputs::{OutFolder, aligned, parameters_json},
     progress::FitCount,
 };
-use anyhow::{Context, bail};
+use anyhow::Context;
 use lookalike::brdf::flat_names;
 use serde_json::{Value, json};
 use std::fmt::Write as _;
@@ -15,7 +15,7 @@ const SCHEMA: &str = "lookalike.batch/1";
 
 /// The names of the summaries.
 const CSV: &str = "summary.csv";
-const JSON: &str = "summary.json";
+pub(super) const JSON: &str = "summary.json";
 
 /// All fits at a time.
 #[derive(Debug)]
@@ -25,15 +25,6 @@ pub(super) struct Summary {
     /// `running`, `finished` or `stopped`.
     pub(super) state: &'static str,
     pub(super) seconds: f64,
-}
-
-/// Refuses a folder that holds a batch.
-pub(super) fn refuse_old(out: &OutFolder) -> anyhow::Result<()> {
-    let old = out.file(JSON);
-    if old.exists() {
-        bail!("{} says that a batch was run there already: choose another --out, or remove it first", old.display());
-    }
-    Ok(())
 }
 
 /// Writes both summaries, each in one piece.

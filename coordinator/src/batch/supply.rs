@@ -23,6 +23,8 @@ use std::{collections::BTreeMap, sync::Arc};
 #[derive(Debug)]
 pub(super) struct SupplyOptions {
     pub(super) fits: Arc<[BatchFit]>,
+    /// The numbers of the fits that have no results yet, in order.
+    pub(super) open: Arc<[u32]>,
     /// One per fit.
     pub(super) checks: Arc<[Checked]>,
     pub(super) lights: Arc<Lights>,
@@ -57,6 +59,7 @@ impl Supply {
     pub(super) fn new(options: SupplyOptions) -> anyhow::Result<(Self, Written)> {
         let loader = Loader::start(Shelf {
             fits: Arc::clone(&options.fits),
+            open: Arc::clone(&options.open),
             checks: Arc::clone(&options.checks),
             lights: Arc::clone(&options.lights),
             stage_two: options.stage_two,
@@ -113,7 +116,7 @@ impl Parts for Supply {
                         return Ok(Next::Part(Box::new(part)));
                     }
                 }
-                Err(true) if self.taken < self.options.fits.len() => {
+                Err(true) if self.taken < self.options.open.len() => {
                     return Err(PlanError::new("the thread that reads the inputs is gone: please report this"));
                 }
                 Err(true) => return Ok(Next::End),
@@ -123,7 +126,8 @@ impl Parts for Supply {
     }
 
     fn wants_more(&self, active: usize, ready: usize) -> bool {
-        let Some(next) = self.options.checks.get(self.taken) else { return true };
+        let next = self.options.open.get(self.taken).and_then(|next| self.options.checks.get(*next as usize));
+        let Some(next) = next else { return true };
         let pixels = self.active.values().map(|active| active.pixels).sum();
         self.options.window.has_room(active, ready, pixels, next.pixels)
     }
@@ -144,5 +148,9 @@ impl Parts for Supply {
     fn failed(&mut self, part: Part<FitPlanner>, failure: PartFailure) -> Result<(), PlanError> {
         self.active.remove(&part.number);
         self.give_up(part.number, &failure.to_string())
+    }
+
+    fn newly_safe(&mut self) -> Vec<u32> {
+        self.writers.newly_safe()
     }
 }

@@ -1,19 +1,24 @@
 //! One fit from a checked capture to a folder of results: plans the graph, runs it on workers, writes what came out.
 
 mod clock;
+mod identity;
 mod method;
 mod notes;
 mod results;
+mod resume;
 mod running;
 
 pub(crate) use clock::Clock;
+pub(crate) use identity::{FitIdentity, version};
 pub(crate) use method::method;
 pub(crate) use notes::notes;
 pub(crate) use results::{final_parameters, final_score, final_scores, judge, write_results};
+pub(crate) use resume::is_finished;
 pub(crate) use running::{run_to_end, runner_options};
 
 use crate::{
     cli::Exit,
+    journal::{self, JOURNAL_FILE, JournalError, JournalOptions},
     metrics::Metrics,
     outputs::{FitRecord, OutFolder, Pictures, Timing, print_summary},
     progress::display,
@@ -45,6 +50,10 @@ pub(crate) struct FitJob {
     pub(crate) max_cssim: Option<f64>,
     /// Gammas whose candidates are rendered as well.
     pub(crate) also_render: Vec<f64>,
+    /// Go on with the run that is in the folder, if there is one.
+    pub(crate) resume: bool,
+    /// Whether somebody may want to go on with this run.
+    pub(crate) is_resumable: bool,
     /// Seconds spent on loading or making the inputs.
     pub(crate) input_seconds: f64,
 }
@@ -57,8 +66,19 @@ pub(crate) struct Finished {
     pub(crate) code: ExitCode,
 }
 
-/// Runs a fit and writes its results.
-pub(crate) fn run(job: FitJob) -> anyhow::Result<Finished> {
+/// Runs a fit and writes its results; `None` if that was done before.
+pub(crate) fn run(job: FitJob) -> anyhow::Result<Option<Finished>> {
+    let identity = FitIdentity {
+        inputs: &job.inputs,
+        capture: &job.capture,
+        settings: &job.settings,
+        exposure: job.exposure,
+        also_render: &job.also_render,
+    };
+    let identity = identity.of_run()?;
+    if job.resume && is_finished(&job.out, &job.out_name, &identity)? {
+        return Ok(None);
+    }
     let method = method(&job.settings)?;
     let planner = FitPlanner::new(Arc::clone(&job.capture), method.clone(), job.exposure)
         .context("the photo cannot be fitted")?
@@ -66,7 +86,14 @@ pub(crate) fn run(job: FitJob) -> anyhow::Result<Finished> {
     let metrics = job.metrics.map(Metrics::listen).transpose()?;
     let mut display = display(job.progress, planner.best());
     let mut clock = Clock::start();
-    let options = runner_options(&job.cluster, &job.out);
+    let mut options = runner_options(&job.cluster, &job.out, job.settings.seed);
+    options.journal = Some(JournalOptions {
+        path: job.out.file(JOURNAL_FILE),
+        identity,
+        resume: job.resume,
+        survivors: job.is_resumable,
+        best: Some(planner.best()),
+    });
     let run = run_to_end(options, planner, metrics.as_ref(), |event| {
         clock.note(event);
         display.event(event);
@@ -97,6 +124,8 @@ pub(crate) fn run(job: FitJob) -> anyhow::Result<Finished> {
         notes: &notes,
     };
     let pictures = write_results(&job.out, &record, &timing)?;
+    let finished = journal::Finished { outputs: job.out.results()? };
+    journal::finish(&job.out.file(JOURNAL_FILE), &finished).map_err(journal_failed)?;
     print_summary(&record, &timing, &job.out_name).context("cannot write to stdout")?;
     let best = final_score(&method, &outcome);
     let missed = job.max_cssim.is_some_and(|limit| best > limit);
@@ -104,5 +133,11 @@ pub(crate) fn run(job: FitJob) -> anyhow::Result<Finished> {
         eprintln!("the match has a score of {best:.4} (--judge {}), more than --max-cssim {limit}", judge(&method));
     }
     let code = if missed { Exit::MissedMaxCssim } else { Exit::Done };
-    Ok(Finished { outcome, pictures, code: code.into() })
+    Ok(Some(Finished { outcome, pictures, code: code.into() }))
+}
+
+/// What went wrong with a journal, with its exit code.
+pub(crate) fn journal_failed(error: JournalError) -> anyhow::Error {
+    let exit = if error.exit_code() == 2 { Exit::BadInput } else { Exit::ClusterFailed };
+    anyhow::Error::new(error).context(exit)
 }

@@ -13,15 +13,15 @@ use anyhow::Context;
 use lookalike::{fit::nodes, graph::Planner};
 use std::sync::Arc;
 
-/// How a run with these settings treats its workers; its access file goes to `out`.
-pub(crate) fn runner_options(cluster: &ClusterSettings, out: &OutFolder) -> RunnerOptions {
+/// How a run with these settings treats its workers; its access file goes to `out`. The seed decides which outputs are verified.
+pub(crate) fn runner_options(cluster: &ClusterSettings, out: &OutFolder, seed: u64) -> RunnerOptions {
     let mut options = RunnerOptions::new(cluster.workers.count(), out.file("access.json"));
     options.listen = cluster.listen_for_others();
     options.access = cluster.access.clone();
     options.advertise = cluster.advertise.as_ref().map(ToString::to_string);
     options.log.clone_from(&cluster.log);
-    options.policy.wait_for_workers = cluster.wait_for_workers;
-    options.policy.grace = cluster.grace;
+    options.policy = cluster.policy;
+    options.policy.verify_seed = seed;
     options
 }
 

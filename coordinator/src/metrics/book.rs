@@ -1,7 +1,7 @@
 //! The numbers, as the events of a run change them.
 
 use super::histogram::Histogram;
-use crate::comm::{Departure, RunEvent, Site};
+use crate::comm::{RunEvent, Site};
 use lookalike::graph::{NodeId, WorkerId};
 use std::{collections::BTreeMap, time::Instant};
 
@@ -64,6 +64,9 @@ pub(super) struct Book {
     pub(super) attempts: u64,
     pub(super) requeued: u64,
     pub(super) duplicates: u64,
+    pub(super) recalled: u64,
+    pub(super) speculated: u64,
+    pub(super) suspected: u64,
     pub(super) blobs_sent: u64,
     pub(super) blob_bytes_sent: u64,
     pub(super) output_bytes_received: u64,
@@ -83,6 +86,9 @@ impl Book {
             attempts: 0,
             requeued: 0,
             duplicates: 0,
+            recalled: 0,
+            speculated: 0,
+            suspected: 0,
             blobs_sent: 0,
             blob_bytes_sent: 0,
             output_bytes_received: 0,
@@ -116,13 +122,15 @@ impl Book {
             }
             RunEvent::WorkerLeft { worker, departure } => {
                 self.workers.remove(worker);
-                *self.left.entry(reason(departure)).or_default() += 1;
+                *self.left.entry(departure.word()).or_default() += 1;
             }
             RunEvent::BlobSent { bytes, .. } => {
                 self.blobs_sent += 1;
                 self.blob_bytes_sent += *bytes as u64;
             }
             RunEvent::DuplicateResult { .. } => self.duplicates += 1,
+            RunEvent::NodeSpeculated { .. } => self.speculated += 1,
+            RunEvent::NodeSuspected { .. } => self.suspected += 1,
             _ => self.note_node(event, now),
         }
     }
@@ -155,6 +163,10 @@ impl Book {
                     self.output_bytes_received += *bytes as u64;
                 }
                 self.of(&name.kind).seconds.observe(*elapsed);
+                self.close(name.node, State::Completed);
+            }
+            RunEvent::NodeRecalled { name, .. } => {
+                self.recalled += 1;
                 self.close(name.node, State::Completed);
             }
             RunEvent::NodeFailed { name, reason } => {
@@ -191,15 +203,5 @@ impl Book {
     fn close(&mut self, node: NodeId, state: State) {
         self.change(node, state);
         self.open.remove(&node);
-    }
-}
-
-/// Why workers leave, in one word of a closed list.
-fn reason(departure: &Departure) -> &'static str {
-    match departure {
-        Departure::Lost => "lost",
-        Departure::Silent => "silent",
-        Departure::Goodbye => "goodbye",
-        Departure::Violation(_) => "violation",
     }
 }

@@ -55,6 +55,21 @@ fn nodes(page: &mut Page, book: &Book) {
             book.requeued,
         ),
         (
+            "lookalike_nodes_recalled_total",
+            "Nodes whose output an earlier coordinator of this run had acknowledged.",
+            book.recalled,
+        ),
+        (
+            "lookalike_nodes_speculated_total",
+            "Nodes that were given to a second worker because the first one was slow.",
+            book.speculated,
+        ),
+        (
+            "lookalike_nodes_suspected_total",
+            "Times that a node was set apart because workers had died while they executed it.",
+            book.suspected,
+        ),
+        (
             "lookalike_duplicate_results_total",
             "Outputs that came a second time, bit for bit the same.",
             book.duplicates,

@@ -4,7 +4,7 @@ use super::{
     Display,
     fits::{FitCount, FitEvent},
 };
-use crate::comm::{Departure, NodeName, RunEvent, Site};
+use crate::comm::{NodeName, RunEvent, Site};
 use lookalike::graph::split_label;
 use serde_json::{Value, json};
 use std::time::Instant;
@@ -75,12 +75,15 @@ fn of_fit(event: &FitEvent) -> Value {
 fn of_run(event: &RunEvent) -> Option<Value> {
     Some(match event {
         RunEvent::Listening { address } => json!({ "event": "listening", "address": address }),
+        RunEvent::Resumed { epoch, results } => json!({ "event": "resumed", "epoch": epoch, "results": results }),
+        RunEvent::LocalWorkerStarted { process } => json!({ "event": "local-worker-started", "process": process }),
         RunEvent::WorkerJoined { worker, threads, process } => {
             json!({ "event": "worker-joined", "worker": worker.0, "threads": threads, "process": process })
         }
+        RunEvent::WorkerDraining { worker } => json!({ "event": "worker-draining", "worker": worker.0 }),
         RunEvent::WorkerLeft { worker, departure } => {
             let detail = departure.to_string();
-            json!({ "event": "worker-left", "worker": worker.0, "why": why(departure), "detail": detail })
+            json!({ "event": "worker-left", "worker": worker.0, "why": departure.word(), "detail": detail })
         }
         RunEvent::LocalWorkerEnded { process, status, restart_after } => json!({
             "event": "local-worker-ended", "process": process, "status": status, "restarts": restart_after.is_some(),
@@ -103,6 +106,9 @@ fn of_node(event: &RunEvent) -> Option<Value> {
             let rest = json!({ "worker": worker_of(*site), "bytes": bytes, "seconds": elapsed.as_secs_f64() });
             node("node-finished", name, rest)
         }
+        RunEvent::NodeRecalled { name, bytes } => node("node-recalled", name, json!({ "bytes": bytes })),
+        RunEvent::NodeSuspected { name, deaths } => node("node-suspected", name, json!({ "deaths": deaths })),
+        RunEvent::NodeSpeculated { name, worker } => node("node-speculated", name, json!({ "worker": worker.0 })),
         RunEvent::NodeFailed { name, reason } if reason.is_cancellation() => node("node-cancelled", name, json!({})),
         RunEvent::NodeFailed { name, reason } => node("node-failed", name, json!({ "reason": reason.to_string() })),
         RunEvent::NodeRequeued { name, worker, crashes } => {
@@ -130,15 +136,5 @@ fn worker_of(site: Site) -> Option<u64> {
     match site {
         Site::Worker(worker) => Some(worker.0),
         Site::Coordinator => None,
-    }
-}
-
-/// Why a worker left, in one word of a closed list.
-fn why(departure: &Departure) -> &'static str {
-    match departure {
-        Departure::Lost => "lost",
-        Departure::Silent => "silent",
-        Departure::Goodbye => "goodbye",
-        Departure::Violation(_) => "violation",
     }
 }

@@ -123,7 +123,9 @@ fn thousandths(count: Count) -> u64 {
 impl Display for ManyBars {
     fn event(&mut self, event: &RunEvent) {
         let owner = match event {
-            RunEvent::NodeAdded { name } | RunEvent::NodeFinished { name, .. } => {
+            RunEvent::NodeAdded { name }
+            | RunEvent::NodeFinished { name, .. }
+            | RunEvent::NodeRecalled { name, .. } => {
                 split_label(&name.label).0.and_then(|fit| self.numbers.get(fit)).copied()
             }
             RunEvent::NodeProgress { node, .. } => self.owners.get(node).copied(),

@@ -1,48 +1,65 @@
 //! A worker's connection, from its hello to its end.
 
+use std::io;
 use std::net::SocketAddr;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::Duration;
 
 use lookalike::graph::{BlobHash, NodeFailure, NodeId, WorkerId};
-use lookalike::protocol::{FailureKind, IncomingBlob, LeaseName, ToCoordinator, ToWorker, Welcome, bounded_text};
+use lookalike::protocol::{
+    FailureKind, IncomingBlob, LeaseName, PART_BYTES, ToCoordinator, ToWorker, Welcome, bounded_text,
+};
 use lookalike_worker::wire::{Incoming, Received, WireError, send_message, send_parts};
 use tokio::io::{AsyncWriteExt, ReadHalf, WriteHalf};
-use tokio::sync::mpsc::{Sender, UnboundedReceiver, unbounded_channel};
+use tokio::sync::mpsc::Sender;
+use tokio::sync::oneshot;
 use tokio::time::timeout;
 use tracing::info;
 
+use super::mailbox::{Patient, Postman, mailbox};
 use super::{Connection, Gate, Greeted, Inbound, Outgoing};
 use crate::comm::{Departure, Site};
 use crate::reactor::Event;
+
+/// How many bytes of small outputs a worker may send before it is asked for how many the reactor has taken (8 MiB).
+const UNASKED_BYTES: u64 = 8 << 20;
 
 /// Serve a worker to its end.
 pub(super) async fn serve(greeted: Greeted, worker: WorkerId, peer: SocketAddr, gate: &Gate) {
     let Greeted { incoming, writer, hello } = greeted;
     info!(%worker, %peer, process = hello.process, build = bounded_text(&hello.build), "joined");
-    let (outgoing, queue) = unbounded_channel();
-    let heartbeat_ms = u32::try_from(gate.heartbeat.as_millis()).unwrap_or(u32::MAX).max(1);
-    let welcome = Welcome { worker: worker.0, run: gate.run, epoch: gate.epoch, heartbeat_ms };
-    // The receiver is alive: it is ours.
-    let _ = outgoing.send(Outgoing::Message(ToWorker::Welcome(welcome)));
-    if gate.inbound.send(Inbound::Joined { worker, hello, outgoing }).await.is_err() {
+    let (mailbox, postman) = mailbox(gate.limits.queued_bytes);
+    let (heartbeat_ms, drain_ms) = (milliseconds(gate.policy.heartbeat), milliseconds(gate.policy.drain_time));
+    let welcome = Welcome { worker: worker.0, run: gate.run, epoch: gate.epoch, heartbeat_ms, drain_ms };
+    mailbox.send(Outgoing::Message(ToWorker::Welcome(welcome)));
+    if gate.inbound.send(Inbound::Joined { worker, hello, mailbox }).await.is_err() {
         return;
     }
     let pending_blobs = Arc::new(AtomicUsize::new(0));
     let mut reader = Reader {
         worker,
+        epoch: gate.epoch,
+        has_reported: gate.epoch == 1,
         incoming,
         output: None,
+        unasked_bytes: 0,
         pending_blobs: Arc::clone(&pending_blobs),
         max_pending_blobs: gate.limits.pending_blobs,
         inbound: gate.inbound.clone(),
     };
     let mut reading = std::pin::pin!(reader.read_to_the_end());
+    let (overflowing, closed) = (postman.overflowing(), postman.closed());
+    let writer = Patient::new(writer, gate.policy.lost_after);
     let departure = tokio::select! {
         departure = &mut reading => departure,
-        written = write(writer, queue, &pending_blobs) => match written {
+        () = overflowing => Departure::TooSlow,
+        // Thrown out: whoever did it knows.
+        () = closed => return,
+        written = write(writer, postman, &pending_blobs) => match written {
             // We have said our last word: let the worker say its own, so that closing does not destroy ours.
             Ok(()) => timeout(gate.limits.farewell_time, reading).await.unwrap_or(Departure::Lost),
+            Err(WireError::Stream(error)) if error.kind() == io::ErrorKind::TimedOut => Departure::TooSlow,
             Err(error) => departure_of(&error),
         },
     };
@@ -53,11 +70,11 @@ pub(super) async fn serve(greeted: Greeted, worker: WorkerId, peer: SocketAddr, 
 }
 
 async fn write(
-    mut writer: WriteHalf<Connection>,
-    mut queue: UnboundedReceiver<Outgoing>,
+    mut writer: Patient<WriteHalf<Connection>>,
+    mut postman: Postman,
     pending_blobs: &AtomicUsize,
 ) -> Result<(), WireError> {
-    while let Some(next) = queue.recv().await {
+    while let Some(next) = postman.next().await {
         match next {
             Outgoing::Message(message) => send_message(&mut writer, &message).await?,
             Outgoing::Blob(blob) => {
@@ -73,6 +90,10 @@ async fn write(
     Ok(())
 }
 
+fn milliseconds(time: Duration) -> u32 {
+    u32::try_from(time.as_millis()).unwrap_or(u32::MAX).max(1)
+}
+
 fn departure_of(error: &WireError) -> Departure {
     if error.is_violation() { Departure::Violation(error.to_string()) } else { Departure::Lost }
 }
@@ -80,9 +101,15 @@ fn departure_of(error: &WireError) -> Departure {
 /// The reading end of one worker's connection.
 struct Reader {
     worker: WorkerId,
+    /// That of this coordinator.
+    epoch: u64,
+    /// Whether it has told what it does for earlier ones.
+    has_reported: bool,
     incoming: Incoming<ReadHalf<Connection>>,
     /// The output that is being received.
     output: Option<(LeaseName, IncomingBlob)>,
+    /// The announced lengths of outputs since the last question.
+    unasked_bytes: u64,
     pending_blobs: Arc<AtomicUsize>,
     max_pending_blobs: usize,
     inbound: Sender<Inbound>,
@@ -94,21 +121,20 @@ impl Reader {
             let event = match self.incoming.next().await {
                 Ok(None) => return Departure::Lost,
                 Ok(Some(Received::Message(ToCoordinator::Goodbye))) => return Departure::Goodbye,
-                Ok(Some(received)) => self.event(received),
+                Ok(Some(received)) => self.event(received).await,
                 Err(error) => Err(error),
             };
             match event {
                 // When nobody listens any more the run is over. Then we still read until the worker has closed its end:
                 // closing over unread bytes would destroy our last word to it.
-                Ok(event) => _ = self.inbound.send(Inbound::Event(event)).await,
+                Ok(event) => _ = self.inbound.send(event).await,
                 Err(error) => return departure_of(&error),
             }
         }
     }
 
-    fn event(&mut self, received: Received<ToCoordinator>) -> Result<Event, WireError> {
+    async fn event(&mut self, received: Received<ToCoordinator>) -> Result<Inbound, WireError> {
         let worker = self.worker;
-        let site = Site::Worker(worker);
         let message = match received {
             Received::Message(message) => message,
             Received::Part(part) => {
@@ -119,14 +145,22 @@ impl Reader {
                 return self.output_or_life();
             }
         };
-        Ok(match message {
+        Ok(Inbound::Event(match message {
+            ToCoordinator::Heartbeat { executing } if !self.has_reported => {
+                self.has_reported = true;
+                let earlier = executing.iter().map(|node| node.lease).filter(|lease| lease.epoch < self.epoch);
+                return Ok(Inbound::Reported { worker, executing: earlier.collect() });
+            }
             ToCoordinator::Heartbeat { executing } => {
-                let executing = executing.iter().map(|node| (NodeId(node.lease.node), node.permille.min(1000)));
+                // What was begun for an earlier coordinator has another number there.
+                let executing = executing.iter().filter(|node| node.lease.epoch == self.epoch);
+                let executing = executing.map(|node| (NodeId(node.lease.node), node.permille.min(1000)));
                 Event::Heartbeat { worker, executing: executing.collect() }
             }
-            ToCoordinator::Started(lease) => {
+            ToCoordinator::Started(lease) if self.is_ours(lease)? => {
                 Event::Started { worker, node: NodeId(lease.node), attempt: lease.attempt }
             }
+            ToCoordinator::Started(_) => self.life(),
             ToCoordinator::Fetch { hash } => {
                 if self.pending_blobs.fetch_add(1, Ordering::Relaxed) >= self.max_pending_blobs {
                     return Err(unexpected("a worker that reads what it asked for", "still more requests for blobs"));
@@ -138,28 +172,76 @@ impl Reader {
                     return Err(unexpected("the rest of an output", "another output"));
                 }
                 self.output = Some((lease, IncomingBlob::begin(BlobHash(hash), length)?));
+                self.ask_before(lease, length).await?;
                 return self.output_or_life();
             }
             ToCoordinator::Failed { lease, kind, message } => {
-                let message = bounded_text(&message);
-                let failure = match kind {
-                    FailureKind::Application => NodeFailure::Application { message },
-                    FailureKind::Panic => NodeFailure::Panicked { message },
-                    FailureKind::UnknownKind => NodeFailure::UnknownKind { message },
-                };
-                Event::Failed { site, node: NodeId(lease.node), attempt: lease.attempt, failure }
+                if !self.is_ours(lease)? {
+                    return Ok(Inbound::Late { worker, lease, output: None });
+                }
+                let failure = failure(kind, bounded_text(&message));
+                Event::Failed { site: Site::Worker(worker), node: NodeId(lease.node), attempt: lease.attempt, failure }
             }
+            ToCoordinator::Draining => Event::WorkerDrains { worker },
             ToCoordinator::Hello(_) | ToCoordinator::Goodbye => return Err(unexpected("work", "a greeting")),
-        })
+        }))
+    }
+
+    /// Whether this coordinator gave out a lease; else an earlier one of the run did.
+    fn is_ours(&self, lease: LeaseName) -> Result<bool, WireError> {
+        if lease.epoch == 0 || lease.epoch > self.epoch {
+            return Err(unexpected("a lease of this run", &format!("one of epoch {}", lease.epoch)));
+        }
+        Ok(lease.epoch == self.epoch)
+    }
+
+    fn life(&self) -> Event {
+        Event::Heartbeat { worker: self.worker, executing: Vec::new() }
+    }
+
+    /// Before much is received, ask whether anybody wants it. The answer also tells that what came before has been taken: at most
+    /// one large output of a worker is in memory without being kept. What fits into one frame is here already.
+    async fn ask_before(&mut self, lease: LeaseName, length: u64) -> Result<(), WireError> {
+        self.unasked_bytes = self.unasked_bytes.saturating_add(length);
+        if length <= PART_BYTES as u64 && self.unasked_bytes <= UNASKED_BYTES {
+            return Ok(());
+        }
+        self.unasked_bytes = length;
+        // Of an earlier coordinator's leases nobody knows all.
+        if !self.is_ours(lease)? {
+            return Ok(());
+        }
+        let (answer, answered) = oneshot::channel();
+        let _ = self.inbound.send(Inbound::Ask { lease, answer }).await;
+        match answered.await {
+            Ok(false) => {
+                let found = format!("one for node {}, attempt {}", lease.node, lease.attempt);
+                Err(unexpected("an output for a lease that was given out", &found))
+            }
+            // When nobody answers any more the run is over.
+            Ok(true) | Err(_) => Ok(()),
+        }
     }
 
     /// The output, if it is complete; else a sign of life.
-    fn output_or_life(&mut self) -> Result<Event, WireError> {
+    fn output_or_life(&mut self) -> Result<Inbound, WireError> {
         let Some((lease, output)) = self.output.take_if(|(_, output)| output.is_complete()) else {
-            return Ok(Event::Heartbeat { worker: self.worker, executing: Vec::new() });
+            return Ok(Inbound::Event(self.life()));
         };
-        let (node, attempt) = (NodeId(lease.node), lease.attempt);
-        Ok(Event::Finished { site: Site::Worker(self.worker), node, attempt, output: output.finish()? })
+        let (worker, output) = (self.worker, output.finish()?);
+        if !self.is_ours(lease)? {
+            return Ok(Inbound::Late { worker, lease, output: Some(output) });
+        }
+        let (site, node, attempt) = (Site::Worker(worker), NodeId(lease.node), lease.attempt);
+        Ok(Inbound::Event(Event::Finished { site, node, attempt, output }))
+    }
+}
+
+fn failure(kind: FailureKind, message: String) -> NodeFailure {
+    match kind {
+        FailureKind::Application => NodeFailure::Application { message },
+        FailureKind::Panic => NodeFailure::Panicked { message },
+        FailureKind::UnknownKind => NodeFailure::UnknownKind { message },
     }
 }
 

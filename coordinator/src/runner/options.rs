@@ -3,10 +3,10 @@
 use std::net::{Ipv4Addr, SocketAddr};
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
-use std::time::Duration;
 
 use super::RunError;
 use crate::core::Policy;
+use crate::journal::JournalOptions;
 use crate::limits::Limits;
 use crate::spawn::WorkerCommand;
 
@@ -32,16 +32,16 @@ pub struct RunnerOptions {
     pub access: Option<PathBuf>,
     /// What connections may cost.
     pub limits: Limits,
-    /// How often a worker shall tell that it lives.
-    pub heartbeat: Duration,
-    /// How workers and nodes are treated: waiting, grace, crashes.
+    /// How workers and nodes are treated.
     pub policy: Policy,
+    /// Where to write the run down, so that it can be gone on with; `None` forgets it when this process ends.
+    pub journal: Option<JournalOptions>,
     /// Whether Ctrl-C and SIGTERM stop the run in order, with [`RunError::Interrupted`].
     pub handle_signals: bool,
 }
 
 impl RunnerOptions {
-    /// `workers` local workers, the access file, and for the rest the defaults of design section 8.
+    /// `workers` local workers, the access file, no journal, and for the rest the defaults of design section 8.
     #[must_use]
     pub fn new(workers: usize, access_file: PathBuf) -> Self {
         Self {
@@ -54,8 +54,8 @@ impl RunnerOptions {
             access_file,
             access: None,
             limits: Limits::default(),
-            heartbeat: Duration::from_secs(1),
             policy: Policy::default(),
+            journal: None,
             handle_signals: true,
         }
     }
@@ -77,13 +77,25 @@ impl RunnerOptions {
         }
     }
 
+    /// The address to listen on for a run that an earlier coordinator listened for at `before`: the same one, so that its workers find
+    /// it, unless the user names another port.
+    pub(crate) fn listen_again(&self, before: Option<SocketAddr>) -> SocketAddr {
+        let anywhere = SocketAddr::from((Ipv4Addr::LOCALHOST, 0));
+        match (self.listen, before) {
+            (Some(listen), Some(before)) if listen.port() == 0 && listen.ip() == before.ip() => before,
+            (Some(listen), _) => listen,
+            (None, before) => before.unwrap_or(anywhere),
+        }
+    }
+
     /// Whether workers may come that this run does not start.
     pub(crate) fn others_may_come(&self) -> bool {
         self.listen.is_some() || self.access.is_some()
     }
 
-    /// That some worker can join, and be told where.
+    /// That the policy makes sense, and some worker can join and be told where.
     pub(crate) fn check(&self) -> Result<(), RunError> {
+        self.policy.check()?;
         if self.workers == 0 && !self.others_may_come() {
             return Err(RunError::NoWorkersPossible);
         }
@@ -162,6 +174,17 @@ mod tests {
         assert!(options(0, Some("10.0.0.1:0"), None).listen_address(Some("node7:4100")).is_err());
         let beforehand = RunnerOptions { access: Some("a.json".into()), ..options(0, Some("0.0.0.0:4100"), None) };
         assert!(beforehand.check().is_ok());
+    }
+
+    #[test]
+    fn resumed_run_listens_where_it_did_unless_another_port_is_named() {
+        let before: SocketAddr = "127.0.0.1:4100".parse().unwrap();
+        let again = |listen| options(1, listen, None).listen_again(Some(before)).to_string();
+        assert_eq!(again(None), "127.0.0.1:4100");
+        assert_eq!(again(Some("127.0.0.1:0")), "127.0.0.1:4100");
+        assert_eq!(again(Some("127.0.0.1:4200")), "127.0.0.1:4200");
+        assert_eq!(again(Some("10.0.0.1:0")), "10.0.0.1:0");
+        assert_eq!(options(1, None, None).listen_again(None).to_string(), "127.0.0.1:0");
     }
 
     #[test]

@@ -15,6 +15,8 @@ pub struct BatchSettings {
     pub fits: Vec<BatchFit>,
     /// The folder of results.
     pub out: PathBuf,
+    /// Go on with the run that is in the folder, if there is one.
+    pub resume: bool,
     /// Where candidates are judged and polished.
     pub stage_two: StageTwo,
     /// What happens when a fit fails.

@@ -22,6 +22,7 @@ mod model;
 mod render;
 mod samples;
 mod scene;
+mod status;
 
 pub use access::AccessSettings;
 pub use batch::{BatchFit, BatchSettings, OnFailure, StageTwo};
@@ -39,3 +40,4 @@ pub use model::{ModelName, ModelParams};
 pub use render::{Material, RenderSettings};
 pub use samples::Samples;
 pub use scene::{EnvironmentSettings, ViewSettings};
+pub use status::StatusSettings;

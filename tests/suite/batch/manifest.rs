@@ -39,6 +39,6 @@ fn folder_of_an_earlier_batch_is_left_alone() {
     fs::create_dir(folder.path().join("out")).unwrap();
     fs::write(folder.path().join("out/summary.json"), "precious").unwrap();
     batch(&folder, "out", "")
-        .refused(&["out/summary.json says that a batch was run there already", "choose another --out"]);
+        .refused(&["out/summary.json says that a batch was run there already", "--resume, choose another --out"]);
     assert_eq!(fs::read_to_string(folder.path().join("out/summary.json")).unwrap(), "precious");
 }

@@ -117,7 +117,7 @@ impl Bench {
         loop {
             while let Some(changed) = graph.next_change() {
                 match changed {
-                    Change::Added(_) => {}
+                    Change::Added(_) | Change::Forgotten(_) => {}
                     Change::Ready(node) => ready.push(node),
                     Change::Completed(node) => {
                         let output = graph.output(node).cloned().unwrap();

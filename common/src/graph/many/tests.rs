@@ -81,6 +81,7 @@ struct Bench {
     most_active: usize,
     most_ready: usize,
     is_fail_fast: bool,
+    safe: Vec<u32>,
     ended: Vec<(String, Result<Vec<u8>, String>)>,
 }
 
@@ -106,6 +107,7 @@ impl Parts for Bench {
     }
 
     fn completed(&mut self, part: Part<Fit>) -> Result<(), PlanError> {
+        self.safe.push(part.number);
         self.ended.push((part.name, Ok(part.planner.result.expect("a result"))));
         Ok(())
     }
@@ -113,6 +115,10 @@ impl Parts for Bench {
     fn failed(&mut self, part: Part<Fit>, failure: PartFailure) -> Result<(), PlanError> {
         self.ended.push((part.name, Err(failure.to_string())));
         if self.is_fail_fast { Err(PlanError::new("one has failed")) } else { Ok(()) }
+    }
+
+    fn newly_safe(&mut self) -> Vec<u32> {
+        std::mem::take(&mut self.safe)
     }
 }
 
@@ -180,11 +186,11 @@ fn parts_may_end_the_run_at_the_first_failure() {
     assert_eq!(error.to_string(), "one has failed");
 }
 
-/// Runs a graph node by node and returns the most bytes that it kept at a time, and at its end.
+/// Runs a graph node by node and returns the most bytes that it kept at a time, and at its end. Every node is forgotten once.
 fn kept_bytes(fits: u8) -> (usize, usize) {
     let registry = Registry::default().with(Leaf::default());
     let mut planner = Many::new(Bench::new((0..fits).map(|i| Fit::new(i, i + 100)).collect()));
-    let (mut graph, mut most) = (Graph::new(), 0);
+    let (mut graph, mut most, mut forgotten) = (Graph::new(), 0, Vec::new());
     planner.start(&mut GraphEdit::new(&mut graph)).unwrap();
     while let Some(change) = graph.next_change() {
         match change {
@@ -197,11 +203,14 @@ fn kept_bytes(fits: u8) -> (usize, usize) {
                 let output = graph.output(node).cloned().unwrap();
                 planner.completed(node, &output, &mut GraphEdit::new(&mut graph)).unwrap();
             }
+            Change::Forgotten(node) => forgotten.push(node),
             Change::Added(_) | Change::Failed(_) => {}
         }
         most = most.max(graph.blob_bytes());
     }
     assert!(graph.is_drained() && (0..graph.len() as u64).all(|n| !graph.is_open(NodeId(n))));
+    forgotten.sort_unstable();
+    assert_eq!(forgotten, (0..graph.len() as u64).map(NodeId).collect::<Vec<_>>());
     (most, graph.blob_bytes())
 }
 
@@ -209,6 +218,33 @@ fn kept_bytes(fits: u8) -> (usize, usize) {
 fn what_ended_parts_held_is_let_go() {
     let (most, left) = kept_bytes(50);
     assert!(most < 3000 && left == 0, "{most} {left}");
+}
+
+#[test]
+fn shared_nodes_are_forgotten_with_the_last_part_that_asked_for_them() {
+    let mut graph = Graph::new();
+    let mut planner = Many::new(Bench::new(vec![Fit::new(1, 2), Fit::new(1, 200)]));
+    planner.start(&mut GraphEdit::new(&mut graph)).unwrap();
+    let complete = |planner: &mut Many<Bench>, graph: &mut Graph, node: u64| {
+        graph.complete(NodeId(node), Blob::new(vec![7]));
+        planner.completed(NodeId(node), &Blob::new(vec![7]), &mut GraphEdit::new(graph)).unwrap();
+    };
+    // Nodes: 0 shared, 1 of the first, 2 of the second, 3 the join of the first.
+    for node in [0, 1, 3] {
+        complete(&mut planner, &mut graph, node);
+    }
+    let forgotten = |graph: &mut Graph| {
+        let changes = std::iter::from_fn(|| graph.next_change());
+        changes.filter(|change| matches!(change, Change::Forgotten(_))).collect::<Vec<_>>()
+    };
+    assert_eq!(
+        forgotten(&mut graph),
+        [1, 3].map(|node| Change::Forgotten(NodeId(node))),
+        "the second may need node 0 again"
+    );
+    complete(&mut planner, &mut graph, 2);
+    complete(&mut planner, &mut graph, 4);
+    assert_eq!(forgotten(&mut graph), [0, 2, 4].map(|node| Change::Forgotten(NodeId(node))));
 }
 
 #[test]

@@ -23,7 +23,7 @@ pub(crate) struct BatchArgs {
     /// Flags of the method that were given, as they were typed.
     #[arg(skip)]
     pub(crate) given: Vec<OsString>,
-    /// Folder of results, one subfolder per fit; must not hold a run
+    /// Folder of results, one subfolder per fit; must not hold a run, unless --resume goes on with it
     #[arg(long, short, value_name = "DIR", help_heading = "Output")]
     out: PathBuf,
     /// Go on with the other fits when one fails [default]
@@ -32,7 +32,8 @@ pub(crate) struct BatchArgs {
     /// End the run when one fit fails
     #[arg(long, overrides_with = "keep_going", help_heading = "Output")]
     fail_fast: bool,
-    /// Go on with the run that is in the folder (not there yet)
+    /// Go on with the run that is in the folder: fits that are complete stay, what was acknowledged of the others is not computed
+    /// again, those that failed are tried again. Begins one if there is none
     #[arg(long, help_heading = "Output")]
     resume: bool,
     #[command(flatten)]
@@ -55,6 +56,7 @@ impl BatchArgs {
             manifest: self.manifest,
             fits,
             out: self.out,
+            resume: self.resume,
             stage_two: self.stage_two,
             on_failure: if self.fail_fast { OnFailure::FailFast } else { OnFailure::KeepGoing },
             metrics,
@@ -69,10 +71,6 @@ impl BatchArgs {
             let instead =
                 "run lookalike batch in a job of its own, and its workers with srun lookalike worker --access FILE";
             return Err(NotThereYet { what: "--slurm", instead }.into());
-        }
-        if self.resume {
-            let instead = "start again with another --out, and leave out of the manifest what is done";
-            return Err(NotThereYet { what: "lookalike batch --resume", instead }.into());
         }
         Ok(())
     }
@@ -125,6 +123,7 @@ const EXAMPLES: &str = "\
 Examples:
   lookalike batch balls.toml --out runs
   lookalike batch balls.toml --out runs --seed 3 --fail-fast
+  lookalike batch balls.toml --out runs --resume
   lookalike batch balls.toml --out runs --workers 0 --listen 10.0.0.1:4100 --stage-two workers --metrics 9100
 
 where balls.toml is, for instance (its relative paths are relative to the file):

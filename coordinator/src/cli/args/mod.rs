@@ -10,8 +10,10 @@ mod compare;
 mod fit;
 mod later;
 mod method;
+mod policy;
 mod render;
 mod scene;
+mod status;
 
 pub(crate) use batch::{BatchArgs, EntryArgs};
 pub(crate) use fit::FitArgs;
@@ -42,8 +44,8 @@ pub(crate) enum Command {
     Fit(Box<FitArgs>),
     /// Fit many photos as one run
     Batch(Box<BatchArgs>),
-    /// Show the state of a running or finished run (not there yet)
-    Status(later::StatusArgs),
+    /// Show the state of a run: going on, stopped or finished
+    Status(status::StatusArgs),
     /// Render a sphere, or a map of normals, of one material under one light
     Render(render::RenderArgs),
     /// Measure how different two images look
