@@ -4,6 +4,8 @@
 //! coordinator was killed by whatever means, the worker ends itself. Each one is in a process group of its own, so that a
 //! Ctrl-C at the terminal reaches the coordinator alone, which ends its workers in order.
 
+mod worked;
+
 use std::ffi::OsString;
 use std::io;
 use std::num::NonZeroUsize;
@@ -18,12 +20,14 @@ use tokio::time::{Instant, sleep, timeout};
 use tokio_util::sync::CancellationToken;
 use tracing::{debug, warn};
 
+pub(crate) use self::worked::Worked;
 use crate::comm::RunEvent;
 use crate::reactor::Event;
 use crate::rpc::Inbound;
 use crate::runner::RunError;
 
-/// A worker that lived for this long was well; its death starts the count again.
+/// A worker that lived for this long was well; its death starts the count again, and so does that of one that has executed
+/// something: it may have died of a node, and then the node fails in the end.
 const HEALTHY_LIFE: Duration = Duration::from_secs(10);
 /// After this many deaths in a row, each soon after the start, a worker is not started again.
 const MAX_QUICK_DEATHS: u32 = 8;
@@ -70,6 +74,7 @@ pub(crate) struct LocalWorkers {
     pub(crate) threads: NonZeroUsize,
     /// Whether other workers may come when all local ones are given up.
     pub(crate) others_may_come: bool,
+    pub(crate) worked: Worked,
 }
 
 /// The threads of each of `workers` workers, so that together they use the cores once.
@@ -115,7 +120,15 @@ impl LocalWorkers {
                 },
                 Err(error) => (0, format!("an error at its start: {error}"), false),
             };
-            quick_deaths = if begin.elapsed() < HEALTHY_LIFE { quick_deaths + 1 } else { 1 };
+            if !is_hopeless {
+                // Its last words may still be on their way.
+                tokio::select! {
+                    () = sleep(FIRST_PAUSE) => {}
+                    () = stop.cancelled() => return None,
+                }
+            }
+            let was_well = begin.elapsed() >= HEALTHY_LIFE || self.worked.take(process);
+            quick_deaths = if was_well { 1 } else { quick_deaths + 1 };
             let give_up = is_hopeless || quick_deaths >= MAX_QUICK_DEATHS;
             let pause = (FIRST_PAUSE * 2_u32.pow(quick_deaths - 1)).min(LONGEST_PAUSE);
             let restart_after = (!give_up).then_some(pause);
@@ -128,7 +141,7 @@ impl LocalWorkers {
                 return Some(status);
             }
             tokio::select! {
-                () = sleep(pause) => next = self.spawn(),
+                () = sleep(pause - FIRST_PAUSE) => next = self.spawn(),
                 () = stop.cancelled() => return None,
             }
         }

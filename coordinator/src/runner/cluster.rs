@@ -16,7 +16,7 @@ use tokio_util::sync::CancellationToken;
 use super::{RunError, RunnerOptions};
 use crate::access::Credentials;
 use crate::rpc::{Gate, Inbound, Mailbox, Outgoing, serve_forever};
-use crate::spawn::{LocalWorkers, WorkerCommand, threads_per_worker};
+use crate::spawn::{LocalWorkers, Worked, WorkerCommand, threads_per_worker};
 use crate::tls::server_config;
 
 /// How many events may wait for the reactor before the connections have to.
@@ -29,7 +29,9 @@ pub(crate) struct Cluster {
     pub(crate) inbound: Receiver<Inbound>,
     /// What the access file tells workers to connect to.
     pub(crate) address: String,
-    members: BTreeMap<WorkerId, Mailbox>,
+    /// The processes and mailboxes of the members.
+    members: BTreeMap<WorkerId, (u32, Mailbox)>,
+    worked: Worked,
     stop: CancellationToken,
     serving: JoinHandle<()>,
     local_workers: JoinSet<()>,
@@ -53,6 +55,7 @@ impl Cluster {
         let (sender, inbound) = channel(INBOUND_CAPACITY);
         let stop = CancellationToken::new();
         let workers = local_workers(options, RunnerOptions::local_address(bound))?;
+        let worked = workers.worked.clone();
         // From here on the drop guard inside `Self` ends what was started.
         let mut run = [0; 16];
         getrandom::fill(&mut run).map_err(RunError::Randomness)?;
@@ -67,29 +70,36 @@ impl Cluster {
         };
         let local_workers = workers.start(&sender, &stop)?;
         let serving = tokio::spawn(serve_forever(listener, gate, stop.clone()));
-        Ok(Self { inbound, address: access.address, members: BTreeMap::new(), stop, serving, local_workers })
+        Ok(Self { inbound, address: access.address, members: BTreeMap::new(), worked, stop, serving, local_workers })
     }
 
     /// A worker can be sent to from now on.
-    pub(crate) fn admit(&mut self, worker: WorkerId, mailbox: Mailbox) {
-        self.members.insert(worker, mailbox);
+    pub(crate) fn admit(&mut self, worker: WorkerId, process: u32, mailbox: Mailbox) {
+        self.members.insert(worker, (process, mailbox));
+    }
+
+    /// A worker executes a node.
+    pub(crate) fn note_work(&self, worker: WorkerId) {
+        if let Some((process, _)) = self.members.get(&worker) {
+            self.worked.note(*process);
+        }
     }
 
     /// Send to a worker. One that has left meanwhile gets nothing: the reactor will hear of it.
     pub(crate) fn send(&self, worker: WorkerId, outgoing: Outgoing) {
-        if let Some(member) = self.members.get(&worker) {
+        if let Some((_, member)) = self.members.get(&worker) {
             member.send(outgoing);
         }
     }
 
     /// Send nothing more to a worker and close its connection, whether or not it has read what was sent before.
     pub(crate) fn dismiss(&mut self, worker: WorkerId) {
-        self.members.remove(&worker).into_iter().for_each(|member| member.close());
+        self.members.remove(&worker).into_iter().for_each(|(_, member)| member.close());
     }
 
     /// Tell all workers that the run is over, and wait until connections and local processes are gone.
     pub(crate) async fn stop(mut self, reason: &str) {
-        for member in std::mem::take(&mut self.members).into_values() {
+        for (_, member) in std::mem::take(&mut self.members).into_values() {
             member.send(Outgoing::Message(ToWorker::Stop { reason: reason.to_owned() }));
         }
         self.stop.cancel();
@@ -127,5 +137,6 @@ fn local_workers(options: &RunnerOptions, address: String) -> Result<LocalWorker
         address,
         threads: options.threads_per_worker.unwrap_or_else(|| threads_per_worker(options.workers)),
         others_may_come: options.others_may_come(),
+        worked: Worked::default(),
     })
 }

@@ -154,7 +154,7 @@ impl<P: Planner, O: FnMut(&RunEvent)> Driver<P, O> {
                 Some(event)
             }
             Inbound::Joined { worker, hello, mailbox } => {
-                self.cluster.admit(worker, mailbox);
+                self.cluster.admit(worker, hello.process, mailbox);
                 let threads = usize::try_from(hello.threads).unwrap_or(usize::MAX).clamp(1, MAX_THREADS);
                 Some(Event::WorkerJoined { worker, threads, process: hello.process })
             }
@@ -185,7 +185,12 @@ impl<P: Planner, O: FnMut(&RunEvent)> Driver<P, O> {
                 }
                 Action::Drop { worker } => self.cluster.dismiss(worker),
                 Action::RunHere { node, attempt } => self.run_here(node, attempt),
-                Action::Tell(event) => (self.observer)(&event),
+                Action::Tell(event) => {
+                    if let RunEvent::NodeStarted { site: Site::Worker(worker), .. } = &event {
+                        self.cluster.note_work(*worker);
+                    }
+                    (self.observer)(&event);
+                }
             }
         }
     }
