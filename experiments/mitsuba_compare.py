@@ -96,7 +96,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("map")
     parser.add_argument("--out", type=pathlib.Path, required=True)
-    parser.add_argument("--program", default="target/release/examples/render_sphere")
+    parser.add_argument("--program", default=pathlib.Path(__file__).resolve().parent.parent / "target/release/examples/render_sphere")
     parser.add_argument("--size", type=int, default=128)
     parser.add_argument("--samples", type=int, default=1024)
     arguments = parser.parse_args()

@@ -73,7 +73,8 @@ impl JudgedBy {
     }
 }
 
-/// Renders and scores every candidate; near-equal ones share a score.
+/// Renders and scores every candidate; near-equal ones share a score. `each` is told whenever another candidate is done, in any
+/// order and from any thread.
 ///
 /// # Errors
 /// When a rendering cannot be scored (not finite).
@@ -81,6 +82,7 @@ pub fn judge_candidates(
     view: &FullView<'_>,
     judge: &Judge,
     candidates: &[Candidate],
+    each: impl Fn() + Sync,
 ) -> Result<Vec<Judged>, MetricError> {
     let firsts = distinct(view.model, candidates);
     let scores: Vec<Option<Score>> = candidates
@@ -88,7 +90,9 @@ pub fn judge_candidates(
         .enumerate()
         .map(|(i, candidate)| {
             let first = firsts[i] == i;
-            first.then(|| judge.score(&view.render(&candidate.parameters))).transpose()
+            let score = first.then(|| judge.score(&view.render(&candidate.parameters))).transpose();
+            each();
+            score
         })
         .collect::<Result<_, _>>()?;
     let judged = candidates.iter().zip(&firsts).filter_map(|(candidate, &first)| {

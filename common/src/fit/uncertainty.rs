@@ -9,8 +9,13 @@
 //!
 //! Parameters at a bound are held there while the others are judged. Whether the bound means anything is asked for each of them by
 //! itself: where the data would not hold it in place if it were free, it is not determined either. (The width of a highlight that is
-//! not there drifts to an end of its range.) What this is not: an error by light
-//! or geometry that is not what it is said to be.
+//! not there drifts to an end of its range.)
+//!
+//! Derivatives at one point do not show that a parameter matters only where another one is not zero, as the Fresnel reflectance of
+//! a highlight whose strength may be nothing but noise. So all of this is asked again wherever any other parameter may lie within two
+//! standard errors: what is not determined everywhere there is not determined.
+//!
+//! What this is not: an error by light or geometry that is not what it is said to be.
 
 use super::{method::SearchKind, objective::Objective, stage_one::search_bounds};
 use crate::{
@@ -28,6 +33,19 @@ pub enum Uncertainty {
     /// Much of the parameter's range matches the photo as well.
     Undetermined,
 }
+
+impl Uncertainty {
+    /// The standard error, where there is one.
+    fn standard_error(self) -> Option<f64> {
+        match self {
+            Self::StandardError(error) => Some(error),
+            Self::AtBound | Self::Undetermined => None,
+        }
+    }
+}
+
+/// How far from the minimum a parameter may lie, in standard errors.
+const REACH: f64 = 2.0;
 
 /// A parameter counts as undetermined when its standard error is beyond this share of its range (of the range's logarithm for
 /// widths): the values within two standard errors are then half of all that the model allows.
@@ -56,33 +74,65 @@ pub(super) fn uncertainties(
     for i in (0..point.len()).filter(|&i| !inside[i]) {
         freed.push((0..point.len()).map(|j| inside[j] || j == i).collect());
     }
-    let errors = standard_errors(objective, point, &freed);
-    let mut of_bounds = errors[1..].iter();
-    let judged = (0..point.len()).map(|i| {
-        let errors = if inside[i] { Some(&errors[0]) } else { of_bounds.next() };
-        let error = errors.map_or(f64::INFINITY, |errors| errors[i]);
-        let share = error / bounds.scaled_derivative(i, point[i]);
-        match share <= LARGEST_SHARE {
-            true if inside[i] => Uncertainty::StandardError(error),
-            true => Uncertainty::AtBound,
-            // Also where the share is not a number.
-            false => Uncertainty::Undetermined,
+    let residuals = residuals(objective, point);
+    let mut judged_at = |place: &[f64]| {
+        let errors = standard_errors(objective, place, &residuals, &freed);
+        let mut of_bounds = errors[1..].iter();
+        let judge = |i: usize| {
+            let errors = if inside[i] { Some(&errors[0]) } else { of_bounds.next() };
+            let error = errors.map_or(f64::INFINITY, |errors| errors[i]);
+            let share = error / bounds.scaled_derivative(i, place[i]);
+            match share <= LARGEST_SHARE {
+                true if inside[i] => Uncertainty::StandardError(error),
+                true => Uncertainty::AtBound,
+                // Also where the share is not a number.
+                false => Uncertainty::Undetermined,
+            }
+        };
+        (0..place.len()).map(judge).collect::<Vec<_>>()
+    };
+    let here = judged_at(point);
+    let mut judged = here.clone();
+    for (i, error) in here.iter().enumerate().filter_map(|(i, u)| Some((i, u.standard_error()?))) {
+        for reach in [-REACH, REACH] {
+            let mut place = point.to_vec();
+            place[i] += reach * error;
+            bounds.clamp(&mut place);
+            let there = judged_at(&place);
+            let lost = (0..point.len()).filter(|&j| j != i && there[j] == Uncertainty::Undetermined);
+            lost.for_each(|j| judged[j] = Uncertainty::Undetermined);
         }
-    });
-    Ok(judged.collect())
+    }
+    Ok(judged)
 }
 
-/// The standard errors of all parameters for each set of free ones; 0 where not free.
-fn standard_errors(objective: &mut Objective<'_>, point: &[f64], freed: &[Vec<bool>]) -> Vec<Vec<f64>> {
-    let mut normal = NormalEquations::new(point.len());
-    objective.linearise(point, &mut normal);
+/// The residuals of all rows.
+fn residuals(objective: &mut Objective<'_>, point: &[f64]) -> Vec<f64> {
+    let mut residuals = Vec::new();
+    objective.rows(point, &mut |_, _, residual| residuals.push(residual));
+    residuals
+}
+
+/// The standard errors of all parameters for each set of free ones, 0 where not free, by the derivatives at `place` and the
+/// residuals at the minimum.
+fn standard_errors(
+    objective: &mut Objective<'_>,
+    place: &[f64],
+    residuals: &[f64],
+    freed: &[Vec<bool>],
+) -> Vec<Vec<f64>> {
+    let mut normal = NormalEquations::new(place.len());
+    objective.linearise(place, &mut normal);
     let mut sandwiches: Vec<Sandwich> = freed.iter().map(|free| Sandwich::new(&normal, free)).collect();
     let mut pixel = 0;
-    objective.rows(point, &mut |p, row, residual| {
+    let mut residuals = residuals.iter();
+    objective.rows(place, &mut |p, row, _| {
         if p != pixel {
             sandwiches.iter_mut().for_each(Sandwich::close_group);
             pixel = p;
         }
+        // The rows are the same everywhere.
+        let residual = residuals.next().copied().unwrap_or(f64::NAN);
         sandwiches.iter_mut().for_each(|sandwich| sandwich.add_row(row, residual));
     });
     sandwiches.iter_mut().for_each(Sandwich::close_group);

@@ -6,11 +6,12 @@ use super::{
 };
 use std::{collections::BTreeSet, fs, process::Command};
 
-const DOCUMENTS: [&str; 7] = [
+const DOCUMENTS: [&str; 8] = [
     "README.md",
     "ARCHITECTURE.md",
     "CONTRIBUTING.md",
     "CHANGELOG.md",
+    "docs/accuracy.md",
     "docs/design.md",
     "docs/real-materials.md",
     "docs/security.md",

@@ -9,6 +9,7 @@ use crate::{
     graph::{Blob, NodeFailure, NodeType, RunContext},
 };
 use serde::{Deserialize, Serialize};
+use std::sync::atomic::{AtomicU64, Ordering};
 
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(in crate::fit) struct SelectParameters {
@@ -29,7 +30,9 @@ impl NodeType for Select {
         let model = scene.view.model;
         let candidates = parameters.candidates.into_iter().map(|wire| wire.candidate(model));
         let candidates = candidates.collect::<Result<Vec<_>, _>>()?;
-        let judged = judge_candidates(&scene.full(), &scene.view.judge, &candidates)
+        let done = AtomicU64::new(0);
+        let each = || context.report(1 + done.fetch_add(1, Ordering::Relaxed), candidates.len() as u64);
+        let judged = judge_candidates(&scene.full(), &scene.view.judge, &candidates, each)
             .map_err(|error| NodeFailure::new(format!("a candidate cannot be judged: {error}")))?;
         write("scores", &ScoresWire::of(&judged))
     }
