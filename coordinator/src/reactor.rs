@@ -194,7 +194,8 @@ fn refused(core: &Core, node: NodeId, error: PlanError) -> RunError {
 }
 
 fn make_ready(core: &mut Core, planner: &impl Planner, node: NodeId, now: Duration, outbox: &mut Outbox) {
-    let Some(spec) = core.graph.spec(node) else { return };
+    // It may have been given up meanwhile.
+    let Some(spec) = core.graph.spec(node).filter(|_| core.graph.is_open(node)) else { return };
     if spec.placement == Placement::Worker {
         let is_verified = answers::is_chosen(core, spec, node) && planner.is_verified_by_repetition(spec);
         core.record(node).into_iter().for_each(|record| record.is_verified = is_verified);
