@@ -25,6 +25,15 @@ pub(super) fn join(
     core.members.join(worker, threads, now + core.policy.lost_after, now);
     core.summary.workers_joined += 1;
     outbox.tell(RunEvent::WorkerJoined { worker, threads, process });
+    for (_, node) in core.continued.extract_if(.., |(continuing, _)| *continuing == worker).collect::<Vec<_>>() {
+        // Whoever has to run alone begins anew.
+        if core.look(node).is_some_and(|record| record.place == Place::Queue) {
+            schedule::assign(core, worker, node, now, outbox);
+            // It has begun: nobody else shall get it for having idle threads.
+            let attempt = core.look(node).map_or(0, |record| record.attempts);
+            answers::started(core, worker, node, attempt, now, outbox);
+        }
+    }
 }
 
 /// A worker was heard of.
@@ -56,12 +65,14 @@ pub(super) fn leave(core: &mut Core, worker: WorkerId, departure: &Departure, no
 pub(super) fn drain(core: &mut Core, worker: WorkerId, now: Duration, outbox: &mut Outbox) {
     renew(core, worker, now);
     core.clearing = core.clearing.filter(|clearing| *clearing != worker);
-    let unbegun = core.members.change(worker, |member| {
-        let is_news = !std::mem::replace(&mut member.is_draining, true);
-        is_news.then(|| member.waiting.clone())
+    let drained = core.members.change(worker, |member| {
+        let was_draining = std::mem::replace(&mut member.is_draining, true);
+        (was_draining, member.waiting.clone())
     });
-    let Some(Some(unbegun)) = unbegun else { return };
-    outbox.tell(RunEvent::WorkerDraining { worker });
+    let Some((was_draining, unbegun)) = drained else { return };
+    if !was_draining {
+        outbox.tell(RunEvent::WorkerDraining { worker });
+    }
     for node in unbegun {
         core.end_lease(worker, node, now);
         requeue(core, node, worker, now, outbox);
