@@ -14,6 +14,14 @@ const FIRST_DELAY: Duration = Duration::from_millis(100);
 /// The longest of these pauses.
 const LONGEST_DELAY: Duration = Duration::from_secs(5);
 
+/// Keep a node for the worker that executes it and is about to join. Whoever has to run alone begins anew.
+pub(super) fn reserve(core: &mut Core, worker: WorkerId, node: NodeId) {
+    if core.look(node).is_some_and(|record| record.place == Place::Queue) {
+        core.put(node, Place::Nowhere);
+        core.continued.push((worker, node));
+    }
+}
+
 pub(super) fn join(
     core: &mut Core,
     worker: WorkerId,
@@ -26,8 +34,8 @@ pub(super) fn join(
     core.summary.workers_joined += 1;
     outbox.tell(RunEvent::WorkerJoined { worker, threads, process });
     for (_, node) in core.continued.extract_if(.., |(continuing, _)| *continuing == worker).collect::<Vec<_>>() {
-        // Whoever has to run alone begins anew.
-        if core.look(node).is_some_and(|record| record.place == Place::Queue) {
+        // Its output may have come meanwhile.
+        if core.graph.is_open(node) {
             schedule::assign(core, worker, node, now, outbox);
             // It has begun: nobody else shall get it for having idle threads.
             let attempt = core.look(node).map_or(0, |record| record.attempts);
