@@ -478,6 +478,11 @@ impl Planner for FitPlanner {
             _ => Ok(()),
         }
     }
+
+    /// What a search claims is computed again here; of a table only the shape can be seen.
+    fn is_verified_by_repetition(&self, spec: &NodeSpec) -> bool {
+        spec.kind == nodes::TRANSPORT
+    }
 }
 
 /// A map as the nodes of a fit read it, for [`FitPlanner::with_encoded_light`].
