@@ -1,7 +1,7 @@
 //! One bar per stage, with the best CSSIM so far.
 
 use super::{
-    Display, remark,
+    Display, print_line, remark,
     stage::{Count, Stage, Tally},
 };
 use crate::comm::RunEvent;
@@ -57,7 +57,7 @@ impl Display for Bars {
 
     fn say(&mut self, text: &str) {
         if self.all.println(text).is_err() {
-            eprintln!("{text}");
+            print_line(text);
         }
     }
 

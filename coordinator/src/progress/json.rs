@@ -3,6 +3,7 @@
 use super::{
     Display,
     fits::{FitCount, FitEvent},
+    print_line,
 };
 use crate::comm::{NodeName, RunEvent, Site};
 use lookalike::graph::split_label;
@@ -27,7 +28,7 @@ impl JsonLines {
     fn print(&self, mut object: Value) {
         let milliseconds = (self.began.elapsed().as_secs_f64() * 1000.0).round();
         object["time_s"] = json!(milliseconds / 1000.0);
-        eprintln!("{object}");
+        print_line(&object.to_string());
     }
 }
 

@@ -1,6 +1,6 @@
 //! A line when a stage is complete, for logs and pipes.
 
-use super::{Display, remark, stage::Tally};
+use super::{Display, print_line, remark, stage::Tally};
 use crate::{comm::RunEvent, progress::stage::Stage};
 use lookalike::fit::BestScore;
 use std::{sync::Arc, time::Instant};
@@ -33,7 +33,7 @@ impl Display for Lines {
     }
 
     fn say(&mut self, text: &str) {
-        eprintln!("{text}");
+        print_line(text);
     }
 
     fn finish(&mut self, _outcome: Result<(), &str>) {}

@@ -4,7 +4,7 @@
 use super::{
     Display,
     fits::{FitCount, FitEvent},
-    remark_of_many,
+    print_line, remark_of_many,
     stage::{Count, Stage, Tally},
 };
 use crate::comm::RunEvent;
@@ -161,7 +161,7 @@ impl Display for ManyBars {
 
     fn say(&mut self, text: &str) {
         if self.all.println(text).is_err() {
-            eprintln!("{text}");
+            print_line(text);
         }
     }
 

@@ -3,7 +3,7 @@
 use super::{
     Display,
     fits::{FitCount, FitEvent},
-    remark_of_many,
+    print_line, remark_of_many,
 };
 use crate::comm::RunEvent;
 use std::time::Instant;
@@ -35,7 +35,7 @@ impl Display for ManyLines {
     }
 
     fn say(&mut self, text: &str) {
-        eprintln!("{text}");
+        print_line(text);
     }
 
     fn finish(&mut self, _outcome: Result<(), &str>) {}

@@ -12,7 +12,10 @@ pub(crate) use fits::{FitCount, FitEvent};
 
 use crate::{comm::RunEvent, settings::ProgressKind};
 use lookalike::fit::BestScore;
-use std::{io::IsTerminal, sync::Arc};
+use std::{
+    io::{self, IsTerminal, Write as _},
+    sync::Arc,
+};
 
 /// Something that watches a run.
 pub(crate) trait Display: Send {
@@ -29,10 +32,15 @@ pub(crate) trait Display: Send {
     fn finish(&mut self, outcome: Result<(), &str>);
 }
 
+/// A line on stderr. When nobody reads it any more, the run goes on all the same.
+fn print_line(text: &str) {
+    let _ = writeln!(io::stderr(), "{text}");
+}
+
 /// The display that the user asked for. `best` holds the best score so far.
 pub(crate) fn display(kind: ProgressKind, best: Arc<BestScore>) -> Box<dyn Display> {
     match kind {
-        ProgressKind::Auto if !std::io::stderr().is_terminal() => Box::new(lines::Lines::new(best)),
+        ProgressKind::Auto if !io::stderr().is_terminal() => Box::new(lines::Lines::new(best)),
         // Where bars cannot be drawn (a pipe, a dumb terminal) lines must do.
         ProgressKind::Bar | ProgressKind::Auto => match bars::Bars::new(Arc::clone(&best)) {
             Some(bars) => Box::new(bars),
@@ -46,7 +54,7 @@ pub(crate) fn display(kind: ProgressKind, best: Arc<BestScore>) -> Box<dyn Displ
 /// The display of a batch of so many fits that the user asked for.
 pub(crate) fn display_of_many(kind: ProgressKind, fits: usize) -> Box<dyn Display> {
     match kind {
-        ProgressKind::Auto if !std::io::stderr().is_terminal() => Box::new(many_lines::ManyLines::new()),
+        ProgressKind::Auto if !io::stderr().is_terminal() => Box::new(many_lines::ManyLines::new()),
         ProgressKind::Bar | ProgressKind::Auto => match many_bars::ManyBars::new(fits) {
             Some(bars) => Box::new(bars),
             None => Box::new(many_lines::ManyLines::new()),
@@ -62,7 +70,7 @@ impl Display for Silent {
     fn event(&mut self, _event: &RunEvent) {}
 
     fn say(&mut self, text: &str) {
-        eprintln!("{text}");
+        print_line(text);
     }
 
     fn finish(&mut self, _outcome: Result<(), &str>) {}
@@ -81,7 +89,7 @@ impl Display for SilentMany {
     }
 
     fn say(&mut self, text: &str) {
-        eprintln!("{text}");
+        print_line(text);
     }
 
     fn finish(&mut self, _outcome: Result<(), &str>) {}

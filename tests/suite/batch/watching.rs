@@ -80,7 +80,6 @@ fn scrape(address: &str) -> String {
 
 #[test]
 fn metrics_tell_what_waits_for_workers() {
-    // With one node at first, two fits give a worker enough to do.
     let models = "models = ['ggx', 'cook-torrance']";
     let folder =
         folder(&format!("photos = ['photo.exr', 'red.exr']\nenvironments = 'map.exr'\n{models}\n[defaults]\n{QUICK}"));
@@ -92,7 +91,7 @@ fn metrics_tell_what_waits_for_workers() {
         if let Some(text) = event["text"].as_str().and_then(|text| text.strip_prefix("metrics at http://")) {
             address = text.strip_suffix("/metrics").map(str::to_owned);
         }
-        // Both fits have begun before anybody is told of their nodes.
+        // The first fit has begun before anybody is told of its nodes.
         if page.is_none() && is(event, "node-added") {
             page = Some(scrape(address.as_deref().expect("an address")));
             signal(coordinator, "INT");
@@ -102,14 +101,30 @@ fn metrics_tell_what_waits_for_workers() {
     let page = page.unwrap();
     for sample in [
         "lookalike_workers 0",
-        "lookalike_fits{state=\"waiting\"} 2",
-        "lookalike_fits{state=\"running\"} 2",
         "lookalike_fits{state=\"done\"} 0",
+        "lookalike_nodes{kind=\"search\",state=\"completed\"} 0",
     ] {
         assert!(page.lines().any(|line| line == sample), "{sample} in:\n{page}");
     }
+    let fits = |state: &str| {
+        let sample = format!("lookalike_fits{{state=\"{state}\"}} ");
+        page.lines().find_map(|line| line.strip_prefix(&sample)?.parse::<u32>().ok()).expect(state)
+    };
+    // One node is not enough for a worker: the second one begins as soon as it is read.
+    assert!((1..=2).contains(&fits("running")) && fits("running") + fits("waiting") == 4, "{page}");
     let text = fs::read_to_string(folder.path().join("out/summary.json")).unwrap();
     assert!(text.contains("\"state\": \"stopped\"") && !text.contains("\"state\": \"running\""), "{text}");
+}
+
+#[test]
+fn batch_goes_on_when_nobody_reads_its_progress_any_more() {
+    let folder =
+        folder(&format!("photos = 'photo.exr'\nenvironments = 'map.exr'\n[defaults]\npolish = false\n{QUICK}"));
+    let mut process = start(&folder, "--workers 1");
+    let found = process.stderr_until(|event| is(event, "worker-joined").then_some(()));
+    assert!(found.is_some());
+    assert_eq!(process.output().status.code(), Some(0));
+    assert!(folder.path().join("out/photo-map-ggx/fit.json").exists());
 }
 
 #[test]
