@@ -138,7 +138,7 @@ pub(super) fn create(path: &Path) -> Result<Connection, JournalError> {
         _ => JournalError::Create { path: path.to_owned(), source },
     })?;
     let writing = |source| JournalError::writing(path, source);
-    let connection = connect(path)?;
+    let connection = connect(path, is_shared(path))?;
     connection
         .execute_batch(&format!(
             "BEGIN; {TABLES} PRAGMA application_id = {APPLICATION}; PRAGMA user_version = {FORMAT}; COMMIT;"
@@ -154,7 +154,11 @@ pub(super) fn open(path: &Path) -> Result<Connection, JournalError> {
         .map_err(|source| JournalError::reading(path, source))?;
     check_format(path, &looking)?;
     drop(looking);
-    connect(path)
+    connect(path, is_shared(path))
+}
+
+fn is_shared(path: &Path) -> bool {
+    path.parent().is_some_and(place::is_shared)
 }
 
 /// That a file is a journal of this format.
@@ -172,12 +176,13 @@ pub(super) fn check_format(path: &Path, connection: &Connection) -> Result<(), J
     }
 }
 
-fn connect(path: &Path) -> Result<Connection, JournalError> {
+/// Connect to a journal, alone if other machines may write to its file system.
+pub(super) fn connect(path: &Path, is_shared: bool) -> Result<Connection, JournalError> {
     let connect = || {
         let connection = Connection::open_with_flags(path, OpenFlags::SQLITE_OPEN_READ_WRITE)?;
         connection.busy_timeout(BUSY_TIME)?;
         connection.set_prepared_statement_cache_capacity(32);
-        if path.parent().is_some_and(place::is_shared) {
+        if is_shared {
             // Before the first use of the log: then it needs no shared memory.
             connection.pragma_update(None, "locking_mode", "EXCLUSIVE")?;
         }

@@ -253,6 +253,25 @@ fn status_tells_counts_workers_and_whether_somebody_is_at_work() {
     assert_eq!(Status::of(folder.path()).unwrap().state, RunState::Finished);
 }
 
+#[test]
+fn where_the_journal_is_locked_the_status_file_tells() {
+    let folder = tempfile::tempdir().unwrap();
+    let _lock = RunLock::take(folder.path()).unwrap();
+    let mut journal = begun(&folder);
+    write(&mut journal, [completed(1)]);
+    journal.close(None).unwrap();
+    // As on a network file system.
+    let path = folder.path().join(JOURNAL_FILE);
+    let alone = schema::connect(&path, true).unwrap();
+    alone.execute("UPDATE epochs SET ended_ms = NULL", []).unwrap();
+    assert!(!folder.path().join("run.sqlite-shm").exists(), "there is no memory to share");
+    let status = Status::of(folder.path()).unwrap();
+    assert_eq!((status.state, status.nodes.completed), (RunState::Running, 1));
+    fs::remove_file(folder.path().join("status.json")).unwrap();
+    let error = Status::of(folder.path()).unwrap_err().to_string();
+    assert!(error.contains("another process is using the journal"), "{error}");
+}
+
 #[cfg(unix)]
 #[test]
 fn journal_is_readable_by_its_owner_alone() {
