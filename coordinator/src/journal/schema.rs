@@ -16,7 +16,7 @@ pub(super) const FORMAT: i64 = 1;
 /// Marks the file as a journal of this program: `PRAGMA application_id`, the letters `Look`.
 pub(super) const APPLICATION: i64 = 0x4c6f_6f6b;
 
-/// docs/journal.md explains them.
+/// docs/journal.md explains them. What is written for every node is appended, or found by a number: no index besides.
 const TABLES: &str = "
 CREATE TABLE run (
     id          INTEGER PRIMARY KEY CHECK (id = 1),
@@ -39,8 +39,7 @@ CREATE TABLE epochs (
     best_cssim  REAL
 );
 CREATE TABLE nodes (
-    epoch       INTEGER NOT NULL,
-    node        INTEGER NOT NULL,
+    id          INTEGER PRIMARY KEY,
     kind        TEXT NOT NULL,
     label       TEXT NOT NULL,
     state       INTEGER NOT NULL,
@@ -49,9 +48,8 @@ CREATE TABLE nodes (
     deaths_alone    INTEGER NOT NULL,
     deaths_excused  INTEGER NOT NULL,
     key         BLOB,
-    error       TEXT,
-    PRIMARY KEY (epoch, node)
-) WITHOUT ROWID;
+    error       TEXT
+);
 CREATE TABLE attempts (
     epoch       INTEGER NOT NULL,
     node        INTEGER NOT NULL,
@@ -59,9 +57,8 @@ CREATE TABLE attempts (
     worker      INTEGER NOT NULL,
     begun_ms    INTEGER NOT NULL,
     ended_ms    INTEGER,
-    outcome     INTEGER,
-    PRIMARY KEY (epoch, node, attempt)
-) WITHOUT ROWID;
+    outcome     INTEGER
+);
 CREATE TABLE workers (
     epoch       INTEGER NOT NULL,
     worker      INTEGER NOT NULL,
@@ -79,12 +76,13 @@ CREATE TABLE local_workers (
 ) WITHOUT ROWID;
 CREATE TABLE results (
     id          INTEGER PRIMARY KEY,
+    epoch       INTEGER NOT NULL,
     key         BLOB NOT NULL,
     hash        BLOB NOT NULL,
     bytes       BLOB
 );
 CREATE VIEW node_list AS
-    SELECT epoch, node, kind, label,
+    SELECT id >> 32 AS epoch, id & 0xffffffff AS node, kind, label,
            CASE state WHEN 0 THEN 'waiting' WHEN 1 THEN 'ready' WHEN 2 THEN 'running' WHEN 3 THEN 'completed'
                       WHEN 4 THEN 'recalled' ELSE 'failed' END AS state,
            attempts, deaths + deaths_alone + deaths_excused AS deaths, lower(hex(key)) AS key, error
@@ -103,6 +101,11 @@ const CACHE_KIB: i64 = 16 << 10;
 
 /// How long to wait for a reader that is in the way; there should be none.
 const BUSY_TIME: Duration = Duration::from_secs(5);
+
+/// The number of a node among those of all epochs; the first node of an epoch comes after the last one of the one before.
+pub(super) fn node_id(epoch: u64, node: u64) -> u64 {
+    (epoch << 32) + node
+}
 
 /// The files of a journal: itself, its log, their index, and the log of the older kind.
 pub(crate) fn files(path: &Path) -> [PathBuf; 4] {

@@ -126,7 +126,10 @@ fn damaged_output_is_dropped_and_the_others_stay() {
     let mut journal = begun(&folder);
     write(&mut journal, [completed(1), completed(2)]);
     journal.close(None).unwrap();
-    sql(&folder, "UPDATE results SET bytes = zeroblob(1000) WHERE key = (SELECT key FROM nodes WHERE node = 1)");
+    sql(
+        &folder,
+        "UPDATE results SET bytes = zeroblob(1000) WHERE key = (SELECT key FROM nodes WHERE id & 0xffffffff = 1)",
+    );
     let again = begun(&folder);
     let mut recall = again.recall();
     assert_eq!(recall.recall(key(1)).output, None);
