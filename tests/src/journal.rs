@@ -44,8 +44,9 @@ impl JournalView {
     #[must_use]
     pub fn run_twice(&self) -> u64 {
         self.number(
-            "SELECT count(*) FROM nodes earlier JOIN nodes later ON earlier.key = later.key AND earlier.epoch < later.epoch
-             WHERE earlier.state IN (3, 4) AND (later.attempts > 0 OR later.state NOT IN (3, 4))",
+            "SELECT count(*) FROM results JOIN node_list later
+                 ON lower(hex(results.key)) = later.key AND results.epoch < later.epoch
+             WHERE later.attempts > 0 OR later.state <> 'recalled'",
         )
     }
 }

@@ -61,10 +61,14 @@ impl Memory {
                 self.today.entry(key).or_insert(node);
             }
         }
-        if group.batch.is_empty() && self.waiting.is_empty() {
+        let batch = std::mem::take(&mut group.batch);
+        if self.waiting.is_empty() && !batch.is_urgent() {
+            if !batch.is_empty() {
+                journal.note(batch);
+            }
             return Some(group);
         }
-        journal.commit(std::mem::take(&mut group.batch));
+        journal.commit(batch);
         self.waiting.push_back(group);
         None
     }

@@ -6,13 +6,14 @@ use super::{
 };
 use std::{collections::BTreeSet, fs, process::Command};
 
-const DOCUMENTS: [&str; 8] = [
+const DOCUMENTS: [&str; 9] = [
     "README.md",
     "ARCHITECTURE.md",
     "CONTRIBUTING.md",
     "CHANGELOG.md",
     "docs/accuracy.md",
     "docs/design.md",
+    "docs/journal.md",
     "docs/real-materials.md",
     "docs/security.md",
 ];
@@ -77,7 +78,7 @@ fn links_and_paths_in_documents_resolve() {
 
 #[test]
 fn commands_and_flags_in_documents_exist() {
-    const COMMANDS: [&str; 7] = ["access new", "batch", "demo", "fit", "render", "compare", "worker"];
+    const COMMANDS: [&str; 8] = ["access new", "batch", "demo", "fit", "status", "render", "compare", "worker"];
     const OF_CARGO: [&str; 10] = [
         "--bench",
         "--bin",
