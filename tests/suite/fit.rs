@@ -4,5 +4,5 @@ mod ending;
 mod outputs;
 mod resume;
 mod same_bits;
-mod scene;
+pub(crate) mod scene;
 mod settings;

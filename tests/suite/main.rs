@@ -8,6 +8,7 @@
 
 mod access;
 mod bad_input;
+mod chaos;
 mod cli;
 mod cluster;
 mod compare;
