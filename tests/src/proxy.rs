@@ -11,6 +11,9 @@ use std::time::Duration;
 /// Longer than anything takes; a test that waits longer has failed.
 const PATIENCE: Duration = Duration::from_secs(60);
 
+/// How much is recorded.
+const RECORD_BYTES: usize = 64 << 10;
+
 /// Where bytes go.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Way {
@@ -41,6 +44,8 @@ struct State {
     /// Bytes that wait to be allowed.
     stopped: [bool; 2],
     connections: u64,
+    /// What went up first.
+    record: Vec<u8>,
     /// Both ends of what is connected.
     streams: Vec<TcpStream>,
     is_over: bool,
@@ -107,6 +112,12 @@ impl Proxy {
         self.wire.lock().passed[way as usize]
     }
 
+    /// The first bytes of all that the last worker has sent, as somebody on the wire sees them: 64 KiB at most.
+    #[must_use]
+    pub fn record(&self) -> Vec<u8> {
+        self.wire.lock().record.clone()
+    }
+
     /// Break all connections, and let everything through on the next ones.
     pub fn renew(&self) {
         let mut state = self.wire.lock();
@@ -165,6 +176,7 @@ impl Wire {
             let Ok(above) = TcpStream::connect(coordinator) else { continue };
             state.passed = [0, 0];
             state.stopped = [false, false];
+            state.record.clear();
             state.connections += 1;
             let number = state.connections;
             for (way, from, to) in [(Way::Up, &below, &above), (Way::Down, &above, &below)] {
@@ -189,7 +201,7 @@ impl Wire {
             };
             let mut rest = &buffer[..count];
             loop {
-                let Some(now) = self.take(way, number, rest.len()) else { return };
+                let Some(now) = self.take(way, number, rest) else { return };
                 let (passing, waiting) = rest.split_at(now);
                 if to.write_all(passing).is_err() {
                     return;
@@ -209,8 +221,8 @@ impl Wire {
 
     /// How many of so many bytes may pass now; waits until one may, and the end of a stream until everything may. `None` when their
     /// connection is broken.
-    fn take(&self, way: Way, number: u64, bytes: usize) -> Option<usize> {
-        let way = way as usize;
+    fn take(&self, way: Way, number: u64, bytes: &[u8]) -> Option<usize> {
+        let (is_up, way) = (way == Way::Up, way as usize);
         let mut state = self.lock();
         loop {
             if state.is_over || state.streams.is_empty() || state.connections != number {
@@ -218,7 +230,11 @@ impl Wire {
             }
             let room = state.allowed[way].map_or(u64::MAX, |allowed| allowed.saturating_sub(state.passed[way]));
             if room > 0 {
-                let now = bytes.min(usize::try_from(room).unwrap_or(usize::MAX));
+                let now = bytes.len().min(usize::try_from(room).unwrap_or(usize::MAX));
+                let recorded = RECORD_BYTES.saturating_sub(state.record.len()).min(now);
+                if is_up {
+                    state.record.extend_from_slice(&bytes[..recorded]);
+                }
                 state.passed[way] += now as u64;
                 state.stopped[way] = false;
                 return Some(now);

@@ -128,7 +128,8 @@ fn result_whose_receipt_was_lost_comes_again_and_is_dropped() {
     let _ = proxy.wait_for_stop(Way::Down);
     proxy.renew();
     wait_for_worker(&cluster);
-    // It has gone on with the second node meanwhile, and brings it too.
+    // It goes on with the second node, as one that is given to it now.
+    wait_for_start(&cluster);
     second.release();
     let keeper = gate.keep(Waiting::release);
     let (result, summary) = cluster.finish();

@@ -23,7 +23,7 @@ pub(super) const SIZE: usize = 48;
 pub(super) const QUICK: &str = "--samples 32 --gammas 1:2:0.5 --workers 1 --progress none";
 
 /// A folder with `photo.exr` and `map.exr`.
-pub(super) fn folder() -> TempDir {
+pub(crate) fn folder() -> TempDir {
     static PHOTO: OnceLock<Image> = OnceLock::new();
     folder_with(PHOTO.get_or_init(|| photo(SIZE)))
 }
