@@ -47,7 +47,8 @@ impl Namespace {
             skip(&why);
             return None;
         }
-        let cable = |kind: &str, index: u16| Cable::new(&name, kind, u32::from(number) * 8 + u32::from(serial * 2 + index) % 8);
+        let cable =
+            |kind: &str, index: u16| Cable::new(&name, kind, u32::from(number) * 8 + u32::from(serial * 2 + index) % 8);
         let namespace = Self { line: cable("l", 0), control: cable("c", 1), name };
         let laid = namespace.line.lay(&namespace.name).and_then(|()| namespace.control.lay(&namespace.name));
         match laid {

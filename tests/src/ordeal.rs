@@ -200,7 +200,10 @@ impl Run<'_> {
             (Some("worker-left"), Some(worker), _) => {
                 if let Some(process) = self.members.remove(&worker) {
                     // It was stopped, or not heard, for long enough.
-                    self.stopped.iter_mut().filter(|(stopped, _)| *stopped == process).for_each(|(_, until)| *until = 0);
+                    self.stopped
+                        .iter_mut()
+                        .filter(|(stopped, _)| *stopped == process)
+                        .for_each(|(_, until)| *until = 0);
                     if self.remote.as_ref().is_some_and(|remote| remote.id() == process) {
                         self.silent_until = self.silent_until.map(|_| 0);
                     }

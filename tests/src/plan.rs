@@ -44,6 +44,11 @@ pub enum Leaves {
         /// Where the gate is.
         address: String,
     },
+    /// So many nodes that abort whatever process they run in, and a planner that does without them; then a digest of nothing.
+    Killers {
+        /// How many.
+        count: usize,
+    },
     /// One node that waits at a gate in the coordinator's own process.
     GateHere {
         /// Where.
@@ -117,6 +122,7 @@ impl Planner for TestPlanner {
                 ("gate", (0..*count).map(|leaf| format!("{address}#{leaf}").into_bytes()).collect(), 0)
             }
             Leaves::Abort { marker } => ("abort", vec![marker.clone().into_bytes()], 0),
+            Leaves::Killers { count } => ("abort", vec![Vec::new(); *count], 0),
             Leaves::GateHere { address } => ("gate", vec![address.clone().into_bytes()], 0),
             Leaves::Panic => ("panic", vec![Vec::new()], 0),
             Leaves::Unknown => ("nonsense", vec![Vec::new()], 0),
@@ -148,7 +154,7 @@ impl Planner for TestPlanner {
     }
 
     fn failed(&mut self, id: NodeId, reason: &FailureReason, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
-        if matches!(self.leaves, Leaves::Mob { .. }) {
+        if matches!(self.leaves, Leaves::Mob { .. } | Leaves::Killers { .. }) {
             self.nodes.retain(|leaf| *leaf != id);
             return self.leaf_is_done(graph);
         }

@@ -105,7 +105,6 @@ impl Proxy {
         self.wire.wait_while(|state| !state.stopped[way as usize]).passed[way as usize]
     }
 
-
     /// How many bytes have passed on this way since the last connection began.
     #[must_use]
     pub fn passed(&self, way: Way) -> u64 {

@@ -11,7 +11,7 @@ use lookalike_tests::netns::Namespace;
 use lookalike_tests::process::Process;
 
 use super::{
-    PROGRAM, departure, deaths_when_requeued, gates, gates_reference, run_for_others, wait_for_start, wait_for_worker,
+    PROGRAM, deaths_when_requeued, departure, gates, gates_reference, run_for_others, wait_for_start, wait_for_worker,
     without_workers, worker_at,
 };
 

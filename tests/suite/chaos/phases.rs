@@ -12,7 +12,7 @@ use lookalike_tests::process::Process;
 use lookalike_tests::proxy::{Proxy, Way};
 
 use super::{
-    departure, deaths_when_requeued, gates, gates_reference, run_for_others, wait_for_result, wait_for_start,
+    deaths_when_requeued, departure, gates, gates_reference, run_for_others, wait_for_result, wait_for_start,
     wait_for_worker, without_workers, worker_at,
 };
 
