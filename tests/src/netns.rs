@@ -10,7 +10,7 @@
 use std::net::IpAddr;
 use std::path::Path;
 use std::process::Command;
-use std::sync::atomic::{AtomicU16, Ordering};
+use std::sync::atomic::{AtomicU32, Ordering};
 
 /// A namespace, gone when dropped, with all processes in it.
 #[derive(Debug)]
@@ -38,17 +38,15 @@ impl Namespace {
     /// A namespace; says why there is none where it cannot be made.
     #[must_use]
     pub fn new() -> Option<Self> {
-        static COUNT: AtomicU16 = AtomicU16::new(0);
+        static COUNT: AtomicU32 = AtomicU32::new(0);
         // Other test processes have other numbers, as far as there are enough.
-        let number = std::process::id() as u16 & 0xfff;
-        let serial = COUNT.fetch_add(1, Ordering::Relaxed);
+        let (number, serial) = (std::process::id() & 0xfff, COUNT.fetch_add(1, Ordering::Relaxed));
         let name = format!("lk{number}-{serial}");
         if let Err(why) = try_ip(&format!("netns add {name}")) {
             skip(&why);
             return None;
         }
-        let cable =
-            |kind: &str, index: u16| Cable::new(&name, kind, u32::from(number) * 8 + u32::from(serial * 2 + index) % 8);
+        let cable = |kind: &str, index: u32| Cable::new(&name, kind, number * 8 + (serial * 2 + index) % 8);
         let namespace = Self { line: cable("l", 0), control: cable("c", 1), name };
         let laid = namespace.line.lay(&namespace.name).and_then(|()| namespace.control.lay(&namespace.name));
         match laid {
