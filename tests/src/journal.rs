@@ -45,7 +45,7 @@ impl JournalView {
     #[must_use]
     pub fn run_twice(&self) -> u64 {
         self.number(
-            "SELECT count(*) FROM nodes earlier JOIN nodes later ON earlier.key = later.key AND earlier.epoch < later.epoch
+            "SELECT count(DISTINCT later.key) FROM nodes earlier JOIN nodes later ON earlier.key = later.key AND earlier.epoch < later.epoch
              WHERE earlier.state IN (3, 4) AND (later.attempts > 0 OR later.state NOT IN (3, 4))",
         )
     }
