@@ -3,9 +3,12 @@
 pub mod cluster;
 pub mod gate;
 pub mod journal;
+pub mod netns;
 pub mod nodes;
+pub mod ordeal;
 pub mod plan;
 pub mod process;
 pub mod program;
+pub mod proxy;
 pub mod scene;
 pub mod stranger;

@@ -9,6 +9,7 @@
 mod access;
 mod bad_input;
 mod batch;
+mod chaos;
 mod cli;
 mod cluster;
 mod compare;

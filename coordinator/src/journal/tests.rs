@@ -121,6 +121,20 @@ fn torn_write_costs_only_the_group_that_was_being_written() {
 }
 
 #[test]
+fn number_of_an_epoch_is_never_given_again_whatever_is_left_of_the_log() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut journal = begun(&folder);
+    let mut batch = Batch::default();
+    batch.listens("127.0.0.1:4100".into());
+    write(&mut journal, [batch, completed(1)]);
+    let copy = copied(&folder);
+    fs::write(copy.path().join("run.sqlite-wal"), "").unwrap();
+    let again = Journal::open(&options(&copy), RunName([8; 16])).unwrap();
+    assert_eq!((again.run, again.epoch, again.past.results), (NAME, 2, 0));
+    assert_eq!(again.past.listen, "127.0.0.1:4100".parse().ok());
+}
+
+#[test]
 fn damaged_output_is_dropped_and_the_others_stay() {
     let folder = tempfile::tempdir().unwrap();
     let mut journal = begun(&folder);

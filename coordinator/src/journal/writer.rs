@@ -98,6 +98,10 @@ impl Writer {
             }
             transaction.commit()
         });
+        let outcome = match batch.listen {
+            Some(_) => outcome.and_then(|()| self.reach_the_disk()),
+            None => outcome,
+        };
         outcome.map_err(|source| JournalError::writing(&self.options.path, source))?;
         if is_much {
             self.deferred.forget();
@@ -107,6 +111,14 @@ impl Writer {
             self.results.remove(key);
         }
         Ok(())
+    }
+
+    /// Wait until all that was written is on the disk. Once per epoch, before its first lease: a machine that loses its power may
+    /// lose the end of the log, but must not lose which epochs there were. The next one would have the number of one that was lost,
+    /// and a worker elsewhere might bring it an answer to the other's node of the same number.
+    fn reach_the_disk(&self) -> rusqlite::Result<()> {
+        // What readers still need stays in the log as well, and is synchronised with it.
+        self.connection.query_row("PRAGMA wal_checkpoint(PASSIVE)", [], |_| Ok(()))
     }
 
     /// The output of a node. A damaged one is dropped, and the node runs again.
