@@ -4,6 +4,7 @@ pub mod cluster;
 pub mod gate;
 pub mod journal;
 pub mod nodes;
+pub mod overhead;
 pub mod plan;
 pub mod process;
 pub mod program;
