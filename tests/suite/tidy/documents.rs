@@ -78,7 +78,18 @@ fn links_and_paths_in_documents_resolve() {
 #[test]
 fn commands_and_flags_in_documents_exist() {
     const COMMANDS: [&str; 6] = ["access new", "demo", "fit", "render", "compare", "worker"];
-    const OF_CARGO: [&str; 7] = ["--bin", "--features", "--lib", "--locked", "--path", "--release", "--test"];
+    const OF_CARGO: [&str; 10] = [
+        "--bench",
+        "--bin",
+        "--example",
+        "--features",
+        "--lib",
+        "--locked",
+        "--nocapture",
+        "--path",
+        "--release",
+        "--test",
+    ];
     let helps: Vec<(&str, String)> = COMMANDS.iter().map(|command| (*command, help(command))).collect();
     let known: BTreeSet<&str> = helps.iter().flat_map(|(_, help)| flags(help)).chain(OF_CARGO).collect();
     let mut offences = Vec::new();
