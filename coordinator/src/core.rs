@@ -10,8 +10,8 @@ use std::time::Duration;
 
 use lookalike::graph::{Blob, Graph, NodeId, NodeKey, WorkerId};
 
-use self::members::{Size, weight};
 pub(crate) use self::members::{Held, Member, Members};
+use self::members::{Size, weight};
 use self::pace::Pace;
 pub(crate) use self::waiting::{Place, Waiting};
 use crate::comm::{NodeName, Site};
@@ -194,7 +194,13 @@ impl Core {
     pub fn next_deadline(&self) -> Option<Duration> {
         let limit = self.starvation_limit();
         let starvation = self.starving.map(|starving| starving.next_reminder.min(starving.since + limit));
-        let delays = [self.members.next_deadline(), self.waiting.next_rested(), self.next_slow, self.next_move, self.next_patience];
+        let delays = [
+            self.members.next_deadline(),
+            self.waiting.next_rested(),
+            self.next_slow,
+            self.next_move,
+            self.next_patience,
+        ];
         delays.into_iter().flatten().chain(starvation).min()
     }
 

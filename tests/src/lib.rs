@@ -3,6 +3,7 @@
 pub mod cluster;
 pub mod gate;
 pub mod journal;
+pub mod light;
 pub mod nodes;
 pub mod overhead;
 pub mod plan;

@@ -11,6 +11,7 @@ mod bad_input;
 mod cli;
 mod cluster;
 mod compare;
+mod crowd;
 mod faults;
 mod fit;
 mod hostile;

@@ -75,7 +75,8 @@ fn all() -> Result<()> {
         &["worker-stopped"],
         &["coordinator-killed"],
     ] {
-        let output = Command::new(std::env::current_exe()?).args(arguments).stderr(std::process::Stdio::inherit()).output()?;
+        let output =
+            Command::new(std::env::current_exe()?).args(arguments).stderr(std::process::Stdio::inherit()).output()?;
         if !output.status.success() {
             return Err(format!("{} ended with {}", arguments.join(" "), output.status).into());
         }

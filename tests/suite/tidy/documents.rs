@@ -6,13 +6,14 @@ use super::{
 };
 use std::{collections::BTreeSet, fs, process::Command};
 
-const DOCUMENTS: [&str; 8] = [
+const DOCUMENTS: [&str; 9] = [
     "README.md",
     "ARCHITECTURE.md",
     "CONTRIBUTING.md",
     "CHANGELOG.md",
     "docs/accuracy.md",
     "docs/design.md",
+    "docs/overhead.md",
     "docs/real-materials.md",
     "docs/security.md",
 ];
