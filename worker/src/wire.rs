@@ -254,3 +254,40 @@ async fn read_array<const N: usize>(stream: &mut (impl AsyncRead + Unpin)) -> Re
         Err(error) => Err(error.into()),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use lookalike::protocol::ToWorker;
+    use tokio::io::duplex;
+
+    #[tokio::test]
+    async fn what_leaves_together_arrives_in_order_small_or_large() {
+        let (mut near, far) = duplex(1000);
+        let blobs = [vec![1; 10], vec![2; PARCEL_BYTES + 1], Vec::new(), vec![3; 3 << 20], vec![4; 7]].map(Blob::new);
+        let sent = blobs.clone();
+        let sending = tokio::spawn(async move {
+            let mut parcel = Parcel::default();
+            for blob in &sent {
+                parcel.add(&ToWorker::Blob { hash: blob.hash().0, length: blob.len() as u64 })?;
+                parcel.add_blob(blob, &mut near).await?;
+            }
+            parcel.send(&mut near).await
+        });
+        let mut incoming = Incoming::new(far);
+        for blob in &blobs {
+            let announced = ToWorker::Blob { hash: blob.hash().0, length: blob.len() as u64 };
+            assert_eq!(incoming.message::<ToWorker>().await.unwrap(), announced);
+            let mut bytes = Vec::new();
+            while bytes.len() < blob.len() {
+                match incoming.next::<ToWorker>().await.unwrap() {
+                    Some(Received::Part(part)) => bytes.extend(part),
+                    other => panic!("expected a part, found {other:?}"),
+                }
+            }
+            assert_eq!(Blob::new(bytes), *blob);
+        }
+        sending.await.unwrap().unwrap();
+        assert!(incoming.next::<ToWorker>().await.unwrap().is_none());
+    }
+}

@@ -15,6 +15,9 @@ const UNBEGUN_BYTES: usize = 8 << 20;
 /// there and back take.
 const ENOUGH: Duration = Duration::from_millis(10);
 
+/// A worker that has not moved for this long does not get on: a busy machine lets a process wait for a few hundredths of a second.
+const STANDSTILL: Duration = Duration::from_millis(50);
+
 /// A node that takes less than this is short: a worker is given many of them at a time.
 const SHORT: Duration = Duration::from_millis(1);
 
@@ -140,7 +143,7 @@ impl Member {
     /// When what it has not begun with may be moved to another worker. Short nodes stay as long as it gets on with them: they
     /// would be begun with here before anybody there hears of it.
     pub(crate) fn movable_at(&self) -> Duration {
-        if self.waiting_time > self.enough() + SHORT { Duration::ZERO } else { self.last_move + ENOUGH }
+        if self.waiting_time > self.enough() + SHORT { Duration::ZERO } else { self.last_move + STANDSTILL }
     }
 
     /// Whether it was given something though it had enough.

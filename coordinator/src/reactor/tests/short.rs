@@ -31,7 +31,7 @@ fn short_nodes_are_moved_only_from_a_worker_that_does_not_get_on() {
     bench.start(A, 5, 1);
     assert_eq!(held(&bench, A), 45);
     assert!(bench.join(B, 1).is_empty());
-    let due = bench.now + Duration::from_millis(10);
+    let due = bench.now + Duration::from_millis(50);
     assert_eq!(bench.core.next_deadline(), Some(due));
     bench.now = due;
     assert_eq!(bench.handle(Event::DeadlinePassed), ["worker 1 drops 49.1", "worker 2 gets 49.2"]);
