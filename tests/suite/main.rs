@@ -13,6 +13,7 @@ mod chaos;
 mod cli;
 mod cluster;
 mod compare;
+mod crowd;
 mod faults;
 mod fit;
 mod hostile;

@@ -10,8 +10,9 @@ use crate::comm::Action;
 use crate::journal::{Batch, Journal};
 use crate::reactor::Event;
 
-/// How many groups may wait for their transactions: while one is written, the next is made.
-const WAITING_GROUPS: usize = 2;
+/// How many groups may wait for their transactions. With one, what comes while it is written becomes the next: a transaction costs
+/// as much as many events, and a node that begins and ends within one is written once.
+const WAITING_GROUPS: usize = 1;
 
 /// What a group of events has led to: done once it is written down.
 #[derive(Debug, Default)]

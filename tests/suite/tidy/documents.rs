@@ -6,7 +6,7 @@ use super::{
 };
 use std::{collections::BTreeSet, fs, process::Command};
 
-const DOCUMENTS: [&str; 9] = [
+const DOCUMENTS: [&str; 10] = [
     "README.md",
     "ARCHITECTURE.md",
     "CONTRIBUTING.md",
@@ -14,6 +14,7 @@ const DOCUMENTS: [&str; 9] = [
     "docs/accuracy.md",
     "docs/design.md",
     "docs/journal.md",
+    "docs/overhead.md",
     "docs/real-materials.md",
     "docs/security.md",
 ];
