@@ -66,12 +66,12 @@ fn journal_that_was_torn_or_damaged_costs_what_it_has_lost_and_nothing_else() {
         // Whatever is torn, the number of a coordinator is never given again: workers may still answer to it.
         assert_eq!(journal.number("SELECT max(epoch) FROM epochs"), 2, "{left} bytes of the log");
         assert_eq!(journal.run_twice(), 0, "{left} bytes of the log");
-        recalled.push(journal.number("SELECT count(*) FROM nodes WHERE epoch = 2 AND state = 4"));
+        recalled.push(journal.number("SELECT count(*) FROM node_list WHERE epoch = 2 AND state = 'recalled'"));
     }
     assert!(recalled.is_sorted() && recalled.last() > recalled.first(), "{recalled:?}");
     copy(&at("killed"), &at("damaged"));
     assert!(damage_an_output(&at("damaged"), 3));
-    resume("damaged");
+    let resumed = resume("damaged");
+    assert!(resumed.stderr.contains("is damaged: its node runs again"), "{}", resumed.stderr);
     assert_same(&at("whole"), &at("damaged"), "damaged");
-    assert_eq!(JournalView::of(&at("damaged")).run_twice(), 1);
 }
