@@ -104,7 +104,9 @@ fn worker_killed_before_and_after_its_result_is_on_the_wire_has_its_node_run_aga
     // Nothing more reaches it, so it does not run the last node as well.
     proxy.allow(Way::Down, Some(proxy.passed(Way::Down)));
     waiting.release();
-    wait_for_result(&cluster);
+    assert_eq!(wait_for_result(&cluster), "leaf 0");
+    // With this the last node is given to it.
+    assert_eq!(wait_for_result(&cluster), "of all leaves");
     worker.kill();
     proxy.cut();
     assert_eq!(deaths_when_requeued(&cluster), 0);
