@@ -18,6 +18,7 @@ pub mod reactor;
 mod rpc;
 pub mod runner;
 pub mod settings;
+pub mod slurm;
 pub mod spawn;
 pub mod tls;
 
