@@ -3,5 +3,5 @@
 mod ending;
 mod outputs;
 mod same_bits;
-mod scene;
+pub(crate) mod scene;
 mod settings;

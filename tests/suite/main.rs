@@ -11,6 +11,8 @@ mod bad_input;
 mod cli;
 mod cluster;
 mod compare;
+#[cfg(unix)]
+mod deploy;
 mod fit;
 mod hostile;
 mod network;

@@ -23,7 +23,7 @@ pub(super) const SIZE: usize = 48;
 pub(super) const QUICK: &str = "--samples 32 --gammas 1:2:0.5 --workers 1 --progress none";
 
 /// A folder with `photo.exr` and `map.exr`.
-pub(super) fn folder() -> TempDir {
+pub(crate) fn folder() -> TempDir {
     static PHOTO: OnceLock<Image> = OnceLock::new();
     folder_with(PHOTO.get_or_init(|| photo(SIZE)))
 }
@@ -58,7 +58,7 @@ fn photo(size: usize) -> Image {
 }
 
 /// Fits `photo.exr` under `map.exr` into the folder `out`.
-pub(super) fn fit(folder: &Path, out: &str, flags: &str) -> Answer {
+pub(crate) fn fit(folder: &Path, out: &str, flags: &str) -> Answer {
     lookalike(folder, &format!("fit photo.exr --env map.exr --out {out} {flags}"))
 }
 
@@ -75,7 +75,7 @@ pub(super) fn fit_json(out: &Path) -> Value {
 }
 
 /// `fit.json` without its `timing`, which must be there, as text.
-pub(super) fn without_timing(out: &Path) -> String {
+pub(crate) fn without_timing(out: &Path) -> String {
     let mut json = fit_json(out);
     json.as_object_mut().unwrap().remove("timing").expect("a timing block");
     serde_json::to_string_pretty(&json).unwrap()
