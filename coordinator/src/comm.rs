@@ -6,7 +6,8 @@ use std::time::Duration;
 
 use lookalike::graph::{Blob, FailureReason, NodeId, WorkerId};
 
-/// A worker's permission, and duty, to execute a node.
+/// A worker's permission, and duty, to execute a node. It ends with an answer, when it is cancelled, or with its worker's
+/// membership, which lasts as long as the worker is heard of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Lease {
     /// The node.
@@ -15,9 +16,6 @@ pub struct Lease {
     pub attempt: u32,
     /// Counts the coordinator processes of this run, from 1.
     pub epoch: u64,
-    /// When it ends, unless the worker is heard of before: time since the run began. Every sign of life of a worker renews
-    /// all its leases.
-    pub deadline: Duration,
 }
 
 /// One thing to do.
@@ -53,7 +51,7 @@ pub enum Action {
         /// The attempt it answered for.
         attempt: u32,
     },
-    /// Close the connection of this worker; it is no member any more.
+    /// Close the connection of this worker at once; it is no member any more.
     Drop {
         /// The worker.
         worker: WorkerId,
@@ -76,6 +74,8 @@ pub enum Departure {
     Lost,
     /// It was not heard of for too long.
     Silent,
+    /// It did not read what was sent to it.
+    TooSlow,
     /// It said goodbye: somebody asked it to end.
     Goodbye,
     /// It broke the protocol.
@@ -83,12 +83,13 @@ pub enum Departure {
 }
 
 impl Departure {
-    /// Whether the nodes that the worker executed may have caused it.
+    /// Whether the nodes that the worker executed may have caused it. How a local process ended would not tell more: a node
+    /// that takes all memory and somebody with `kill -9` leave the same status behind.
     #[must_use]
     pub fn is_suspicious(&self) -> bool {
         match self {
             Self::Lost | Self::Violation(_) => true,
-            Self::Silent | Self::Goodbye => false,
+            Self::Silent | Self::TooSlow | Self::Goodbye => false,
         }
     }
 }
@@ -98,6 +99,7 @@ impl fmt::Display for Departure {
         match self {
             Self::Lost => formatter.write_str("its connection ended"),
             Self::Silent => formatter.write_str("it was not heard of for too long"),
+            Self::TooSlow => formatter.write_str("it did not read what was sent to it"),
             Self::Goodbye => formatter.write_str("it was asked to end"),
             Self::Violation(what) => write!(formatter, "it broke the protocol: {what}"),
         }
@@ -164,6 +166,11 @@ pub enum RunEvent {
         /// Why.
         departure: Departure,
     },
+    /// A worker was asked to end: it finishes what it executes and gets nothing more.
+    WorkerDraining {
+        /// Its number.
+        worker: WorkerId,
+    },
     /// A local worker process ended by itself.
     LocalWorkerEnded {
         /// Its process id.
@@ -225,6 +232,20 @@ pub enum RunEvent {
         worker: WorkerId,
         /// How many workers have died while they executed it.
         crashes: u32,
+    },
+    /// Workers have died while they executed this node, so from now on it runs alone.
+    NodeSuspected {
+        /// The node.
+        name: NodeName,
+        /// How many workers.
+        deaths: u32,
+    },
+    /// A slow node runs on a second worker as well.
+    NodeSpeculated {
+        /// The node.
+        name: NodeName,
+        /// The second worker.
+        worker: WorkerId,
     },
     /// A blob goes to a worker.
     BlobSent {

@@ -1,43 +1,20 @@
 //! The coordinator's state: the graph, who holds which node, who is a member. Data and questions; what changes it is in
 //! [`reactor`](crate::reactor).
 
-use std::collections::{BTreeMap, BTreeSet};
+mod members;
+mod pace;
+mod waiting;
+
+use std::collections::VecDeque;
 use std::time::Duration;
 
-use lookalike::graph::{BlobHash, Graph, NodeId, WorkerId};
+use lookalike::graph::{Blob, Graph, NodeId, WorkerId};
 
-use crate::comm::{Lease, NodeName, Site};
-
-/// How the coordinator treats workers and nodes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Policy {
-    /// A node fails once this many workers have died while they executed it.
-    pub node_crashes: u32,
-    /// How many leases a worker holds beyond its threads, so that it never waits for the next one.
-    pub spare_leases: usize,
-    /// A worker that was not heard of for this long is lost.
-    pub lost_after: Duration,
-    /// How long to wait for the first worker.
-    pub wait_for_workers: Duration,
-    /// How often to tell the user about it.
-    pub remind_every: Duration,
-    /// How long to wait for another worker after the last one was lost.
-    pub grace: Duration,
-}
-
-/// The defaults of design section 8.
-impl Default for Policy {
-    fn default() -> Self {
-        Self {
-            node_crashes: 3,
-            spare_leases: 2,
-            lost_after: Duration::from_secs(5),
-            wait_for_workers: Duration::from_mins(10),
-            remind_every: Duration::from_secs(30),
-            grace: Duration::from_mins(1),
-        }
-    }
-}
+pub(crate) use self::members::{Held, Member, Members};
+use self::pace::Pace;
+pub(crate) use self::waiting::{Place, Waiting};
+use crate::comm::{NodeName, Site};
+pub use crate::policy::Policy;
 
 /// What a run has cost, for people: nothing of it may reach a result.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -50,8 +27,14 @@ pub struct RunSummary {
     pub attempts: u64,
     /// How many nodes went back to the queue because their worker left.
     pub requeued_nodes: u64,
-    /// How many results came a second time, bit for bit the same.
+    /// How many results came a second time, bit for bit the same, without having been asked for.
     pub duplicate_results: u64,
+    /// How many nodes were given to a second worker because the first one was slow.
+    pub speculated_nodes: u64,
+    /// How many outputs were verified by running their node a second time.
+    pub verified_nodes: u64,
+    /// How often a node became a suspect, to be run alone.
+    pub suspected_nodes: u64,
     /// How many workers joined; one that reconnects counts again.
     pub workers_joined: u64,
     /// How many workers left before the end.
@@ -72,9 +55,17 @@ pub struct Core {
     pub(crate) graph: Graph,
     /// One per node of the graph.
     pub(crate) records: Vec<Record>,
-    /// Ready nodes that wait for a worker; the lowest number goes first.
-    pub(crate) queue: BTreeSet<NodeId>,
-    pub(crate) workers: BTreeMap<WorkerId, Member>,
+    pub(crate) waiting: Waiting,
+    pub(crate) members: Members,
+    pub(crate) pace: Pace,
+    /// When a node will be slow for which a worker has nothing else to do.
+    pub(crate) next_slow: Option<Duration>,
+    /// When a suspect's patience ends.
+    pub(crate) next_patience: Option<Duration>,
+    /// The worker that is being cleared for a suspect.
+    pub(crate) clearing: Option<WorkerId>,
+    /// The latest deaths of workers that no suspect explains: when, and what they executed.
+    pub(crate) unexplained: VecDeque<(Duration, Vec<NodeId>)>,
     /// Since when there is work but no worker.
     pub(crate) starving: Option<Starving>,
     /// How the last local worker ended, once none will be started again and no other can join.
@@ -83,25 +74,52 @@ pub struct Core {
 }
 
 /// What the coordinator knows of a node beside the graph.
-#[derive(Clone, Debug, Default)]
+#[derive(Debug, Default)]
 pub(crate) struct Record {
+    /// How often it was given out.
     pub(crate) attempts: u32,
-    pub(crate) crashes: u32,
-    pub(crate) holder: Option<Site>,
-    pub(crate) started_at: Option<Duration>,
+    pub(crate) place: Place,
+    /// Who has a lease of it: one worker, or two if one was slow.
+    pub(crate) holders: Vec<WorkerId>,
+    /// The coordinator runs it, since then.
+    pub(crate) here_since: Option<Duration>,
+    /// Under which time [`Pace`] watches it.
+    pub(crate) watched: Option<Duration>,
+    /// Whether its output has to come twice.
+    pub(crate) is_verified: bool,
+    /// The first of these two outputs.
+    pub(crate) candidate: Option<Box<Candidate>>,
     /// Where its output came from.
     pub(crate) finished_by: Option<Site>,
+    /// How often it has lost a worker that executed it, for whatever reason but a drain.
+    pub(crate) losses: u32,
+    pub(crate) deaths: Deaths,
 }
 
-/// A worker that has joined.
-#[derive(Clone, Debug)]
-pub(crate) struct Member {
-    pub(crate) threads: usize,
-    pub(crate) leases: BTreeMap<NodeId, Lease>,
-    pub(crate) executing: BTreeSet<NodeId>,
-    /// The inputs of every node it was ever given: what it may read. (One that was taken back may still be asked about.)
-    pub(crate) readable: BTreeSet<BlobHash>,
-    pub(crate) deadline: Duration,
+/// The deaths of workers that executed a node.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Deaths {
+    /// While they executed it, perhaps with others, or before it was a suspect.
+    pub(crate) in_company: u32,
+    /// While it had its worker for itself.
+    pub(crate) alone: u32,
+    /// While it had its worker for itself, when other workers died of something else.
+    pub(crate) excused: u32,
+}
+
+impl Deaths {
+    pub(crate) fn total(self) -> u32 {
+        self.in_company + self.alone + self.excused
+    }
+}
+
+/// An output that waits for its verification.
+#[derive(Debug)]
+pub(crate) struct Candidate {
+    pub(crate) site: Site,
+    pub(crate) attempt: u32,
+    pub(crate) output: Blob,
+    pub(crate) took: Duration,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -119,8 +137,13 @@ impl Core {
             epoch,
             graph: Graph::new(),
             records: Vec::new(),
-            queue: BTreeSet::new(),
-            workers: BTreeMap::new(),
+            waiting: Waiting::default(),
+            members: Members::new(policy.spare_leases),
+            pace: Pace::default(),
+            next_slow: None,
+            next_patience: None,
+            clearing: None,
+            unexplained: VecDeque::new(),
             starving: None,
             given_up: None,
             summary: RunSummary::default(),
@@ -150,7 +173,14 @@ impl Core {
     pub fn next_deadline(&self) -> Option<Duration> {
         let limit = self.starvation_limit();
         let starvation = self.starving.map(|starving| starving.next_reminder.min(starving.since + limit));
-        self.workers.values().map(|member| member.deadline).chain(starvation).min()
+        let delays = [self.members.next_deadline(), self.waiting.next_rested(), self.next_slow, self.next_patience];
+        delays.into_iter().flatten().chain(starvation).min()
+    }
+
+    /// Whether an answer to this attempt may come: it was given out. Any worker may bring it, because one that has lost its
+    /// connection comes back under another number.
+    pub(crate) fn was_given_out(&self, node: NodeId, attempt: u32) -> bool {
+        self.look(node).is_some_and(|record| (1..=record.attempts).contains(&attempt))
     }
 
     /// How long there may be work without a worker.
@@ -170,13 +200,71 @@ impl Core {
         self.records.get_mut(usize::try_from(node.0).ok()?)
     }
 
-    /// The member with free places that is least busy for its threads.
-    pub(crate) fn least_busy(&self, has_place: impl Fn(&Member) -> bool) -> Option<WorkerId> {
-        let free = self.workers.iter().filter(|(_, member)| has_place(member));
-        // leases_a / threads_a < leases_b / threads_b without a division; `min_by` takes the first of equals.
-        let load = |(_, a): &(&WorkerId, &Member), (_, b): &(&WorkerId, &Member)| {
-            (a.leases.len() * b.threads).cmp(&(b.leases.len() * a.threads))
+    /// The same, to look at.
+    pub(crate) fn look(&self, node: NodeId) -> Option<&Record> {
+        self.records.get(usize::try_from(node.0).ok()?)
+    }
+
+    /// Whether a node has to run alone.
+    pub(crate) fn is_suspect(&self, node: NodeId) -> bool {
+        self.look(node).is_some_and(|record| record.deaths.in_company >= self.policy.suspect_after)
+    }
+
+    /// Let a node wait in another place.
+    pub(crate) fn put(&mut self, node: NodeId, place: Place) {
+        if let Some(record) = self.record(node) {
+            let before = std::mem::replace(&mut record.place, place);
+            self.waiting.leave(node, before);
+            self.waiting.enter(node, place);
+        }
+    }
+
+    /// A worker gets a lease of a node.
+    pub(crate) fn give(&mut self, worker: WorkerId, node: NodeId, attempt: u32, now: Duration) {
+        let inputs = self.graph.input_blobs(node).unwrap_or_default();
+        let parameters = self.graph.spec(node).map_or(0, |spec| spec.parameters.len());
+        let bytes = parameters + inputs.len() * size_of::<[u8; 32]>();
+        self.members.change(worker, |member| {
+            member.give(node, attempt, bytes, now);
+            member.readable.extend(inputs.iter().map(Blob::hash));
+        });
+        if let Some(record) = self.record(node) {
+            record.holders.push(worker);
+        }
+        self.watch(node);
+    }
+
+    /// A lease ends.
+    pub(crate) fn end_lease(&mut self, worker: WorkerId, node: NodeId, now: Duration) -> Option<Held> {
+        let held = self.members.change(worker, |member| member.end(node, now)).flatten()?;
+        self.forget_holder(worker, node);
+        Some(held)
+    }
+
+    /// A worker that held a node does not any more.
+    pub(crate) fn forget_holder(&mut self, worker: WorkerId, node: NodeId) {
+        if let Some(record) = self.record(node) {
+            record.holders.retain(|holder| *holder != worker);
+        }
+        self.watch(node);
+    }
+
+    /// Watch the pace of a node that one worker executes and a second one might as well; forget that of any other.
+    pub(crate) fn watch(&mut self, node: NodeId) {
+        let wanted = match self.look(node).map(|record| record.holders.as_slice()) {
+            Some([holder]) if !self.is_suspect(node) => {
+                let member = self.members.get(*holder);
+                member.and_then(|member| member.leases.get(&node)).and_then(|held| held.started_at)
+            }
+            _ => None,
         };
-        free.min_by(load).map(|(worker, _)| *worker)
+        let Some(record) = self.record(node) else { return };
+        let watched = std::mem::replace(&mut record.watched, wanted);
+        if watched == wanted {
+            return;
+        }
+        let kind = self.graph.spec(node).map_or("", |spec| spec.kind.as_str());
+        watched.into_iter().for_each(|since| self.pace.forget(kind, since, node));
+        wanted.into_iter().for_each(|since| self.pace.watch(kind, since, node));
     }
 }

@@ -13,6 +13,7 @@ mod fitting;
 pub mod inputs;
 pub mod limits;
 mod outputs;
+pub mod policy;
 mod progress;
 pub mod reactor;
 mod rpc;

@@ -22,6 +22,9 @@ pub struct Limits {
     /// How many blobs a worker may have asked for without having taken them (default 65536: sixteen leases of the 4096 inputs that a
     /// node may have; those of a fit have dozens). What waits are references; a blob's bytes are in memory once.
     pub pending_blobs: usize,
+    /// How many bytes of messages may wait for a worker to read them (default 64 MiB); with more it is thrown out as too slow. Its
+    /// leases are given out such that one that reads never comes near.
+    pub queued_bytes: usize,
     /// How long a worker may take to close its end after the coordinator's last word (default 2 s).
     pub farewell_time: Duration,
 }
@@ -34,6 +37,7 @@ impl Default for Limits {
             connections: 4096,
             frame_bytes: MAX_FRAME_BYTES,
             pending_blobs: 1 << 16,
+            queued_bytes: 64 << 20,
             farewell_time: Duration::from_secs(2),
         }
     }

@@ -2,18 +2,25 @@
 //! no waiting: time comes in as an argument, and everything the coordinator does goes out through the [`Outbox`].
 //!
 //! Scheduling reacts to events: whenever a node is ready and a worker has a place, the lease is given at once. A lease may
-//! end without a result (its worker left) or be overtaken by the result of an earlier attempt; any attempt's result is as
+//! end without a result (its worker left) or be overtaken by the result of another attempt; any attempt's result is as
 //! good as another's, because nodes are pure functions. Results that differ show that one was not, and end the run.
+//!
+//! No event looks at all nodes or all workers: what has to be found among them is indexed in [`core`](crate::core).
+
+mod answers;
+mod membership;
+mod quarantine;
+mod schedule;
+mod speculation;
 
 use std::time::Duration;
 
 use lookalike::graph::{
-    Blob, BlobHash, Change, Completion, FailureReason, GraphEdit, NodeFailure, NodeId, NodeState, Placement, PlanError,
-    Planner, WorkerId,
+    Blob, BlobHash, Change, GraphEdit, NodeFailure, NodeId, NodeState, Placement, PlanError, Planner, WorkerId,
 };
 
-use crate::comm::{Action, Departure, Lease, Outbox, RunEvent, Site};
-use crate::core::{Core, Member, Record, Starving};
+use crate::comm::{Action, Departure, Outbox, RunEvent, Site};
+use crate::core::{Core, Place, Record, Starving};
 use crate::runner::RunError;
 
 /// Something that happened.
@@ -34,6 +41,11 @@ pub enum Event {
         worker: WorkerId,
         /// Why.
         departure: Departure,
+    },
+    /// A worker was asked to end: it finishes what it executes, and what it has not begun with it will not begin with.
+    WorkerDrains {
+        /// The worker.
+        worker: WorkerId,
     },
     /// A worker was heard of; it executes these nodes, done to so many thousandths.
     Heartbeat {
@@ -111,31 +123,31 @@ pub fn handle(
     outbox: &mut Outbox,
 ) -> Result<(), RunError> {
     match event {
-        Event::WorkerJoined { worker, threads, process } => join(core, worker, threads, process, now, outbox),
-        Event::WorkerLeft { worker, departure } => leave(core, worker, &departure, outbox),
+        Event::WorkerJoined { worker, threads, process } => {
+            membership::join(core, worker, threads, process, now, outbox);
+        }
+        Event::WorkerLeft { worker, departure } => membership::leave(core, worker, &departure, now, outbox),
+        Event::WorkerDrains { worker } => membership::drain(core, worker, now, outbox),
         Event::Heartbeat { worker, executing } => {
-            renew(core, worker, now);
-            for (node, permille) in executing.into_iter().filter(|(node, _)| holds(core, worker, *node)) {
-                outbox.tell(RunEvent::NodeProgress { node, permille });
+            membership::renew(core, worker, now);
+            for (node, permille) in executing {
+                if core.members.progress(worker, node, permille) {
+                    outbox.tell(RunEvent::NodeProgress { node, permille });
+                }
             }
         }
-        Event::Started { worker, node, attempt } => started(core, worker, node, attempt, now, outbox),
+        Event::Started { worker, node, attempt } => answers::started(core, worker, node, attempt, now, outbox),
         Event::Finished { site, node, attempt, output } => {
-            finished(core, (site, node, attempt), output, now, outbox)?;
+            answers::finished(core, (site, node, attempt), output, now, outbox)?;
         }
         Event::Failed { site, node, attempt, failure } => {
-            if answered(core, (site, node, attempt), now, outbox) && core.graph.is_open(node) {
-                retract(core, node, outbox);
-                core.graph.fail(node, FailureReason::Node(failure));
-            }
+            answers::failed(core, (site, node, attempt), failure, now, outbox)?;
         }
-        Event::BlobRequested { worker, hash } => send_blob(core, worker, hash, now, outbox),
+        Event::BlobRequested { worker, hash } => membership::send_blob(core, worker, hash, now, outbox),
         Event::LocalWorkersGivenUp { last_status } => core.given_up = Some(last_status),
         Event::DeadlinePassed => {
-            let is_due = |member: &Member| member.deadline <= now;
-            let silent: Vec<_> = core.workers.iter().filter(|(_, member)| is_due(member)).map(|(id, _)| *id).collect();
-            for worker in silent {
-                drop_worker(core, worker, &Departure::Silent, outbox);
+            while let Some(worker) = core.members.silent(now) {
+                membership::drop_worker(core, worker, &Departure::Silent, now, outbox);
             }
         }
     }
@@ -150,7 +162,7 @@ fn settle(core: &mut Core, planner: &mut impl Planner, now: Duration, outbox: &m
                 core.records.push(Record::default());
                 outbox.tell(RunEvent::NodeAdded { name: core.name(node) });
             }
-            Change::Ready(node) => make_ready(core, node, now, outbox),
+            Change::Ready(node) => make_ready(core, planner, node, now, outbox),
             Change::Completed(node) => {
                 core.summary.completed_nodes += 1;
                 if let Some(output) = core.graph.output(node).cloned() {
@@ -159,6 +171,7 @@ fn settle(core: &mut Core, planner: &mut impl Planner, now: Duration, outbox: &m
                 }
             }
             Change::Failed(node) => {
+                answers::retract(core, node, now, outbox);
                 core.summary.failed_nodes += 1;
                 if let Some(NodeState::Failed(reason)) = core.graph.state(node).cloned() {
                     outbox.tell(RunEvent::NodeFailed { name: core.name(node), reason: reason.clone() });
@@ -167,244 +180,40 @@ fn settle(core: &mut Core, planner: &mut impl Planner, now: Duration, outbox: &m
             }
         }
     }
-    schedule(core, outbox);
+    schedule::schedule(core, now, outbox);
     watch_starvation(core, now, outbox)
 }
 
 /// What the planner says of an output, with the name of whom it came from where that one did wrong.
-fn refused(core: &mut Core, node: NodeId, error: PlanError) -> RunError {
+fn refused(core: &Core, node: NodeId, error: PlanError) -> RunError {
     if !matches!(error, PlanError::NotVerified { .. } | PlanError::WrongOutput { .. }) {
         return RunError::Plan(error);
     }
-    let site = core.record(node).and_then(|record| record.finished_by).unwrap_or(Site::Coordinator);
+    let site = core.look(node).and_then(|record| record.finished_by).unwrap_or(Site::Coordinator);
     RunError::WrongResult { name: Box::new(core.name(node)), site, error }
 }
 
-fn make_ready(core: &mut Core, node: NodeId, now: Duration, outbox: &mut Outbox) {
-    let is_for_worker = core.graph.spec(node).is_none_or(|spec| spec.placement == Placement::Worker);
-    if is_for_worker {
-        core.queue.insert(node);
+fn make_ready(core: &mut Core, planner: &impl Planner, node: NodeId, now: Duration, outbox: &mut Outbox) {
+    let Some(spec) = core.graph.spec(node) else { return };
+    if spec.placement == Placement::Worker {
+        let is_verified = answers::is_chosen(core, spec, node) && planner.is_verified_by_repetition(spec);
+        core.record(node).into_iter().for_each(|record| record.is_verified = is_verified);
+        core.put(node, Place::Queue);
         return;
     }
     core.summary.attempts += 1;
     if let Some(record) = core.record(node) {
         record.attempts += 1;
-        record.holder = Some(Site::Coordinator);
-        record.started_at = Some(now);
+        record.here_since = Some(now);
         let attempt = record.attempts;
         outbox.push(Action::RunHere { node, attempt });
         outbox.tell(RunEvent::NodeStarted { name: core.name(node), site: Site::Coordinator });
     }
 }
 
-fn join(core: &mut Core, worker: WorkerId, threads: usize, process: u32, now: Duration, outbox: &mut Outbox) {
-    let deadline = now + core.policy.lost_after;
-    let threads = threads.max(1);
-    let (leases, executing, readable) = Default::default();
-    let member = Member { threads, leases, executing, readable, deadline };
-    core.workers.insert(worker, member);
-    core.summary.workers_joined += 1;
-    outbox.tell(RunEvent::WorkerJoined { worker, threads, process });
-}
-
-/// Take back what a worker held. The nodes it executed are suspects if it may have died of them.
-fn leave(core: &mut Core, worker: WorkerId, departure: &Departure, outbox: &mut Outbox) {
-    let Some(member) = core.workers.remove(&worker) else {
-        return;
-    };
-    core.summary.workers_left += 1;
-    outbox.tell(RunEvent::WorkerLeft { worker, departure: departure.clone() });
-    let crash_limit = core.policy.node_crashes;
-    for node in member.leases.into_keys() {
-        let is_suspect = departure.is_suspicious() && member.executing.contains(&node);
-        let Some(record) = core.record(node) else { continue };
-        record.holder = None;
-        record.started_at = None;
-        record.crashes += u32::from(is_suspect);
-        let crashes = record.crashes;
-        if is_suspect && crashes >= crash_limit {
-            core.graph.fail(node, FailureReason::Crashed { crashes });
-        } else {
-            core.queue.insert(node);
-            core.summary.requeued_nodes += 1;
-            outbox.tell(RunEvent::NodeRequeued { name: core.name(node), worker, crashes });
-        }
-    }
-}
-
-/// Throw a worker out.
-fn drop_worker(core: &mut Core, worker: WorkerId, departure: &Departure, outbox: &mut Outbox) {
-    if core.workers.contains_key(&worker) {
-        outbox.push(Action::Drop { worker });
-        leave(core, worker, departure, outbox);
-    }
-}
-
-/// A worker was heard of: its membership and its leases go on.
-fn renew(core: &mut Core, worker: WorkerId, now: Duration) {
-    let deadline = now + core.policy.lost_after;
-    if let Some(member) = core.workers.get_mut(&worker) {
-        member.deadline = deadline;
-        member.leases.values_mut().for_each(|lease| lease.deadline = deadline);
-    }
-}
-
-fn holds(core: &Core, worker: WorkerId, node: NodeId) -> bool {
-    core.workers.get(&worker).is_some_and(|member| member.leases.contains_key(&node))
-}
-
-fn started(core: &mut Core, worker: WorkerId, node: NodeId, attempt: u32, now: Duration, outbox: &mut Outbox) {
-    renew(core, worker, now);
-    let Some(member) = core.workers.get_mut(&worker) else { return };
-    // A lease that has ended or changed meanwhile: the message crossed ours.
-    if member.leases.get(&node).is_none_or(|lease| lease.attempt != attempt) || !member.executing.insert(node) {
-        return;
-    }
-    if let Some(record) = core.record(node) {
-        record.started_at = Some(now);
-    }
-    outbox.tell(RunEvent::NodeStarted { name: core.name(node), site: Site::Worker(worker) });
-}
-
-/// An answer: (where from, for which node, for which attempt).
-type Answer = (Site, NodeId, u32);
-
-fn finished(core: &mut Core, answer: Answer, output: Blob, now: Duration, outbox: &mut Outbox) -> Result<(), RunError> {
-    let (site, node, _) = answer;
-    if !answered(core, answer, now, outbox) {
-        return Ok(());
-    }
-    let bytes = output.len();
-    let hash = output.hash();
-    if matches!(site, Site::Worker(_)) {
-        core.summary.output_bytes_received += bytes as u64;
-    }
-    match core.graph.complete(node, output) {
-        Completion::Accepted => {
-            retract(core, node, outbox);
-            let record = core.record(node);
-            let started_at = record.and_then(|record| {
-                record.finished_by = Some(site);
-                record.started_at
-            });
-            let elapsed = started_at.map_or(Duration::ZERO, |started_at| now.saturating_sub(started_at));
-            outbox.tell(RunEvent::NodeFinished { name: core.name(node), site, bytes, elapsed });
-        }
-        Completion::Duplicate => core.summary.duplicate_results += 1,
-        // The node has failed before; the planner knows it, and nothing can be taken back.
-        Completion::Refused => {}
-        Completion::Different { first } => {
-            return Err(RunError::ResultsDiffer { name: Box::new(core.name(node)), site, first, second: hash });
-        }
-    }
-    Ok(())
-}
-
-/// An answer has come: its lease ends. Whether it is an answer to something that was asked; who answers anything else is
-/// thrown out.
-fn answered(core: &mut Core, (site, node, attempt): Answer, now: Duration, outbox: &mut Outbox) -> bool {
-    let was_asked = core.record(node).is_some_and(|record| (1..=record.attempts).contains(&attempt));
-    let Site::Worker(worker) = site else {
-        return was_asked;
-    };
-    if !was_asked {
-        let what = format!("it answered for {node}, attempt {attempt}, which was never given out");
-        drop_worker(core, worker, &Departure::Violation(what), outbox);
-        return false;
-    }
-    renew(core, worker, now);
-    if let Some(member) = core.workers.get_mut(&worker) {
-        if member.leases.remove(&node).is_some() {
-            member.executing.remove(&node);
-            if let Some(record) = core.record(node) {
-                record.holder = None;
-            }
-        }
-        outbox.push(Action::Acknowledge { worker, node, attempt });
-    }
-    true
-}
-
-/// Nobody needs to run this node any more.
-fn retract(core: &mut Core, node: NodeId, outbox: &mut Outbox) {
-    core.queue.remove(&node);
-    if let Some(Site::Worker(holder)) = core.record(node).and_then(|record| record.holder.take()) {
-        take_back(core, holder, node, outbox);
-    }
-}
-
-/// End a lease and tell its worker.
-fn take_back(core: &mut Core, worker: WorkerId, node: NodeId, outbox: &mut Outbox) {
-    if let Some(member) = core.workers.get_mut(&worker) {
-        member.executing.remove(&node);
-        if let Some(lease) = member.leases.remove(&node) {
-            outbox.push(Action::Cancel { worker, lease });
-        }
-    }
-}
-
-fn send_blob(core: &mut Core, worker: WorkerId, hash: BlobHash, now: Duration, outbox: &mut Outbox) {
-    renew(core, worker, now);
-    let Some(member) = core.workers.get(&worker) else { return };
-    let Some(blob) = core.graph.blob(hash).filter(|_| member.readable.contains(&hash)).cloned() else {
-        let what = format!("it asked for blob {hash}, which none of its nodes reads");
-        drop_worker(core, worker, &Departure::Violation(what), outbox);
-        return;
-    };
-    let bytes = blob.len();
-    core.summary.blobs_sent += 1;
-    core.summary.blob_bytes_sent += bytes as u64;
-    outbox.push(Action::SendBlob { worker, blob });
-    outbox.tell(RunEvent::BlobSent { worker, bytes });
-}
-
-/// Give out leases: the earliest ready node to the least busy worker, as long as there are both.
-fn schedule(core: &mut Core, outbox: &mut Outbox) {
-    let spare = core.policy.spare_leases;
-    while !core.queue.is_empty() {
-        let Some(worker) = core.least_busy(|member| member.leases.len() < member.threads + spare) else {
-            return;
-        };
-        if let Some(node) = core.queue.pop_first() {
-            assign(core, worker, node, outbox);
-        }
-    }
-    balance(core, outbox);
-}
-
-/// With nothing left in the queue, move nodes that merely wait on one worker to a worker with an idle thread.
-fn balance(core: &mut Core, outbox: &mut Outbox) {
-    while let Some(idle) = core.least_busy(|member| member.leases.len() < member.threads) {
-        let surplus = |member: &Member| member.leases.len().saturating_sub(member.threads);
-        let waiting = |member: &Member| member.leases.keys().rfind(|node| !member.executing.contains(node)).copied();
-        let busiest = core.workers.iter().filter(|(_, member)| surplus(member) > 0).max_by_key(|(_, m)| surplus(m));
-        let Some((from, node)) = busiest.and_then(|(worker, member)| Some((*worker, waiting(member)?))) else {
-            return;
-        };
-        take_back(core, from, node, outbox);
-        assign(core, idle, node, outbox);
-    }
-}
-
-fn assign(core: &mut Core, worker: WorkerId, node: NodeId, outbox: &mut Outbox) {
-    let epoch = core.epoch;
-    let Some(record) = core.record(node) else { return };
-    record.attempts += 1;
-    record.holder = Some(Site::Worker(worker));
-    let attempt = record.attempts;
-    core.summary.attempts += 1;
-    let inputs = core.graph.input_blobs(node).unwrap_or_default();
-    if let Some(member) = core.workers.get_mut(&worker) {
-        let lease = Lease { node, attempt, epoch, deadline: member.deadline };
-        member.leases.insert(node, lease);
-        member.readable.extend(inputs.iter().map(Blob::hash));
-        outbox.push(Action::Assign { worker, lease });
-    }
-}
-
 /// Work without a worker: remind the user, and give up after a while.
 fn watch_starvation(core: &mut Core, now: Duration, outbox: &mut Outbox) -> Result<(), RunError> {
-    if core.queue.is_empty() || !core.workers.is_empty() {
+    if core.waiting.is_empty() || !core.members.is_empty() {
         core.starving = None;
         return Ok(());
     }
@@ -429,5 +238,7 @@ fn watch_starvation(core: &mut Core, now: Duration, outbox: &mut Outbox) -> Resu
 
 #[cfg(test)]
 mod property_tests;
+#[cfg(test)]
+mod storm_tests;
 #[cfg(test)]
 mod tests;

@@ -4,7 +4,7 @@ use std::process::Command;
 use std::time::{Duration, SystemTime};
 
 use lookalike_coordinator::access::Credentials;
-use lookalike_coordinator::comm::{Departure, RunEvent};
+use lookalike_coordinator::comm::RunEvent;
 use lookalike_coordinator::core::Policy;
 use lookalike_coordinator::runner::{RunError, RunnerOptions};
 use lookalike_coordinator::spawn::WorkerCommand;
@@ -143,42 +143,6 @@ fn progress_of_a_node_in_the_coordinators_own_process_is_told_while_it_runs() {
     assert_eq!(told, 250);
     waiting.release();
     assert!(cluster.finish().0.is_some());
-}
-
-#[test]
-fn worker_that_is_asked_to_end_says_goodbye_and_is_not_held_against_its_node() {
-    let gate = Gate::new();
-    let cluster = Cluster::start(gates(&gate, 1), options(PROGRAM, 1));
-    let first = gate.next();
-    signal(first.process(), "TERM");
-    let departure = cluster.wait_for(|event| match event {
-        RunEvent::WorkerLeft { departure, .. } => Some(departure.clone()),
-        _ => None,
-    });
-    assert_eq!(departure, Departure::Goodbye);
-    let crashes = cluster.wait_for(|event| match event {
-        RunEvent::NodeRequeued { crashes, .. } => Some(*crashes),
-        _ => None,
-    });
-    assert_eq!(crashes, 0);
-    gate.next().release();
-    assert_eq!(cluster.finish().0, gates_reference(1));
-}
-
-#[test]
-fn worker_that_hangs_is_lost_after_its_lease() {
-    let gate = Gate::new();
-    let policy = Policy { lost_after: Duration::from_millis(700), ..Policy::default() };
-    let heartbeat = Duration::from_millis(100);
-    let cluster = Cluster::start(gates(&gate, 1), RunnerOptions { policy, heartbeat, ..options(PROGRAM, 2) });
-    let first = gate.next();
-    signal(first.process(), "STOP");
-    let second = gate.next();
-    assert_ne!(second.process(), first.process());
-    second.release();
-    assert_eq!(cluster.finish().0, gates_reference(1));
-    // The run has ended, and with it the process that could not end itself.
-    first.wait_for_death();
 }
 
 #[test]

@@ -13,6 +13,7 @@ mod cluster;
 mod compare;
 #[cfg(unix)]
 mod deploy;
+mod faults;
 mod fit;
 mod hostile;
 mod network;

@@ -4,25 +4,36 @@ use std::io;
 
 use tokio_util::sync::CancellationToken;
 
-/// A token that is cancelled when this process shall end: by SIGTERM or Ctrl-C, and with a leash by the end of stdin.
-pub(crate) fn watch_for_the_end(leash: bool) -> io::Result<CancellationToken> {
-    let token = CancellationToken::new();
-    let on_signal = token.clone();
+/// The wishes that this process shall end.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Wishes {
+    /// Cancelled by the first SIGTERM or Ctrl-C: finish what is begun, then end.
+    pub(crate) drain: CancellationToken,
+    /// Cancelled by the second, and with a leash by the end of stdin: end at once.
+    pub(crate) end: CancellationToken,
+}
+
+/// From now on, what asks this process to end is a wish.
+pub(crate) fn watch_for_the_end(leash: bool) -> io::Result<Wishes> {
+    let wishes = Wishes::default();
+    let Wishes { drain, end } = wishes.clone();
     let mut signals = EndSignals::listen()?;
     tokio::spawn(async move {
         signals.next().await;
-        on_signal.cancel();
+        drain.cancel();
+        signals.next().await;
+        end.cancel();
     });
     if leash {
-        let on_end = token.clone();
+        let end = wishes.end.clone();
         let watch = move || {
             // Nothing is ever written to this pipe; whatever ends it, even SIGKILL, the coordinator is gone.
             let _ = io::copy(&mut io::stdin().lock(), &mut io::sink());
-            on_end.cancel();
+            end.cancel();
         };
         std::thread::Builder::new().name("leash".into()).spawn(watch)?;
     }
-    Ok(token)
+    Ok(wishes)
 }
 
 /// The signals that ask a process to end: SIGTERM, and SIGINT, which is Ctrl-C.

@@ -21,6 +21,11 @@ pub struct Arguments {
     #[arg(long, value_name = "TIME", default_value = "10min", value_parser = humantime::parse_duration)]
     pub reconnect_for: Duration,
 
+    /// How long to finish what is being computed when asked to end by SIGTERM or Ctrl-C, before it goes to others; asked twice,
+    /// the worker ends at once [default: as the coordinator says, 30s]
+    #[arg(long, value_name = "TIME", value_parser = humantime::parse_duration)]
+    pub drain_time: Option<Duration>,
+
     /// Connect to this HOST:PORT instead of the access file's; for workers on the coordinator's own machine
     #[arg(long, value_name = "ADDR", hide = true)]
     pub address: Option<String>,
@@ -38,6 +43,7 @@ impl Arguments {
         WorkerOptions {
             threads,
             reconnect_for: self.reconnect_for,
+            drain_time: self.drain_time,
             address: self.address,
             leash: self.leash,
             ..WorkerOptions::new(self.access)
@@ -56,6 +62,8 @@ pub struct WorkerOptions {
     pub threads: NonZeroUsize,
     /// How long to try to reach the coordinator before giving up.
     pub reconnect_for: Duration,
+    /// How long to finish what executes when asked to end; `None`: as the coordinator says.
+    pub drain_time: Option<Duration>,
     /// End when stdin ends.
     pub leash: bool,
     /// How many bytes of blobs to keep beyond those that assigned nodes need.
@@ -73,6 +81,7 @@ impl WorkerOptions {
             address: None,
             threads: NonZeroUsize::MIN,
             reconnect_for: Duration::from_mins(10),
+            drain_time: None,
             leash: false,
             cached_blob_bytes: 256 << 20,
             decoded_blob_bytes: 128 << 20,

@@ -10,13 +10,12 @@ use tokio::net::TcpStream;
 use tokio::sync::Notify;
 use tokio::sync::mpsc::{UnboundedReceiver, UnboundedSender, unbounded_channel};
 use tokio::task::JoinHandle;
-use tokio::time::{Instant, sleep, timeout};
+use tokio::time::{Instant, sleep, sleep_until, timeout};
 use tokio_rustls::client::TlsStream;
-use tokio_util::sync::CancellationToken;
 use tracing::{debug, info, warn};
 
 use crate::cache::BlobCache;
-use crate::ending::watch_for_the_end;
+use crate::ending::{Wishes, watch_for_the_end};
 use crate::error::WorkerError;
 use crate::execute::{Completed, Executor};
 use crate::options::WorkerOptions;
@@ -32,17 +31,34 @@ const FAREWELL_TIME: Duration = Duration::from_secs(1);
 const FIRST_PAUSE: Duration = Duration::from_millis(100);
 /// The longest pause between two attempts.
 const LONGEST_PAUSE: Duration = Duration::from_secs(5);
+/// A connection that lasted this long was well; a shorter one makes the next pause longer.
+const STEADY_TIME: Duration = Duration::from_secs(10);
+/// How long to finish what executes while no coordinator has said it yet.
+const DRAIN_TIME: Duration = Duration::from_secs(30);
+/// For ever, for a process that shall end.
+const LONGEST_DRAIN: Duration = Duration::from_hours(24 * 365);
 
 /// Work until the coordinator ends the run or this process is asked to end.
 pub(crate) async fn run(options: &WorkerOptions, registry: Registry) -> Result<(), WorkerError> {
     let access = read_access(options)?;
     let address = options.address.clone().unwrap_or_else(|| access.address.clone());
-    let asked_to_end = watch_for_the_end(options.leash).map_err(WorkerError::Runtime)?;
+    let wishes = watch_for_the_end(options.leash).map_err(WorkerError::Runtime)?;
     let (completed_sender, completed) = unbounded_channel();
     let threads = options.threads;
     let executor = Executor::new(threads, registry, options.decoded_blob_bytes, completed_sender)?;
     let tasks = Tasks::new(threads.get(), BlobCache::new(options.cached_blob_bytes));
-    let mut session = Session { address, access, threads: threads.get(), asked_to_end, executor, completed, tasks };
+    let mut session = Session {
+        address,
+        access,
+        threads: threads.get(),
+        wishes,
+        own_drain_time: options.drain_time,
+        drain_time: options.drain_time.unwrap_or(DRAIN_TIME),
+        leave_by: None,
+        executor,
+        completed,
+        tasks,
+    };
     session.keep_connected(options.reconnect_for).await
 }
 
@@ -65,7 +81,12 @@ struct Session {
     address: String,
     access: Access,
     threads: usize,
-    asked_to_end: CancellationToken,
+    wishes: Wishes,
+    /// What this worker was told; it wins over what the coordinator says.
+    own_drain_time: Option<Duration>,
+    drain_time: Duration,
+    /// It drains, at most until then.
+    leave_by: Option<Instant>,
     executor: Executor,
     completed: UnboundedReceiver<Completed>,
     tasks: Tasks,
@@ -75,8 +96,9 @@ impl Session {
     async fn keep_connected(&mut self, patience: Duration) -> Result<(), WorkerError> {
         let mut without_since = Instant::now();
         let mut pause = FIRST_PAUSE;
-        loop {
-            let mut was_welcome = false;
+        let mut short_connections = 0;
+        while !self.may_leave() {
+            let (mut was_welcome, begin) = (false, Instant::now());
             let error = match self.connect_and_serve(&mut was_welcome).await {
                 Ok(Ended::RunOver | Ended::AskedToEnd) => return Ok(()),
                 Err(source) if source.is_final() => {
@@ -86,26 +108,47 @@ impl Session {
             };
             if was_welcome {
                 without_since = Instant::now();
-                pause = FIRST_PAUSE;
+                short_connections = if begin.elapsed() < STEADY_TIME { short_connections + 1 } else { 0 };
+                pause = (FIRST_PAUSE * 2_u32.pow(short_connections.clamp(1, 16) - 1)).min(LONGEST_PAUSE);
             }
             let after = without_since.elapsed();
             if after >= patience {
                 return Err(WorkerError::CoordinatorLost { address: self.address.clone(), after, source: error });
             }
             info!(address = %self.address, %error, ?pause, "without coordinator, trying again");
+            let wishes = self.wishes.clone();
             tokio::select! {
                 () = sleep(scattered(pause).min(patience - after)) => {}
-                () = self.asked_to_end.cancelled() => return Ok(()),
+                () = sleep_until_some(self.leave_by) => {}
+                () = wishes.drain.cancelled(), if self.leave_by.is_none() => self.begin_to_drain(),
+                () = wishes.end.cancelled() => return Ok(()),
             }
             pause = (pause * 2).min(LONGEST_PAUSE);
         }
+        Ok(())
+    }
+
+    /// From now on begin with nothing more, and leave when what was begun is done, or when there is no more time for it.
+    fn begin_to_drain(&mut self) {
+        self.leave_by = Some(Instant::now() + self.drain_time.min(LONGEST_DRAIN));
+        self.tasks.drain();
+        if !self.tasks.are_done() {
+            let seconds = self.drain_time.as_secs_f64();
+            warn!("asked to end: finishing what is being computed, for at most {seconds} s; ask again to end at once");
+        }
+    }
+
+    /// Whether this process was asked to end and nothing keeps it any more.
+    fn may_leave(&self) -> bool {
+        self.leave_by.is_some_and(|leave_by| self.tasks.are_done() || Instant::now() >= leave_by)
     }
 
     async fn connect_and_serve(&mut self, was_welcome: &mut bool) -> Result<Ended, WireError> {
-        let asked_to_end = self.asked_to_end.clone();
+        let wishes = self.wishes.clone();
         let (incoming, writer, welcome) = tokio::select! {
             greeted = timeout(GREETING_TIME, self.greet()) => greeted.map_err(|_| WireError::TimedOut)??,
-            () = asked_to_end.cancelled() => return Ok(Ended::AskedToEnd),
+            () = wishes.end.cancelled() => return Ok(Ended::AskedToEnd),
+            () = wishes.drain.cancelled(), if self.tasks.are_done() => return Ok(Ended::AskedToEnd),
         };
         *was_welcome = true;
         info!(address = %self.address, worker = welcome.worker, "joined");
@@ -113,6 +156,10 @@ impl Session {
         let heart = Arc::new(Notify::new());
         let heartbeat = start_heart(Duration::from_millis(welcome.heartbeat_ms.into()), Arc::clone(&heart));
         let mut connection = Connection { incoming, outgoing, announced, transfer: None };
+        self.drain_time = self.own_drain_time.unwrap_or(Duration::from_millis(welcome.drain_ms.into()));
+        if self.leave_by.is_some() {
+            self.act(&connection, vec![Action::Send(ToCoordinator::Draining)]);
+        }
         let actions = self.tasks.welcomed(welcome.run);
         self.act(&connection, actions);
         let ended = tokio::select! {
@@ -153,8 +200,8 @@ impl Session {
     }
 
     async fn serve(&mut self, connection: &mut Connection, heart: &Notify) -> Result<Ended, WireError> {
-        let asked_to_end = self.asked_to_end.clone();
-        loop {
+        let wishes = self.wishes.clone();
+        while !self.may_leave() && !wishes.end.is_cancelled() {
             let actions = tokio::select! {
                 received = connection.incoming.next() => match received?.ok_or(WireError::Ended)? {
                     Received::Message(ToWorker::Stop { reason }) => {
@@ -166,13 +213,17 @@ impl Session {
                 Some(serial) = connection.announced.recv() => self.tasks.announced(serial),
                 Some(completed) = self.completed.recv() => self.tasks.completed(completed, || self.executor.context()),
                 () = heart.notified() => vec![Action::Send(ToCoordinator::Heartbeat { executing: self.tasks.executing() })],
-                () = asked_to_end.cancelled() => {
-                    self.act(connection, vec![Action::Send(ToCoordinator::Goodbye)]);
-                    return Ok(Ended::AskedToEnd);
+                () = wishes.drain.cancelled(), if self.leave_by.is_none() => {
+                    self.begin_to_drain();
+                    vec![Action::Send(ToCoordinator::Draining)]
                 }
+                () = sleep_until_some(self.leave_by) => Vec::new(),
+                () = wishes.end.cancelled() => Vec::new(),
             };
             self.act(connection, actions);
         }
+        self.act(connection, vec![Action::Send(ToCoordinator::Goodbye)]);
+        Ok(Ended::AskedToEnd)
     }
 
     fn received(
@@ -281,6 +332,14 @@ fn start_writing(mut writer: Writer) -> (UnboundedSender<Outgoing>, UnboundedRec
         Ok(())
     });
     (outgoing, announced, writing)
+}
+
+/// Wait until then; for ever if there is no then.
+async fn sleep_until_some(then: Option<Instant>) {
+    match then {
+        Some(then) => sleep_until(then).await,
+        None => std::future::pending().await,
+    }
 }
 
 /// A pause of half to all of this length: many workers that lost one coordinator shall not all come back at the same time.

@@ -37,6 +37,8 @@ pub(crate) struct Tasks {
     tasks: BTreeMap<u64, Task>,
     /// Blobs that were asked for and have not come.
     fetching: BTreeSet<BlobHash>,
+    /// Nothing more begins.
+    is_draining: bool,
     /// Executions, by serial number, that use a thread: also those whose task is gone.
     running: BTreeSet<u64>,
     next_serial: u64,
@@ -72,6 +74,7 @@ impl Tasks {
             run: None,
             tasks: BTreeMap::new(),
             fetching: BTreeSet::new(),
+            is_draining: false,
             running: BTreeSet::new(),
             next_serial: 0,
         }
@@ -96,6 +99,17 @@ impl Tasks {
         self.tasks.values().filter_map(Task::answer).collect()
     }
 
+    /// This process shall end: begin with nothing more. What had not begun goes back to the coordinator.
+    pub(crate) fn drain(&mut self) {
+        self.is_draining = true;
+        self.tasks.retain(|_, task| !matches!(task.stage, Stage::Gathering { .. }));
+    }
+
+    /// Whether there is nothing that was begun and not acknowledged.
+    pub(crate) fn are_done(&self) -> bool {
+        self.tasks.is_empty()
+    }
+
     /// A node was assigned.
     pub(crate) fn assigned(&mut self, assignment: Assignment, new_context: impl Fn() -> RunContext) -> Vec<Action> {
         let lease = assignment.lease;
@@ -107,6 +121,10 @@ impl Tasks {
                 Stage::Answered(_) => task.answer().into_iter().collect(),
                 Stage::Gathering { .. } | Stage::Announcing(_) => Vec::new(),
             };
+        }
+        if self.is_draining {
+            // It crossed our word that we begin with nothing more, so it is given to another one.
+            return Vec::new();
         }
         let inputs: Vec<_> = assignment.inputs.iter().map(|hash| self.cache.get(BlobHash(*hash))).collect();
         let mut actions = Vec::new();

@@ -158,3 +158,20 @@ fn cancelled_node_is_not_answered_and_frees_its_thread() {
     let stopped = Completed { serial: serials[0], result: Err(NodeFailure::Cancelled) };
     assert_eq!(said(&tasks.completed(stopped, context)), ["announce 1.1"]);
 }
+
+#[test]
+fn draining_worker_finishes_what_it_began_and_begins_with_nothing_more() {
+    let mut tasks = tasks(1);
+    let actions = tasks.assigned(assignment(lease(0, 1), &[]), context);
+    tasks.assigned(assignment(lease(1, 1), &[]), context);
+    // The word that node 0 starts is under way: it counts as begun.
+    tasks.drain();
+    let serials = announce(&mut tasks, &actions);
+    assert!(!tasks.are_done());
+    assert!(tasks.assigned(assignment(lease(2, 1), &[]), context).is_empty());
+    assert_eq!(said(&tasks.completed(output(serials[0], 9), context)), ["output 0.1 9"]);
+    assert!(!tasks.are_done(), "the answer may be lost");
+    assert_eq!(said(&tasks.welcomed(RUN)), ["output 0.1 9"]);
+    tasks.acknowledged(lease(0, 1));
+    assert!(tasks.are_done());
+}

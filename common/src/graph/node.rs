@@ -114,7 +114,7 @@ pub enum FailureReason {
     Node(NodeFailure),
     /// Worker processes died while they executed it.
     #[error(
-        "{crashes} worker processes died while they executed it; see their last lines on stderr, \
+        "{crashes} worker processes died while they executed it and nothing else; see their last lines on stderr, \
          and whether memory ran out"
     )]
     Crashed {

@@ -32,6 +32,13 @@ pub trait Planner {
         let (kind, label) = graph.spec(node).map(|spec| (spec.kind.clone(), spec.label.clone())).unwrap_or_default();
         Err(PlanError::NodeFailed { kind, label, reason: reason.clone() })
     }
+
+    /// Whether a second run of this node would tell whether its output is right, for the share of nodes that a run verifies.
+    /// Not worth it where [`completed`](Self::completed) computes the output's claims again. By default every node.
+    fn is_verified_by_repetition(&self, spec: &NodeSpec) -> bool {
+        let _ = spec;
+        true
+    }
 }
 
 /// What a planner may do to a graph: add to it and read from it.

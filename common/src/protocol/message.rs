@@ -43,6 +43,9 @@ pub struct Welcome {
     pub epoch: u64,
     /// How often the worker shall tell that it lives, in milliseconds.
     pub heartbeat_ms: u32,
+    /// How long it may take to finish what it executes when it is asked to end, in milliseconds, unless it was told
+    /// otherwise.
+    pub drain_ms: u32,
 }
 
 /// A node to execute.
@@ -142,6 +145,9 @@ pub enum ToCoordinator {
     },
     /// I leave because I was asked to, not because of what I executed.
     Goodbye,
+    /// I was asked to end: I finish what I execute, as far as there is time, and begin with nothing more. What I have not said to
+    /// have started may go elsewhere.
+    Draining,
 }
 
 /// `text`, cut to [`MAX_MESSAGE_TEXT_BYTES`] at a character's edge.

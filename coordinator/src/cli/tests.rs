@@ -1,6 +1,7 @@
 //! Precedence, settings files and presets: argument lists in, settings or messages out.
 
 use super::{args::Command, parse};
+use crate::policy::{Policy, Speculation};
 use crate::settings::{
     CameraSpec, CompareSettings, CompressAtZero, DisplayExposure, FitSettings, Gammas, MetricKind, Samples, SearchKind,
     Start, Workers,
@@ -75,8 +76,8 @@ fn a_plain_fit_has_the_defaults_of_the_design() {
     assert_eq!((method.search, method.polish, method.seed), (SearchKind::LeastSquares, true, 0));
     assert_eq!((method.start, method.compress_at_zero), (Start::Scan, CompressAtZero::Tangent));
     assert_eq!(settings.cluster.workers, Workers::PerCore);
-    assert_eq!(settings.cluster.wait_for_workers, Duration::from_secs(600));
-    assert_eq!(settings.cluster.grace, Duration::from_secs(60));
+    assert_eq!(settings.cluster.policy.wait_for_workers, Duration::from_secs(600));
+    assert_eq!(settings.cluster.policy.grace, Duration::from_secs(60));
     assert_eq!((settings.cluster.listen, settings.cluster.access), (None, None));
 }
 
@@ -98,7 +99,7 @@ fn every_group_of_flags_reaches_the_settings() {
     assert_eq!((settings.max_cssim, settings.method.seed), (Some(0.1), 7));
     assert_eq!(settings.cluster.workers, Workers::Count(0));
     assert_eq!(settings.cluster.advertise.unwrap().to_string(), "node7:4101");
-    assert_eq!(settings.cluster.grace, Duration::from_secs(3600));
+    assert_eq!(settings.cluster.policy.grace, Duration::from_secs(3600));
     assert_eq!(settings.cluster.listen, Some(([10, 0, 0, 1], 4100).into()));
     // The access file says under which name workers reach the coordinator, so no other name is needed.
     let flags = ["--listen", "0.0.0.0:4100", "--access", "cluster.json"];
@@ -223,5 +224,55 @@ fn a_rendering_needs_exactly_one_material() {
     ] {
         let message = message(render(&format!("render --env g.hdr {flags}")));
         assert!(message.contains(phrase), "{flags}: {message}");
+    }
+}
+
+#[test]
+fn policy_has_one_meaning_as_flags_in_a_file_and_by_default() {
+    assert_eq!(fit(&PLAIN).unwrap().cluster.policy, Policy::default());
+    let flags = [
+        "--heartbeat=200ms",
+        "--lost-after=2s",
+        "--spare-leases=0",
+        "--suspect-after=1",
+        "--node-crashes=7",
+        "--speculate=3.5",
+        "--speculate-after=9s",
+        "--verify-fraction=0.25",
+        "--drain-time=4min",
+    ];
+    let policy = fit(&[&PLAIN[..], &flags].concat()).unwrap().cluster.policy;
+    let expected = Policy {
+        heartbeat: Duration::from_millis(200),
+        lost_after: Duration::from_secs(2),
+        spare_leases: 0,
+        suspect_after: 1,
+        node_crashes: 7,
+        speculation: Speculation { factor: Some(3.5), after: Duration::from_secs(9) },
+        verify_fraction: 0.25,
+        drain_time: Duration::from_mins(4),
+        ..Policy::default()
+    };
+    assert_eq!(policy, expected);
+    let toml =
+        "photo = \"b.exr\"\nenv = \"g.hdr\"\nout = \"run\"\nspeculate = false\nverify-fraction = 1\nnode_crashes = 2\n";
+    let file = Settings::new("policy", toml);
+    let policy = fit(&["fit", &file.file()]).unwrap().cluster.policy;
+    assert_eq!((policy.speculation.factor, policy.verify_fraction, policy.node_crashes), (None, 1.0, 2));
+}
+
+#[test]
+fn policy_that_makes_no_sense_is_refused_by_name() {
+    for (flag, expected) in [
+        ("--heartbeat=4s", "--lost-after: expected at least two heartbeats, 8s, found 5s"),
+        ("--verify-fraction=1.5", "--verify-fraction: expected a number from 0 to 1, found 1.5"),
+        ("--verify-fraction=-1", "from 0 to 1, found -1"),
+        ("--speculate=0.5", "a factor of at least 1, found 0.5"),
+        ("--speculate=maybe", "expected on, off, or a factor"),
+        ("--node-crashes=0", "--node-crashes: expected 1 or more"),
+        ("--lost-after=soon", "--lost-after"),
+    ] {
+        let error = message(fit(&[&PLAIN[..], &[flag]].concat()));
+        assert!(error.contains(expected), "{flag}: {error}");
     }
 }

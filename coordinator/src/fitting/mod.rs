@@ -100,8 +100,8 @@ fn run_graph(
     options.access = job.cluster.access.clone();
     options.advertise = job.cluster.advertise.as_ref().map(ToString::to_string);
     options.log.clone_from(&job.cluster.log);
-    options.policy.wait_for_workers = job.cluster.wait_for_workers;
-    options.policy.grace = job.cluster.grace;
+    options.policy = job.cluster.policy;
+    options.policy.verify_seed = job.settings.seed;
     let runtime = tokio::runtime::Builder::new_multi_thread()
         .worker_threads(2)
         .enable_all()

@@ -1,5 +1,5 @@
-//! Whatever workers do, in whatever order: every node is completed or fails by name, its planner is told once, and nothing
-//! is lost or held twice.
+//! Whatever workers do, in whatever order: every node is completed or fails by name, its planner is told once, nothing is lost,
+//! nobody holds more than it may, and no index of the state is stale.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
@@ -11,30 +11,56 @@ use super::tests::{Script, node};
 use super::{Event, handle, start};
 use crate::comm::{Action, Departure, Outbox, Site};
 use crate::core::{Core, Policy};
+use crate::policy::Speculation;
+use lookalike::graph::FailureReason;
 
 /// One thing that the outside world does. Numbers choose among what is there, modulo.
 #[derive(Clone, Debug)]
 enum Deed {
-    Join { threads: usize },
-    Leave { worker: usize, departure: u8 },
-    Begin { worker: usize, lease: usize },
-    Answer { worker: usize, lease: usize, again: bool },
-    LateAnswer { lease: usize },
-    Fetch { worker: usize },
-    PassTime { seconds: u64 },
+    Join {
+        threads: usize,
+    },
+    Leave {
+        worker: usize,
+        departure: u8,
+    },
+    Begin {
+        worker: usize,
+        lease: usize,
+    },
+    Answer {
+        worker: usize,
+        lease: usize,
+        again: bool,
+    },
+    LateAnswer {
+        lease: usize,
+    },
+    Fetch {
+        worker: usize,
+    },
+    Drain {
+        worker: usize,
+    },
+    /// Time passes; who is not heard of is lost.
+    PassTime {
+        milliseconds: u64,
+        heard: u8,
+    },
     RunHere,
 }
 
 fn deed() -> impl Strategy<Value = Deed> {
     prop_oneof![
         2 => (1..4_usize).prop_map(|threads| Deed::Join { threads }),
-        1 => (0..9_usize, 0..4_u8).prop_map(|(worker, departure)| Deed::Leave { worker, departure }),
+        1 => (0..9_usize, 0..5_u8).prop_map(|(worker, departure)| Deed::Leave { worker, departure }),
         4 => (0..9_usize, 0..9_usize).prop_map(|(worker, lease)| Deed::Begin { worker, lease }),
         6 => (0..9_usize, 0..9_usize, any::<bool>())
             .prop_map(|(worker, lease, again)| Deed::Answer { worker, lease, again }),
         2 => (0..99_usize).prop_map(|lease| Deed::LateAnswer { lease }),
         1 => (0..9_usize).prop_map(|worker| Deed::Fetch { worker }),
-        1 => (0..3_u64).prop_map(|seconds| Deed::PassTime { seconds }),
+        1 => (0..9_usize).prop_map(|worker| Deed::Drain { worker }),
+        2 => (0..4000_u64, any::<u8>()).prop_map(|(milliseconds, heard)| Deed::PassTime { milliseconds, heard }),
         2 => Just(Deed::RunHere),
     ]
 }
@@ -46,6 +72,9 @@ struct World {
     outbox: Outbox,
     now: Duration,
     connected: BTreeMap<WorkerId, BTreeMap<NodeId, u32>>,
+    executing: BTreeSet<(WorkerId, NodeId)>,
+    /// How often an innocent node was hit by a death from outside.
+    hits: BTreeMap<NodeId, u32>,
     /// Every lease ever given out.
     ever: Vec<(NodeId, u32)>,
     here: BTreeSet<(NodeId, u32)>,
@@ -54,6 +83,13 @@ struct World {
 
 /// Nodes whose number is divisible by this have an application error instead of an output.
 const FAILS_EVERY: u64 = 7;
+
+/// Nodes whose number is divisible by this kill whoever executes them.
+const KILLS_EVERY: u64 = 5;
+
+fn kills(node: NodeId) -> bool {
+    node.0 > 0 && node.0.is_multiple_of(KILLS_EVERY) && !node.0.is_multiple_of(FAILS_EVERY)
+}
 
 impl World {
     fn new(shape: &[(usize, bool)]) -> Self {
@@ -70,13 +106,22 @@ impl World {
         let planner = Script { nodes, blob, follow_up, tolerates_failures: true, ..Script::default() };
         // Time passes, but not so much that the run gives up for want of workers.
         let patient = Duration::from_secs(1_000_000);
-        let policy = Policy { wait_for_workers: patient, grace: patient, ..Policy::default() };
+        let speculation = Speculation { factor: Some(1.0), after: Duration::from_secs(1) };
+        let policy = Policy {
+            wait_for_workers: patient,
+            grace: patient,
+            speculation,
+            verify_fraction: 0.5,
+            ..Policy::default()
+        };
         let mut world = Self {
             core: Core::new(policy, 1),
             planner,
             outbox: Outbox::default(),
             now: Duration::ZERO,
             connected: BTreeMap::new(),
+            executing: BTreeSet::new(),
+            hits: BTreeMap::new(),
             ever: Vec::new(),
             here: BTreeSet::new(),
             next_worker: 1,
@@ -102,33 +147,69 @@ impl World {
                 }
                 Action::Cancel { worker, lease } => {
                     let attempt = self.connected.get_mut(&worker).and_then(|leases| leases.remove(&lease.node));
+                    self.executing.remove(&(worker, lease.node));
                     assert_eq!(attempt, Some(lease.attempt), "cancelled what was not given");
                 }
-                Action::Drop { worker } => _ = self.connected.remove(&worker),
+                Action::Drop { worker } => self.disconnect(worker),
                 Action::RunHere { node, attempt } => assert!(self.here.insert((node, attempt))),
                 Action::SendBlob { .. } | Action::Acknowledge { .. } | Action::Tell(_) => {}
             }
         }
     }
 
-    /// Each ready node for workers is queued or held by exactly one connected worker, and we agree with the core who.
+    /// Each ready node for workers waits in one place or is held by one or two connected workers, and we agree with the core who.
     fn check(&self) {
         let graph = self.core.graph();
         for index in 0..graph.len() as u64 {
             let node = NodeId(index);
             let is_for_workers = graph.spec(node).is_some_and(|spec| spec.placement == Placement::Worker);
-            let holders = self.connected.values().filter(|leases| leases.contains_key(&node)).count();
-            let places = holders + usize::from(self.core.queue.contains(&node));
-            let expected = usize::from(is_for_workers && graph.state(node) == Some(&NodeState::Ready));
-            assert_eq!(places, expected, "{node} in state {:?}", graph.state(node));
+            let is_ready = is_for_workers && graph.state(node) == Some(&NodeState::Ready);
+            let holders: Vec<_> = self.connected.iter().filter(|(_, leases)| leases.contains_key(&node)).collect();
+            let places = self.core.waiting.places(node);
+            let state = graph.state(node);
+            assert_eq!(places, usize::from(is_ready && holders.is_empty()), "{node} in state {state:?}");
+            assert!(holders.len() <= if is_ready { 2 } else { 0 }, "{node} in state {state:?} is held by {holders:?}");
+            let record = &self.core.records[usize::try_from(index).unwrap()];
+            assert_eq!(
+                record.holders.iter().copied().collect::<BTreeSet<_>>(),
+                holders.iter().map(|(id, _)| **id).collect()
+            );
         }
         for (worker, leases) in &self.connected {
-            let member = &self.core.workers[worker];
+            let member = self.core.members.get(*worker).unwrap();
             assert!(leases.len() <= member.threads + self.core.policy.spare_leases);
             assert!(leases.keys().eq(member.leases.keys()));
-            assert!(
-                member.leases.values().all(|lease| lease.deadline == member.deadline && lease.deadline >= self.now)
-            );
+            let executing = leases.keys().filter(|node| self.executing.contains(&(*worker, **node)));
+            assert_eq!(executing.count(), member.executing());
+            assert!(!member.is_draining || member.waiting.is_empty());
+            assert!(member.alone_with.is_none_or(|node| leases.keys().eq([&node])), "{leases:?} beside a suspect");
+        }
+        self.core.members.check();
+    }
+
+    fn disconnect(&mut self, worker: WorkerId) {
+        self.connected.remove(&worker);
+        self.executing.retain(|(other, _)| *other != worker);
+    }
+
+    /// A worker dies of what it executes, or is killed.
+    fn lose(&mut self, worker: WorkerId, departure: Departure) {
+        if departure.is_suspicious() {
+            let hit = self.executing.iter().filter(|(other, node)| *other == worker && !kills(*node));
+            hit.for_each(|(_, node)| *self.hits.entry(*node).or_default() += 1);
+        }
+        self.disconnect(worker);
+        self.tell(Event::WorkerLeft { worker, departure });
+    }
+
+    fn begin(&mut self, worker: WorkerId, (node, attempt): (NodeId, u32)) {
+        if self.core.members.get(worker).is_some_and(|member| member.executing() >= member.threads) {
+            return;
+        }
+        self.executing.insert((worker, node));
+        self.tell(Event::Started { worker, node, attempt });
+        if kills(node) {
+            self.lose(worker, Departure::Lost);
         }
     }
 
@@ -143,7 +224,14 @@ impl World {
 
     fn answer(&mut self, site: Site, (node, attempt): (NodeId, u32)) {
         if let Site::Worker(worker) = site {
-            self.connected.get_mut(&worker).and_then(|leases| leases.remove(&node));
+            if kills(node) {
+                return;
+            }
+            let leases = self.connected.get_mut(&worker);
+            if let Some(leases) = leases.filter(|leases| leases.get(&node) == Some(&attempt)) {
+                leases.remove(&node);
+                self.executing.remove(&(worker, node));
+            }
         }
         self.tell(if node.0.is_multiple_of(FAILS_EVERY) && node.0 > 0 {
             Event::Failed { site, node, attempt, failure: NodeFailure::new("asked to") }
@@ -164,16 +252,15 @@ impl World {
             Deed::Join { threads } => self.join(threads),
             Deed::Leave { worker, departure } => {
                 let Some(worker) = self.chosen(worker) else { return };
-                self.connected.remove(&worker);
                 let violation = Departure::Violation("test".into());
-                let departures = [Departure::Lost, Departure::Silent, Departure::Goodbye, violation];
-                let departure = departures[usize::from(departure)].clone();
-                self.tell(Event::WorkerLeft { worker, departure });
+                let departures =
+                    [Departure::Lost, Departure::Silent, Departure::Goodbye, Departure::TooSlow, violation];
+                self.lose(worker, departures[usize::from(departure)].clone());
             }
             Deed::Begin { worker, lease } => {
                 let Some(worker) = self.chosen(worker) else { return };
-                let Some((node, attempt)) = self.lease_of(worker, lease) else { return };
-                self.tell(Event::Started { worker, node, attempt });
+                let Some(lease) = self.lease_of(worker, lease) else { return };
+                self.begin(worker, lease);
             }
             Deed::Answer { worker, lease, again } => {
                 let Some(worker) = self.chosen(worker) else { return };
@@ -193,12 +280,18 @@ impl World {
                 let Some(worker) = self.chosen(worker) else { return };
                 self.tell(Event::BlobRequested { worker, hash: BlobHash::of(&[1, 2, 3]) });
             }
-            Deed::PassTime { seconds } => {
-                self.now += Duration::from_secs(seconds);
-                let due = self.core.next_deadline().is_some_and(|deadline| deadline <= self.now);
-                if due {
-                    self.tell(Event::DeadlinePassed);
-                }
+            Deed::Drain { worker } => {
+                let Some(worker) = self.chosen(worker) else { return };
+                let begun = |node: &NodeId| self.executing.contains(&(worker, *node));
+                let kept = self.connected[&worker].iter().filter(|(node, _)| begun(node));
+                let kept = kept.map(|(node, attempt)| (*node, *attempt)).collect();
+                self.connected.insert(worker, kept);
+                self.tell(Event::WorkerDrains { worker });
+            }
+            Deed::PassTime { milliseconds, heard } => {
+                self.now += Duration::from_millis(milliseconds);
+                let heard = self.connected.keys().copied().filter(|worker| heard >> (worker.0 % 8) & 1 == 1);
+                self.pass(heard.collect());
             }
             Deed::RunHere => {
                 if let Some(run) = self.here.pop_first() {
@@ -208,41 +301,83 @@ impl World {
         }
     }
 
-    /// From now on one loyal worker answers everything.
+    /// These workers are heard of, and then the time is looked at.
+    fn pass(&mut self, heard: Vec<WorkerId>) {
+        for worker in heard {
+            self.tell(Event::Heartbeat { worker, executing: Vec::new() });
+        }
+        if self.core.next_deadline().is_some_and(|deadline| deadline <= self.now) {
+            self.tell(Event::DeadlinePassed);
+            let next = self.core.next_deadline();
+            assert!(next.is_none_or(|next| next > self.now), "{next:?} is not after {:?}", self.now);
+        }
+    }
+
+    /// From now on two loyal workers, and as many new ones as it takes, execute everything in order, and time passes when there
+    /// is nothing to do.
     fn finish(&mut self) {
         for worker in self.connected.keys().copied().collect::<Vec<_>>() {
-            self.connected.remove(&worker);
-            self.tell(Event::WorkerLeft { worker, departure: Departure::Goodbye });
+            self.lose(worker, Departure::Goodbye);
         }
-        self.join(2);
-        let loyal = self.chosen(0).expect("it has just joined");
+        let mut idle_rounds = 0;
         while !self.core.is_finished() {
+            while self.connected.len() < 2 {
+                self.join(2);
+            }
             let here = self.here.pop_first();
-            let lease = self.lease_of(loyal, 0);
-            assert!(here.is_some() || lease.is_some(), "the run hangs: {:?}", self.core);
             here.into_iter().for_each(|run| self.answer(Site::Coordinator, run));
-            lease.filter(|(node, _)| self.core.graph().is_open(*node)).into_iter().for_each(|lease| {
-                self.answer(Site::Worker(loyal), lease);
+            let lease = (0..2).find_map(|index| {
+                let worker = self.chosen(index)?;
+                Some((worker, self.lease_of(worker, 0)?))
             });
+            if let Some((worker, lease)) = lease {
+                self.begin(worker, lease);
+                if self.connected.contains_key(&worker) && self.core.graph().is_open(lease.0) {
+                    self.answer(Site::Worker(worker), lease);
+                }
+            }
+            if here.is_some() || lease.is_some() {
+                idle_rounds = 0;
+                continue;
+            }
+            idle_rounds += 1;
+            assert!(idle_rounds < 100, "the run hangs: {:?}", self.core);
+            self.now = self.core.next_deadline().expect("something to wait for").max(self.now);
+            self.pass(self.connected.keys().copied().collect());
         }
     }
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 300, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: 2000, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
     fn every_node_completes_or_fails_by_name(
         shape in prop::collection::vec((0..6_usize, prop::bool::weighted(0.2)), 1..20),
-        deeds in prop::collection::vec(deed(), 0..120),
+        deeds in prop::collection::vec(deed(), 0..150),
     ) {
         let mut world = World::new(&shape);
         deeds.into_iter().for_each(|deed| world.act(deed));
         world.finish();
         let told: BTreeSet<_> = world.planner.completed.iter().copied().collect();
-        let failed: BTreeSet<_> = world.planner.failed.iter().map(|(node, _)| *node).collect();
+        let failed: BTreeMap<_, _> = world.planner.failed.iter().cloned().collect();
         prop_assert_eq!(told.len() + failed.len(), world.planner.completed.len() + world.planner.failed.len());
-        prop_assert!(told.is_disjoint(&failed));
+        prop_assert!(told.iter().all(|node| !failed.contains_key(node)));
         prop_assert_eq!(told.len() + failed.len(), world.core.graph().len());
+        let policy = world.core.policy;
+        for index in 0..world.core.graph().len() as u64 {
+            let node = NodeId(index);
+            let is_here = world.core.graph().spec(node).is_some_and(|spec| spec.placement == Placement::Coordinator);
+            let hits = world.hits.get(&node).copied().unwrap_or(0);
+            match failed.get(&node) {
+                Some(FailureReason::Crashed { crashes }) => {
+                    prop_assert_eq!(*crashes, policy.node_crashes);
+                    prop_assert!(kills(node) || hits >= policy.suspect_after + policy.node_crashes, "{} hits", hits);
+                }
+                Some(FailureReason::Node(_)) => prop_assert!(index > 0 && index.is_multiple_of(FAILS_EVERY)),
+                Some(_) => {}
+                None => prop_assert!(is_here || !kills(node), "{} cannot have completed", node),
+            }
+        }
     }
 }

@@ -1,31 +1,39 @@
 //! A worker's connection, from its hello to its end.
 
+use std::io;
 use std::net::SocketAddr;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::Duration;
 
 use lookalike::graph::{BlobHash, NodeFailure, NodeId, WorkerId};
-use lookalike::protocol::{FailureKind, IncomingBlob, LeaseName, ToCoordinator, ToWorker, Welcome, bounded_text};
+use lookalike::protocol::{
+    FailureKind, IncomingBlob, LeaseName, PART_BYTES, ToCoordinator, ToWorker, Welcome, bounded_text,
+};
 use lookalike_worker::wire::{Incoming, Received, WireError, send_message, send_parts};
 use tokio::io::{AsyncWriteExt, ReadHalf, WriteHalf};
-use tokio::sync::mpsc::{Sender, UnboundedReceiver, unbounded_channel};
+use tokio::sync::mpsc::Sender;
+use tokio::sync::oneshot;
 use tokio::time::timeout;
 use tracing::info;
 
+use super::mailbox::{Patient, Postman, mailbox};
 use super::{Connection, Gate, Greeted, Inbound, Outgoing};
 use crate::comm::{Departure, Site};
 use crate::reactor::Event;
+
+/// How many bytes of small outputs a worker may send before it is asked for how many the reactor has taken (8 MiB).
+const UNASKED_BYTES: u64 = 8 << 20;
 
 /// Serve a worker to its end.
 pub(super) async fn serve(greeted: Greeted, worker: WorkerId, peer: SocketAddr, gate: &Gate) {
     let Greeted { incoming, writer, hello } = greeted;
     info!(%worker, %peer, process = hello.process, build = bounded_text(&hello.build), "joined");
-    let (outgoing, queue) = unbounded_channel();
-    let heartbeat_ms = u32::try_from(gate.heartbeat.as_millis()).unwrap_or(u32::MAX).max(1);
-    let welcome = Welcome { worker: worker.0, run: gate.run, epoch: gate.epoch, heartbeat_ms };
-    // The receiver is alive: it is ours.
-    let _ = outgoing.send(Outgoing::Message(ToWorker::Welcome(welcome)));
-    if gate.inbound.send(Inbound::Joined { worker, hello, outgoing }).await.is_err() {
+    let (mailbox, postman) = mailbox(gate.limits.queued_bytes);
+    let (heartbeat_ms, drain_ms) = (milliseconds(gate.policy.heartbeat), milliseconds(gate.policy.drain_time));
+    let welcome = Welcome { worker: worker.0, run: gate.run, epoch: gate.epoch, heartbeat_ms, drain_ms };
+    mailbox.send(Outgoing::Message(ToWorker::Welcome(welcome)));
+    if gate.inbound.send(Inbound::Joined { worker, hello, mailbox }).await.is_err() {
         return;
     }
     let pending_blobs = Arc::new(AtomicUsize::new(0));
@@ -33,16 +41,23 @@ pub(super) async fn serve(greeted: Greeted, worker: WorkerId, peer: SocketAddr, 
         worker,
         incoming,
         output: None,
+        unasked_bytes: 0,
         pending_blobs: Arc::clone(&pending_blobs),
         max_pending_blobs: gate.limits.pending_blobs,
         inbound: gate.inbound.clone(),
     };
     let mut reading = std::pin::pin!(reader.read_to_the_end());
+    let (overflowing, closed) = (postman.overflowing(), postman.closed());
+    let writer = Patient::new(writer, gate.policy.lost_after);
     let departure = tokio::select! {
         departure = &mut reading => departure,
-        written = write(writer, queue, &pending_blobs) => match written {
+        () = overflowing => Departure::TooSlow,
+        // Thrown out: whoever did it knows.
+        () = closed => return,
+        written = write(writer, postman, &pending_blobs) => match written {
             // We have said our last word: let the worker say its own, so that closing does not destroy ours.
             Ok(()) => timeout(gate.limits.farewell_time, reading).await.unwrap_or(Departure::Lost),
+            Err(WireError::Stream(error)) if error.kind() == io::ErrorKind::TimedOut => Departure::TooSlow,
             Err(error) => departure_of(&error),
         },
     };
@@ -53,11 +68,11 @@ pub(super) async fn serve(greeted: Greeted, worker: WorkerId, peer: SocketAddr, 
 }
 
 async fn write(
-    mut writer: WriteHalf<Connection>,
-    mut queue: UnboundedReceiver<Outgoing>,
+    mut writer: Patient<WriteHalf<Connection>>,
+    mut postman: Postman,
     pending_blobs: &AtomicUsize,
 ) -> Result<(), WireError> {
-    while let Some(next) = queue.recv().await {
+    while let Some(next) = postman.next().await {
         match next {
             Outgoing::Message(message) => send_message(&mut writer, &message).await?,
             Outgoing::Blob(blob) => {
@@ -72,6 +87,10 @@ async fn write(
     Ok(())
 }
 
+fn milliseconds(time: Duration) -> u32 {
+    u32::try_from(time.as_millis()).unwrap_or(u32::MAX).max(1)
+}
+
 fn departure_of(error: &WireError) -> Departure {
     if error.is_violation() { Departure::Violation(error.to_string()) } else { Departure::Lost }
 }
@@ -82,6 +101,8 @@ struct Reader {
     incoming: Incoming<ReadHalf<Connection>>,
     /// The output that is being received.
     output: Option<(LeaseName, IncomingBlob)>,
+    /// The announced lengths of outputs since the last question.
+    unasked_bytes: u64,
     pending_blobs: Arc<AtomicUsize>,
     max_pending_blobs: usize,
     inbound: Sender<Inbound>,
@@ -93,7 +114,7 @@ impl Reader {
             let event = match self.incoming.next().await {
                 Ok(None) => return Departure::Lost,
                 Ok(Some(Received::Message(ToCoordinator::Goodbye))) => return Departure::Goodbye,
-                Ok(Some(received)) => self.event(received),
+                Ok(Some(received)) => self.event(received).await,
                 Err(error) => Err(error),
             };
             match event {
@@ -105,7 +126,7 @@ impl Reader {
         }
     }
 
-    fn event(&mut self, received: Received<ToCoordinator>) -> Result<Event, WireError> {
+    async fn event(&mut self, received: Received<ToCoordinator>) -> Result<Event, WireError> {
         let worker = self.worker;
         let site = Site::Worker(worker);
         let message = match received {
@@ -137,6 +158,7 @@ impl Reader {
                     return Err(unexpected("the rest of an output", "another output"));
                 }
                 self.output = Some((lease, IncomingBlob::begin(BlobHash(hash), length)?));
+                self.ask_before(lease, length).await?;
                 return self.output_or_life();
             }
             ToCoordinator::Failed { lease, kind, message } => {
@@ -148,8 +170,29 @@ impl Reader {
                 };
                 Event::Failed { site, node: NodeId(lease.node), attempt: lease.attempt, failure }
             }
+            ToCoordinator::Draining => Event::WorkerDrains { worker },
             ToCoordinator::Hello(_) | ToCoordinator::Goodbye => return Err(unexpected("work", "a greeting")),
         })
+    }
+
+    /// Before much is received, ask whether anybody wants it. The answer also tells that what came before has been taken: at most
+    /// one large output of a worker is in memory without being kept. What fits into one frame is here already.
+    async fn ask_before(&mut self, lease: LeaseName, length: u64) -> Result<(), WireError> {
+        self.unasked_bytes = self.unasked_bytes.saturating_add(length);
+        if length <= PART_BYTES as u64 && self.unasked_bytes <= UNASKED_BYTES {
+            return Ok(());
+        }
+        self.unasked_bytes = length;
+        let (answer, answered) = oneshot::channel();
+        let _ = self.inbound.send(Inbound::Ask { lease, answer }).await;
+        match answered.await {
+            Ok(false) => {
+                let found = format!("one for node {}, attempt {}", lease.node, lease.attempt);
+                Err(unexpected("an output for a lease that was given out", &found))
+            }
+            // When nobody answers any more the run is over.
+            Ok(true) | Err(_) => Ok(()),
+        }
     }
 
     /// The output, if it is complete; else a sign of life.

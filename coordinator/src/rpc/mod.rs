@@ -4,6 +4,7 @@
 //! gets two tasks, one that reads and one that writes, so that a large blob in one direction never blocks the other. What either
 //! may cost is in [`Limits`].
 
+mod mailbox;
 mod member;
 mod strangers;
 
@@ -15,22 +16,25 @@ use std::time::Duration;
 
 use lookalike::graph::{Blob, WorkerId};
 use lookalike::protocol::{
-    FrameReader, HandshakeError, Hello, ProofKey, RunName, Secret, ToCoordinator, ToWorker, bounded_text,
+    FrameReader, HandshakeError, Hello, LeaseName, ProofKey, RunName, Secret, ToCoordinator, ToWorker, bounded_text,
 };
 use lookalike_worker::tls::{TlsError, Transport, channel_binding};
 use lookalike_worker::wire::{Incoming, WireError, greet_worker};
 use tokio::io::{ReadHalf, WriteHalf, split};
 use tokio::net::{TcpListener, TcpStream};
-use tokio::sync::mpsc::{Sender, UnboundedSender};
+use tokio::sync::mpsc::Sender;
+use tokio::sync::oneshot;
 use tokio::task::JoinSet;
 use tokio::time::{sleep, timeout};
 use tokio_rustls::{TlsAcceptor, server::TlsStream};
 use tokio_util::sync::CancellationToken;
 use tracing::{debug, warn};
 
+pub(crate) use self::mailbox::Mailbox;
 use self::strangers::{Place, Strangers};
 use crate::comm::RunEvent;
 use crate::limits::Limits;
+use crate::policy::Policy;
 use crate::reactor::Event;
 use crate::tls::accept;
 
@@ -40,8 +44,10 @@ const ACCEPT_PAUSE: Duration = Duration::from_millis(100);
 /// What comes from the sockets.
 #[derive(Debug)]
 pub(crate) enum Inbound {
-    /// A worker has said hello. What is sent to `outgoing` goes to it; dropping `outgoing` ends the connection.
-    Joined { worker: WorkerId, hello: Hello, outgoing: UnboundedSender<Outgoing> },
+    /// A worker has said hello. What is put into the mailbox goes to it.
+    Joined { worker: WorkerId, hello: Hello, mailbox: Mailbox },
+    /// A worker announces an output for this lease: may it come? A lease that was never given out is answered with `false`.
+    Ask { lease: LeaseName, answer: oneshot::Sender<bool> },
     /// Something happened.
     Event(Event),
     /// Something to tell the user that the reactor does not care about.
@@ -62,7 +68,7 @@ pub(crate) struct Gate {
     pub(crate) limits: Limits,
     pub(crate) run: RunName,
     pub(crate) epoch: u64,
-    pub(crate) heartbeat: Duration,
+    pub(crate) policy: Policy,
     pub(crate) inbound: Sender<Inbound>,
 }
 
@@ -103,7 +109,7 @@ pub(crate) async fn serve_forever(listener: TcpListener, gate: Gate, stop: Cance
         });
     }
     drop(listener);
-    // Each connection ends by itself once its `outgoing` is dropped and the worker has closed its end.
+    // Each connection ends by itself once its mailbox is dropped and the worker has closed its end.
     let all_gone = async { while connections.join_next().await.is_some() {} };
     let _ = timeout(limits.farewell_time, all_gone).await;
     connections.shutdown().await;

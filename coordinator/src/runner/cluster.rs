@@ -8,14 +8,14 @@ use std::time::SystemTime;
 use lookalike::graph::WorkerId;
 use lookalike::protocol::{RunName, ToWorker};
 use tokio::net::TcpListener;
-use tokio::sync::mpsc::{Receiver, UnboundedSender, channel};
+use tokio::sync::mpsc::{Receiver, channel};
 use tokio::task::{JoinHandle, JoinSet};
 use tokio_rustls::TlsAcceptor;
 use tokio_util::sync::CancellationToken;
 
 use super::{RunError, RunnerOptions};
 use crate::access::Credentials;
-use crate::rpc::{Gate, Inbound, Outgoing, serve_forever};
+use crate::rpc::{Gate, Inbound, Mailbox, Outgoing, serve_forever};
 use crate::spawn::{LocalWorkers, WorkerCommand, threads_per_worker};
 use crate::tls::server_config;
 
@@ -29,7 +29,7 @@ pub(crate) struct Cluster {
     pub(crate) inbound: Receiver<Inbound>,
     /// What the access file tells workers to connect to.
     pub(crate) address: String,
-    members: BTreeMap<WorkerId, UnboundedSender<Outgoing>>,
+    members: BTreeMap<WorkerId, Mailbox>,
     stop: CancellationToken,
     serving: JoinHandle<()>,
     local_workers: JoinSet<()>,
@@ -62,7 +62,7 @@ impl Cluster {
             limits: options.limits,
             run: RunName(run),
             epoch,
-            heartbeat: options.heartbeat,
+            policy: options.policy,
             inbound: sender.clone(),
         };
         let local_workers = workers.start(&sender, &stop)?;
@@ -71,26 +71,26 @@ impl Cluster {
     }
 
     /// A worker can be sent to from now on.
-    pub(crate) fn admit(&mut self, worker: WorkerId, outgoing: UnboundedSender<Outgoing>) {
-        self.members.insert(worker, outgoing);
+    pub(crate) fn admit(&mut self, worker: WorkerId, mailbox: Mailbox) {
+        self.members.insert(worker, mailbox);
     }
 
     /// Send to a worker. One that has left meanwhile gets nothing: the reactor will hear of it.
     pub(crate) fn send(&self, worker: WorkerId, outgoing: Outgoing) {
         if let Some(member) = self.members.get(&worker) {
-            let _ = member.send(outgoing);
+            member.send(outgoing);
         }
     }
 
-    /// Send nothing more to a worker and close its connection.
+    /// Send nothing more to a worker and close its connection, whether or not it has read what was sent before.
     pub(crate) fn dismiss(&mut self, worker: WorkerId) {
-        self.members.remove(&worker);
+        self.members.remove(&worker).into_iter().for_each(|member| member.close());
     }
 
     /// Tell all workers that the run is over, and wait until connections and local processes are gone.
     pub(crate) async fn stop(mut self, reason: &str) {
         for member in std::mem::take(&mut self.members).into_values() {
-            let _ = member.send(Outgoing::Message(ToWorker::Stop { reason: reason.to_owned() }));
+            member.send(Outgoing::Message(ToWorker::Stop { reason: reason.to_owned() }));
         }
         self.stop.cancel();
         // A connection or keeper that waits for room would wait for ever.

@@ -1,5 +1,6 @@
 //! Why a run ended without its result.
 
+use std::fmt;
 use std::io;
 use std::net::SocketAddr;
 use std::path::PathBuf;
@@ -10,11 +11,15 @@ use thiserror::Error;
 
 use crate::access::CredentialsError;
 use crate::comm::{NodeName, Site};
+use crate::policy::PolicyError;
 
 /// Why a run ended without its result.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum RunError {
+    /// The policy makes no sense.
+    #[error(transparent)]
+    Policy(#[from] PolicyError),
     /// Neither local workers nor an address where others could join.
     #[error(
         "no worker can ever join: expected at least one local worker, or an address to listen on for others, found neither; use --workers N or --listen ADDR"
@@ -82,17 +87,19 @@ pub enum RunError {
     },
     /// Two computations of one node gave different outputs.
     #[error(
-        "two results of {name} differ ({first:?} and {second:?}, the second one from {site}), so neither can be trusted; use the same build everywhere, check the memory of that machine, and report this"
+        "two results of {name} differ ({first} from {first_site}, {second} from {second_site}), so neither can be trusted; use the same build everywhere, check the memory of these machines, and report this"
     )]
     ResultsDiffer {
         /// The node.
         name: Box<NodeName>,
+        /// Where the first result came from.
+        first_site: Site,
+        /// The first result.
+        first: NodeAnswer,
         /// Where the second result came from.
-        site: Site,
-        /// The first output.
-        first: BlobHash,
-        /// The second output.
-        second: BlobHash,
+        second_site: Site,
+        /// The second result.
+        second: NodeAnswer,
     },
     /// A result is not what its node or its recomputation gives.
     #[error(
@@ -114,13 +121,32 @@ pub enum RunError {
     Interrupted,
 }
 
+/// What a computation of a node came to.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum NodeAnswer {
+    /// An output of this name.
+    Output(BlobHash),
+    /// An error.
+    Failure(Box<NodeFailure>),
+}
+
+impl fmt::Display for NodeAnswer {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Output(hash) => write!(formatter, "output {hash:?}"),
+            Self::Failure(failure) => write!(formatter, "the error {:?}", failure.to_string()),
+        }
+    }
+}
+
 impl RunError {
     /// The exit code of the program (design section 10): 2 for bad input or usage, 130 when interrupted, else 3: the
     /// cluster failed.
     #[must_use]
     pub fn exit_code(&self) -> u8 {
         match self {
-            Self::NoWorkersPossible
+            Self::Policy(_)
+            | Self::NoWorkersPossible
             | Self::NothingToAdvertise { .. }
             | Self::Listen { .. }
             | Self::ListenWhere { .. }

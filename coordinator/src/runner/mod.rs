@@ -25,7 +25,7 @@ use tokio_util::sync::CancellationToken;
 use tracing::{info, trace};
 
 use self::cluster::Cluster;
-pub use self::error::RunError;
+pub use self::error::{NodeAnswer, RunError};
 use self::interrupt::Interrupt;
 pub use self::options::RunnerOptions;
 use crate::comm::{Action, Lease, Outbox, RunEvent, Site};
@@ -153,10 +153,15 @@ impl<P: Planner, O: FnMut(&RunEvent)> Driver<P, O> {
                 }
                 Some(event)
             }
-            Inbound::Joined { worker, hello, outgoing } => {
-                self.cluster.admit(worker, outgoing);
+            Inbound::Joined { worker, hello, mailbox } => {
+                self.cluster.admit(worker, mailbox);
                 let threads = usize::try_from(hello.threads).unwrap_or(usize::MAX).clamp(1, MAX_THREADS);
                 Some(Event::WorkerJoined { worker, threads, process: hello.process })
+            }
+            Inbound::Ask { lease, answer } => {
+                // Whoever asked may be gone.
+                let _ = answer.send(self.core.was_given_out(NodeId(lease.node), lease.attempt));
+                None
             }
             Inbound::Tell(event) => {
                 (self.observer)(&event);

@@ -3,7 +3,6 @@
 use std::net::{Ipv4Addr, SocketAddr};
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
-use std::time::Duration;
 
 use super::RunError;
 use crate::core::Policy;
@@ -32,9 +31,7 @@ pub struct RunnerOptions {
     pub access: Option<PathBuf>,
     /// What connections may cost.
     pub limits: Limits,
-    /// How often a worker shall tell that it lives.
-    pub heartbeat: Duration,
-    /// How workers and nodes are treated: waiting, grace, crashes.
+    /// How workers and nodes are treated.
     pub policy: Policy,
     /// Whether Ctrl-C and SIGTERM stop the run in order, with [`RunError::Interrupted`].
     pub handle_signals: bool,
@@ -54,7 +51,6 @@ impl RunnerOptions {
             access_file,
             access: None,
             limits: Limits::default(),
-            heartbeat: Duration::from_secs(1),
             policy: Policy::default(),
             handle_signals: true,
         }
@@ -82,8 +78,9 @@ impl RunnerOptions {
         self.listen.is_some() || self.access.is_some()
     }
 
-    /// That some worker can join, and be told where.
+    /// That the policy makes sense, and some worker can join and be told where.
     pub(crate) fn check(&self) -> Result<(), RunError> {
+        self.policy.check()?;
         if self.workers == 0 && !self.others_may_come() {
             return Err(RunError::NoWorkersPossible);
         }

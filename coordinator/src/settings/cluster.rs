@@ -1,7 +1,8 @@
 //! Who computes: local worker processes, remote ones, or both (design section 8).
 
+use crate::policy::Policy;
 use anyhow::{Context, bail};
-use std::{fmt, net::SocketAddr, num::NonZeroUsize, path::PathBuf, str::FromStr, thread, time::Duration};
+use std::{fmt, net::SocketAddr, num::NonZeroUsize, path::PathBuf, str::FromStr, thread};
 
 /// Where workers come from and how long a coordinator waits for them.
 #[derive(Debug, Clone, PartialEq)]
@@ -16,10 +17,8 @@ pub struct ClusterSettings {
     pub advertise: Option<Advertise>,
     /// An access file made beforehand, to be used instead of a new one.
     pub access: Option<PathBuf>,
-    /// How long to wait for the first worker.
-    pub wait_for_workers: Duration,
-    /// How long to wait for another worker after losing the last.
-    pub grace: Duration,
+    /// How workers and nodes are treated.
+    pub policy: Policy,
 }
 
 /// How many local worker processes to spawn.
@@ -41,8 +40,7 @@ impl Default for ClusterSettings {
             listen: None,
             advertise: None,
             access: None,
-            wait_for_workers: Duration::from_mins(10),
-            grace: Duration::from_mins(1),
+            policy: Policy::default(),
         }
     }
 }

@@ -2,15 +2,20 @@
 
 use super::{PROGRAM, run_at_the_gate, run_within, worker};
 use lookalike::graph::BlobHash;
-use lookalike::protocol::{FailureKind, FrameTag, LeaseName, ToCoordinator, ToWorker};
+use lookalike::protocol::{
+    FailureKind, FrameTag, LeaseName, PART_BYTES, ToCoordinator, ToWorker, encode_message, frame_header,
+};
 use lookalike_coordinator::comm::{Departure, RunEvent};
+use lookalike_coordinator::core::Policy;
 use lookalike_coordinator::limits::Limits;
-use lookalike_coordinator::runner::RunnerOptions;
+use lookalike_coordinator::runner::{RunError, RunnerOptions};
 use lookalike_tests::cluster::{Cluster, options};
 use lookalike_tests::gate::Gate;
 use lookalike_tests::plan::{Leaves, TestPlanner};
 use lookalike_tests::stranger::{LIAR, TlsClient, hear, join, read_to_the_end, say, say_frame};
 use std::io::Write;
+use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::time::Duration;
 
 /// How the liar's membership ended.
 fn end_of_liar(cluster: &Cluster) -> Departure {
@@ -63,10 +68,12 @@ fn answers_to_nothing_and_false_hashes_are_not_believed() {
     let never_asked = ToCoordinator::Failed { lease, kind: FailureKind::Application, message: "I lie".into() };
     let false_hash = ToCoordinator::Finished { lease, hash: [1; 32], length: 0 };
     let too_long = ToCoordinator::Finished { lease, hash: [1; 32], length: u64::MAX };
+    // Refused before the first of its bytes has come.
+    let large_and_never_asked = ToCoordinator::Finished { lease, hash: [1; 32], length: 100 << 20 };
     let unknown_blob = ToCoordinator::Fetch { hash: [1; 32] };
     // The input of the node at the gate: it is there, but this worker has nothing to do with it.
     let blob_of_another = ToCoordinator::Fetch { hash: BlobHash::of(&[]).0 };
-    for lie in [never_asked, false_hash, too_long, unknown_blob, blob_of_another] {
+    for lie in [never_asked, false_hash, too_long, large_and_never_asked, unknown_blob, blob_of_another] {
         assert_thrown_out(Limits::default(), |stream| say(stream, &lie));
     }
 }
@@ -106,9 +113,13 @@ fn garbage_under_the_encryption_is_the_end_of_the_connection_and_of_nothing_else
 
 /// A run of two leaves over one blob that nobody works for yet.
 fn run_without_workers(limits: Limits) -> (Leaves, Cluster) {
+    run_by(Policy::default(), limits)
+}
+
+fn run_by(policy: Policy, limits: Limits) -> (Leaves, Cluster) {
     let leaves = Leaves::Large { bytes: 20_000_001 };
     let listen = Some(([127, 0, 0, 1], 0).into());
-    let cluster = Cluster::start(leaves.clone(), RunnerOptions { listen, limits, ..options(PROGRAM, 0) });
+    let cluster = Cluster::start(leaves.clone(), RunnerOptions { listen, limits, policy, ..options(PROGRAM, 0) });
     cluster.address();
     (leaves, cluster)
 }
@@ -146,4 +157,62 @@ fn worker_that_asks_and_does_not_take_is_thrown_out() {
     let honest = worker(&cluster.access_file());
     assert_eq!(cluster.finish().0, TestPlanner::reference(leaves));
     assert_eq!(honest.output().status.code(), Some(0));
+}
+
+#[test]
+fn worker_that_reads_nothing_is_too_slow_however_alive_it_seems() {
+    let policy =
+        Policy { heartbeat: Duration::from_millis(100), lost_after: Duration::from_millis(800), ..Policy::default() };
+    let (leaves, cluster) = run_by(policy, Limits::default());
+    let mut liar = join(&cluster.access(), 1);
+    let hash = hear(&mut liar, |message| match message {
+        ToWorker::Assign(assignment) => Some(assignment.inputs[0]),
+        _ => None,
+    });
+    say(&mut liar, &ToCoordinator::Fetch { hash });
+    // It says that it lives until somebody closes the connection.
+    let (keep, dropped) = channel::<()>();
+    let living = std::thread::spawn(move || {
+        let body = encode_message(&ToCoordinator::Heartbeat { executing: Vec::new() }).unwrap();
+        let beat = [&frame_header(FrameTag::Message, body.len()).unwrap()[..], &body].concat();
+        while dropped.recv_timeout(Duration::from_millis(50)) == Err(RecvTimeoutError::Timeout) {
+            if liar.write_all(&beat).and_then(|()| liar.flush()).is_err() {
+                break;
+            }
+        }
+        liar
+    });
+    assert_eq!(end_of_liar(&cluster), Departure::TooSlow);
+    drop(keep);
+    // Only what the sockets held has got through; then the connection is closed, though nobody took what was left.
+    let liar = living.join().unwrap();
+    assert!(read_to_the_end(liar).len() < 20_000_001);
+    let honest = worker(&cluster.access_file());
+    assert_eq!(cluster.finish().0, TestPlanner::reference(leaves));
+    assert_eq!(honest.output().status.code(), Some(0));
+}
+
+#[test]
+fn wrong_output_is_found_out_where_outputs_are_verified() {
+    let policy = Policy { verify_fraction: 1.0, ..Policy::default() };
+    let (_, cluster) = run_by(policy, Limits::default());
+    let mut liar = join(&cluster.access(), 1);
+    let lease = hear(&mut liar, |message| match message {
+        ToWorker::Assign(assignment) => Some(assignment.lease),
+        _ => None,
+    });
+    // Well formed, and long enough to be asked for first.
+    let wrong = vec![7; PART_BYTES + 1];
+    say(&mut liar, &ToCoordinator::Started(lease));
+    let (hash, length) = (BlobHash::of(&wrong).0, wrong.len() as u64);
+    say(&mut liar, &ToCoordinator::Finished { lease, hash, length });
+    wrong.chunks(PART_BYTES).for_each(|part| say_frame(&mut liar, FrameTag::Part, part));
+    hear(&mut liar, |message| matches!(message, ToWorker::Acknowledge(_)).then_some(()));
+    let honest = worker(&cluster.access_file());
+    let error = cluster.error();
+    assert!(matches!(error, RunError::ResultsDiffer { .. }), "{error}");
+    let text = error.to_string();
+    assert!(text.contains("from worker 1") && text.contains("from worker 2"), "{text}");
+    assert_eq!(honest.output().status.code(), Some(0));
+    drop(liar);
 }

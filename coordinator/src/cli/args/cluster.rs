@@ -1,9 +1,10 @@
 //! Flags of the coordinator: where workers come from and how long it waits for them.
 
+use super::policy::PolicyArgs;
 use crate::settings::{Advertise, ClusterSettings, Workers};
 use anyhow::bail;
 use clap::Args;
-use std::{net::SocketAddr, path::PathBuf, time::Duration};
+use std::{net::SocketAddr, path::PathBuf};
 
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Workers")]
@@ -20,12 +21,8 @@ pub(crate) struct ClusterArgs {
     /// Access file made beforehand with lookalike access new, its key beside it [default: a new one, OUT/access.json]
     #[arg(long, value_name = "FILE", conflicts_with = "advertise")]
     access: Option<PathBuf>,
-    /// How long to wait for the first worker, such as 10min or 90s
-    #[arg(long, value_name = "T", default_value = "10min", value_parser = humantime::parse_duration)]
-    wait_for_workers: Duration,
-    /// How long to wait for another worker after losing the last
-    #[arg(long, value_name = "T", default_value = "60s", value_parser = humantime::parse_duration)]
-    grace: Duration,
+    #[command(flatten)]
+    policy: PolicyArgs,
 }
 
 impl ClusterArgs {
@@ -43,8 +40,7 @@ impl ClusterArgs {
             listen: self.listen,
             advertise: self.advertise,
             access: self.access,
-            wait_for_workers: self.wait_for_workers,
-            grace: self.grace,
+            policy: self.policy.into_policy()?,
         })
     }
 }

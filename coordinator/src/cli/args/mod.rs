@@ -9,6 +9,7 @@ mod compare;
 mod fit;
 mod later;
 mod method;
+mod policy;
 mod render;
 mod scene;
 

@@ -1,0 +1,341 @@
+//! The workers that have joined, and who of them is next: every question that is asked of all of them at once has an index,
+//! so that no event costs more for a thousand workers than for ten.
+
+use std::cmp::Ordering;
+use std::collections::{BTreeMap, BTreeSet};
+use std::time::Duration;
+
+use lookalike::graph::{BlobHash, NodeId, WorkerId};
+
+/// How many bytes of assignments a worker may have been given that it has not begun with. What waits in its queue stays as
+/// small as this, and one assignment.
+const UNBEGUN_BYTES: usize = 8 << 20;
+
+/// A worker that has joined.
+#[derive(Clone, Debug)]
+pub(crate) struct Member {
+    pub(crate) threads: usize,
+    pub(crate) leases: BTreeMap<NodeId, Held>,
+    /// The leases that it has not begun with.
+    pub(crate) waiting: BTreeSet<NodeId>,
+    waiting_bytes: usize,
+    /// The inputs of every node it was ever given: what it may read. (One that was taken back may still be asked about.)
+    pub(crate) readable: BTreeSet<BlobHash>,
+    /// When it is lost, and with it its leases, unless it is heard of before.
+    pub(crate) deadline: Duration,
+    /// It was asked to end: it finishes what it executes and gets nothing more.
+    pub(crate) is_draining: bool,
+    /// It gets nothing more until a suspect has it for itself.
+    pub(crate) is_clearing: bool,
+    /// The suspect that has it for itself.
+    pub(crate) alone_with: Option<NodeId>,
+    /// It has executed nothing yet.
+    is_fresh: bool,
+    /// When it last got, began or ended something.
+    last_move: Duration,
+}
+
+/// A lease, as its worker's member holds it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Held {
+    pub(crate) attempt: u32,
+    /// Since when the worker executes it.
+    pub(crate) started_at: Option<Duration>,
+    /// How far it said to be.
+    pub(crate) permille: u16,
+    assignment_bytes: usize,
+}
+
+impl Member {
+    fn new(threads: usize, deadline: Duration, now: Duration) -> Self {
+        Self {
+            threads: threads.max(1),
+            leases: BTreeMap::new(),
+            waiting: BTreeSet::new(),
+            waiting_bytes: 0,
+            readable: BTreeSet::new(),
+            deadline,
+            is_draining: false,
+            is_clearing: false,
+            alone_with: None,
+            is_fresh: true,
+            last_move: now,
+        }
+    }
+
+    /// A lease begins.
+    pub(crate) fn give(&mut self, node: NodeId, attempt: u32, assignment_bytes: usize, now: Duration) {
+        self.leases.insert(node, Held { attempt, started_at: None, permille: 0, assignment_bytes });
+        self.waiting.insert(node);
+        self.waiting_bytes += assignment_bytes;
+        self.last_move = now;
+    }
+
+    /// The worker begins to execute a node that it has not begun with yet; `false` if there is no such lease.
+    pub(crate) fn begin(&mut self, node: NodeId, attempt: u32, now: Duration) -> bool {
+        let Some(held) = self.leases.get_mut(&node).filter(|held| held.attempt == attempt) else { return false };
+        if !self.waiting.remove(&node) {
+            return false;
+        }
+        held.started_at = Some(now);
+        self.waiting_bytes -= held.assignment_bytes;
+        self.is_fresh = false;
+        self.last_move = now;
+        true
+    }
+
+    /// A lease ends.
+    pub(crate) fn end(&mut self, node: NodeId, now: Duration) -> Option<Held> {
+        let held = self.leases.remove(&node)?;
+        if self.waiting.remove(&node) {
+            self.waiting_bytes -= held.assignment_bytes;
+        }
+        self.alone_with = self.alone_with.filter(|alone| *alone != node);
+        self.last_move = now;
+        Some(held)
+    }
+
+    /// How many nodes it executes.
+    pub(crate) fn executing(&self) -> usize {
+        self.leases.len() - self.waiting.len()
+    }
+
+    /// Whether it gets leases like any other.
+    fn accepts(&self) -> bool {
+        !self.is_draining && !self.is_clearing && self.alone_with.is_none()
+    }
+
+    fn keys(&self, worker: WorkerId, spare_leases: usize) -> Keys {
+        let is_idle = self.leases.is_empty();
+        let is_full = self.leases.len() >= self.threads + spare_leases || self.waiting_bytes >= UNBEGUN_BYTES;
+        let load = Load { leases: self.leases.len(), threads: self.threads };
+        let surplus = self.leases.len().saturating_sub(self.threads.max(self.executing()));
+        let has_thread = self.executing() < self.threads;
+        Keys {
+            rank: self.accepts().then_some(Rank { is_full, load, worker }),
+            is_fresh: self.accepts() && self.is_fresh && is_idle,
+            surplus: Some(surplus).filter(|surplus| *surplus > 0 && self.accepts()),
+            stalled_since: Some(self.last_move).filter(|_| has_thread && !self.waiting.is_empty()),
+        }
+    }
+}
+
+/// Where a member is in the indices.
+#[derive(PartialEq, Eq)]
+struct Keys {
+    rank: Option<Rank>,
+    is_fresh: bool,
+    surplus: Option<usize>,
+    stalled_since: Option<Duration>,
+}
+
+/// Who is next: first who has a place, then who is least busy for its threads, then who came first.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+struct Rank {
+    is_full: bool,
+    load: Load,
+    worker: WorkerId,
+}
+
+/// Leases per thread.
+#[derive(Clone, Copy, Debug)]
+struct Load {
+    leases: usize,
+    threads: usize,
+}
+
+impl Ord for Load {
+    fn cmp(&self, other: &Self) -> Ordering {
+        // a / b < c / d without a division.
+        (self.leases * other.threads).cmp(&(other.leases * self.threads))
+    }
+}
+
+impl PartialOrd for Load {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl PartialEq for Load {
+    fn eq(&self, other: &Self) -> bool {
+        self.cmp(other).is_eq()
+    }
+}
+
+impl Eq for Load {}
+
+/// All workers that have joined.
+#[derive(Debug)]
+pub(crate) struct Members {
+    spare_leases: usize,
+    by_id: BTreeMap<WorkerId, Member>,
+    /// Those that get leases like any other.
+    ranking: BTreeSet<Rank>,
+    /// Those of them that have executed nothing and hold nothing.
+    fresh: BTreeSet<WorkerId>,
+    /// Those of them that hold leases which another one could begin with at once.
+    surplus: BTreeSet<(usize, WorkerId)>,
+    /// Those that have not begun with a node though they have a thread for it, since then.
+    stalled: BTreeSet<(Duration, WorkerId)>,
+    deadlines: BTreeSet<(Duration, WorkerId)>,
+}
+
+impl Members {
+    pub(crate) fn new(spare_leases: usize) -> Self {
+        Self {
+            spare_leases,
+            by_id: BTreeMap::new(),
+            ranking: BTreeSet::new(),
+            fresh: BTreeSet::new(),
+            surplus: BTreeSet::new(),
+            stalled: BTreeSet::new(),
+            deadlines: BTreeSet::new(),
+        }
+    }
+
+    pub(crate) fn is_empty(&self) -> bool {
+        self.by_id.is_empty()
+    }
+
+    pub(crate) fn get(&self, worker: WorkerId) -> Option<&Member> {
+        self.by_id.get(&worker)
+    }
+
+    pub(crate) fn join(&mut self, worker: WorkerId, threads: usize, deadline: Duration, now: Duration) {
+        let member = Member::new(threads, deadline, now);
+        self.enter(&member.keys(worker, self.spare_leases), worker);
+        self.deadlines.insert((deadline, worker));
+        self.by_id.insert(worker, member);
+    }
+
+    pub(crate) fn remove(&mut self, worker: WorkerId) -> Option<Member> {
+        let member = self.by_id.remove(&worker)?;
+        self.leave(&member.keys(worker, self.spare_leases), worker);
+        self.deadlines.remove(&(member.deadline, worker));
+        Some(member)
+    }
+
+    /// Change a member; the indices follow.
+    pub(crate) fn change<T>(&mut self, worker: WorkerId, change: impl FnOnce(&mut Member) -> T) -> Option<T> {
+        let member = self.by_id.get_mut(&worker)?;
+        let before = member.keys(worker, self.spare_leases);
+        let result = change(member);
+        let after = member.keys(worker, self.spare_leases);
+        if before != after {
+            self.leave(&before, worker);
+            self.enter(&after, worker);
+        }
+        Some(result)
+    }
+
+    /// A worker was heard of: its membership and its leases go on.
+    pub(crate) fn renew(&mut self, worker: WorkerId, deadline: Duration) {
+        if let Some(member) = self.by_id.get_mut(&worker) {
+            self.deadlines.remove(&(member.deadline, worker));
+            self.deadlines.insert((deadline, worker));
+            member.deadline = deadline;
+        }
+    }
+
+    /// What a worker said of the progress of a node that it executes; `true` if that is news.
+    pub(crate) fn progress(&mut self, worker: WorkerId, node: NodeId, permille: u16) -> bool {
+        let held = self.by_id.get_mut(&worker).and_then(|member| member.leases.get_mut(&node));
+        held.is_some_and(|held| std::mem::replace(&mut held.permille, permille) != permille)
+    }
+
+    /// When the first member is lost if nothing is heard.
+    pub(crate) fn next_deadline(&self) -> Option<Duration> {
+        self.deadlines.first().map(|(deadline, _)| *deadline)
+    }
+
+    /// Some member that is lost by now.
+    pub(crate) fn silent(&self, now: Duration) -> Option<WorkerId> {
+        self.deadlines.first().filter(|(deadline, _)| *deadline <= now).map(|(_, worker)| *worker)
+    }
+
+    /// How many members get leases like any other.
+    pub(crate) fn accepting(&self) -> usize {
+        self.ranking.len()
+    }
+
+    /// Those that have a place, the least busy one first.
+    pub(crate) fn with_place(&self) -> impl Iterator<Item = WorkerId> {
+        self.ranking.iter().take_while(|rank| !rank.is_full).map(|rank| rank.worker)
+    }
+
+    /// Those that have a thread without a lease, the least busy one first.
+    pub(crate) fn with_thread(&self) -> impl Iterator<Item = WorkerId> {
+        let ranks = self.ranking.iter().take_while(|rank| !rank.is_full && rank.load.leases < rank.load.threads);
+        ranks.map(|rank| rank.worker)
+    }
+
+    /// One that gets leases and has few, perhaps too many for a place.
+    pub(crate) fn least_busy(&self) -> Option<WorkerId> {
+        self.ranking.first().map(|rank| rank.worker)
+    }
+
+    /// One that gets leases and holds none.
+    pub(crate) fn idle(&self) -> Option<WorkerId> {
+        self.ranking.first().filter(|rank| rank.load.leases == 0).map(|rank| rank.worker)
+    }
+
+    /// One that has executed nothing and holds nothing.
+    pub(crate) fn fresh(&self) -> Option<WorkerId> {
+        self.fresh.first().copied()
+    }
+
+    /// The one with the most leases that another one could begin with at once.
+    pub(crate) fn busiest(&self) -> Option<(WorkerId, &Member)> {
+        let (_, worker) = self.surplus.last()?;
+        Some((*worker, self.get(*worker)?))
+    }
+
+    /// Those that have not begun with a node though they have had a thread for it since then or before.
+    pub(crate) fn stalled(&self, since: Duration) -> impl Iterator<Item = (WorkerId, &Member)> {
+        let stalled = self.stalled.iter().take_while(move |(begin, _)| *begin <= since);
+        stalled.filter_map(|(_, worker)| Some((*worker, self.get(*worker)?)))
+    }
+
+    /// Since when the first one is stalled of those that are so only since after `since`; of all if there is no such time.
+    pub(crate) fn next_stalled(&self, since: Option<Duration>) -> Option<Duration> {
+        let first = match since {
+            Some(since) => self.stalled.range((since, WorkerId(u64::MAX))..).next(),
+            None => self.stalled.first(),
+        };
+        first.map(|(begin, _)| *begin)
+    }
+
+    /// That every index says what the members say.
+    #[cfg(test)]
+    pub(crate) fn check(&self) {
+        let mut anew = Self::new(self.spare_leases);
+        for (worker, member) in &self.by_id {
+            anew.enter(&member.keys(*worker, self.spare_leases), *worker);
+            anew.deadlines.insert((member.deadline, *worker));
+        }
+        assert!(self.ranking.iter().eq(&anew.ranking), "{:?}", self.ranking);
+        assert_eq!(self.fresh, anew.fresh);
+        assert_eq!(self.surplus, anew.surplus);
+        assert_eq!(self.stalled, anew.stalled);
+        assert_eq!(self.deadlines, anew.deadlines);
+    }
+
+    fn enter(&mut self, keys: &Keys, worker: WorkerId) {
+        keys.rank.into_iter().for_each(|rank| _ = self.ranking.insert(rank));
+        keys.surplus.into_iter().for_each(|surplus| _ = self.surplus.insert((surplus, worker)));
+        keys.stalled_since.into_iter().for_each(|since| _ = self.stalled.insert((since, worker)));
+        if keys.is_fresh {
+            self.fresh.insert(worker);
+        }
+    }
+
+    fn leave(&mut self, keys: &Keys, worker: WorkerId) {
+        keys.rank.into_iter().for_each(|rank| _ = self.ranking.remove(&rank));
+        keys.surplus.into_iter().for_each(|surplus| _ = self.surplus.remove(&(surplus, worker)));
+        keys.stalled_since.into_iter().for_each(|since| _ = self.stalled.remove(&(since, worker)));
+        if keys.is_fresh {
+            self.fresh.remove(&worker);
+        }
+    }
+}

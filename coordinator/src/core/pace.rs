@@ -1,0 +1,137 @@
+//! How long the nodes of each kind take, and which of those that run are slow.
+
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
+use std::time::Duration;
+
+use lookalike::graph::NodeId;
+
+use crate::policy::Speculation;
+
+/// How many of the latest nodes of a kind say what is usual.
+const RECENT: usize = 63;
+
+/// The pace of every kind.
+#[derive(Debug, Default)]
+pub(crate) struct Pace {
+    kinds: BTreeMap<String, KindPace>,
+}
+
+#[derive(Debug, Default)]
+struct KindPace {
+    /// In order of their ends.
+    recent: VecDeque<Duration>,
+    /// The same, in order of length.
+    sorted: Vec<Duration>,
+    /// Nodes that run on one worker and may be run on a second one, since when.
+    running: BTreeSet<(Duration, NodeId)>,
+}
+
+impl Pace {
+    /// A node has taken so long.
+    pub(crate) fn note(&mut self, kind: &str, took: Duration) {
+        let pace = self.of(kind);
+        if pace.recent.len() == RECENT
+            && let Some(oldest) = pace.recent.pop_front()
+            && let Ok(place) = pace.sorted.binary_search(&oldest)
+        {
+            pace.sorted.remove(place);
+        }
+        pace.recent.push_back(took);
+        let place = pace.sorted.partition_point(|other| *other < took);
+        pace.sorted.insert(place, took);
+    }
+
+    /// A node runs since then, and may be run on a second worker.
+    pub(crate) fn watch(&mut self, kind: &str, since: Duration, node: NodeId) {
+        self.of(kind).running.insert((since, node));
+    }
+
+    /// Not any more.
+    pub(crate) fn forget(&mut self, kind: &str, since: Duration, node: NodeId) {
+        if let Some(pace) = self.kinds.get_mut(kind) {
+            pace.running.remove(&(since, node));
+        }
+    }
+
+    /// The slow node that has run for longest, of those that `is_wanted`.
+    pub(crate) fn slowest(
+        &self,
+        speculation: Speculation,
+        now: Duration,
+        is_wanted: impl Fn(NodeId) -> bool,
+    ) -> Option<NodeId> {
+        let slowest_of = |pace: &KindPace| {
+            let limit = pace.limit(speculation)?;
+            let slow = pace.running.iter().take_while(|(since, _)| *since + limit <= now);
+            slow.copied().find(|(_, node)| is_wanted(*node))
+        };
+        self.kinds.values().filter_map(slowest_of).min().map(|(_, node)| node)
+    }
+
+    /// When the next node will be slow that is not so yet.
+    pub(crate) fn next_slow(&self, speculation: Speculation, now: Duration) -> Option<Duration> {
+        let next_of = |pace: &KindPace| {
+            let limit = pace.limit(speculation)?;
+            // Who began at this time or before is slow already. With less time than the limit behind us nobody is.
+            let first = match now.checked_sub(limit) {
+                Some(begin) => pace.running.range((begin, NodeId(u64::MAX))..).next(),
+                None => pace.running.first(),
+            };
+            first.map(|(since, _)| *since + limit)
+        };
+        self.kinds.values().filter_map(next_of).min()
+    }
+
+    fn of(&mut self, kind: &str) -> &mut KindPace {
+        self.kinds.entry(kind.to_owned()).or_default()
+    }
+}
+
+impl KindPace {
+    /// A node of this kind is slow after this time; `None`: never.
+    fn limit(&self, speculation: Speculation) -> Option<Duration> {
+        let factor = speculation.factor?;
+        let median = self.sorted.get(self.sorted.len() / 2)?;
+        // A policy's factor is finite; a time beyond all bounds is never reached.
+        let usual = Duration::try_from_secs_f64(median.as_secs_f64() * factor).unwrap_or(Duration::MAX / 2);
+        Some(usual.max(speculation.after))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SECOND: Duration = Duration::from_secs(1);
+
+    #[test]
+    fn node_is_slow_after_twice_the_median_of_its_kind_and_not_before_a_moment() {
+        let policy = Speculation { factor: Some(2.0), after: 5 * SECOND };
+        let mut pace = Pace::default();
+        pace.watch("search", 10 * SECOND, NodeId(1));
+        let all = |_| true;
+        assert_eq!(pace.slowest(policy, 1000 * SECOND, all), None);
+        assert_eq!(pace.next_slow(policy, 10 * SECOND), None);
+        [1, 2, 9].iter().for_each(|took| pace.note("search", *took * SECOND));
+        assert_eq!(pace.next_slow(policy, 10 * SECOND), Some(15 * SECOND));
+        [9, 9].iter().for_each(|took| pace.note("search", *took * SECOND));
+        assert_eq!(pace.next_slow(policy, 10 * SECOND), Some(28 * SECOND));
+        assert_eq!(pace.slowest(policy, 27 * SECOND, all), None);
+        assert_eq!(pace.slowest(policy, 28 * SECOND, all), Some(NodeId(1)));
+        assert_eq!(pace.next_slow(policy, 28 * SECOND), None);
+        assert_eq!(pace.slowest(policy, 28 * SECOND, |_| false), None);
+        pace.forget("search", 10 * SECOND, NodeId(1));
+        assert_eq!(pace.slowest(policy, 28 * SECOND, all), None);
+    }
+
+    #[test]
+    fn what_is_usual_is_what_was_usual_lately() {
+        let policy = Speculation { factor: Some(1.0), after: Duration::ZERO };
+        let mut pace = Pace::default();
+        (0..RECENT).for_each(|_| pace.note("k", 100 * SECOND));
+        (0..RECENT).for_each(|_| pace.note("k", SECOND));
+        pace.watch("k", Duration::ZERO, NodeId(0));
+        assert_eq!(pace.next_slow(policy, Duration::ZERO), Some(SECOND));
+        assert_eq!((pace.kinds["k"].recent.len(), pace.kinds["k"].sorted.len()), (RECENT, RECENT));
+    }
+}

@@ -1,0 +1,90 @@
+//! Nodes that are ready and wait for a worker, each in one place.
+
+use std::collections::BTreeSet;
+use std::time::Duration;
+
+use lookalike::graph::NodeId;
+
+/// Where a node waits.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) enum Place {
+    /// It does not wait for a worker.
+    #[default]
+    Nowhere,
+    /// For any worker.
+    Queue,
+    /// Until this time, after it has lost its worker time and again.
+    Delayed(Duration),
+    /// For a worker of its own, since then.
+    Suspects(Duration),
+    /// For any other worker than the one whose output is to be checked.
+    Checks,
+}
+
+/// All of them, by place.
+#[derive(Debug, Default)]
+pub(crate) struct Waiting {
+    /// The lowest number goes first.
+    queue: BTreeSet<NodeId>,
+    delayed: BTreeSet<(Duration, NodeId)>,
+    suspects: BTreeSet<(Duration, NodeId)>,
+    checks: BTreeSet<NodeId>,
+}
+
+impl Waiting {
+    pub(crate) fn is_empty(&self) -> bool {
+        self.queue.is_empty() && self.delayed.is_empty() && self.suspects.is_empty() && self.checks.is_empty()
+    }
+
+    pub(crate) fn enter(&mut self, node: NodeId, place: Place) {
+        match place {
+            Place::Nowhere => false,
+            Place::Queue => self.queue.insert(node),
+            Place::Delayed(until) => self.delayed.insert((until, node)),
+            Place::Suspects(since) => self.suspects.insert((since, node)),
+            Place::Checks => self.checks.insert(node),
+        };
+    }
+
+    pub(crate) fn leave(&mut self, node: NodeId, place: Place) {
+        match place {
+            Place::Nowhere => false,
+            Place::Queue => self.queue.remove(&node),
+            Place::Delayed(until) => self.delayed.remove(&(until, node)),
+            Place::Suspects(since) => self.suspects.remove(&(since, node)),
+            Place::Checks => self.checks.remove(&node),
+        };
+    }
+
+    /// The node that any worker may have next.
+    pub(crate) fn next(&self) -> Option<NodeId> {
+        self.queue.first().copied()
+    }
+
+    /// The node that has waited longest for a worker of its own, and since when.
+    pub(crate) fn suspect(&self) -> Option<(Duration, NodeId)> {
+        self.suspects.first().copied()
+    }
+
+    /// The next nodes to be checked.
+    pub(crate) fn checks(&self) -> impl Iterator<Item = NodeId> {
+        self.checks.iter().copied()
+    }
+
+    /// A node whose delay is over.
+    pub(crate) fn rested(&self, now: Duration) -> Option<NodeId> {
+        self.delayed.first().filter(|(until, _)| *until <= now).map(|(_, node)| *node)
+    }
+
+    /// When the next delay is over.
+    pub(crate) fn next_rested(&self) -> Option<Duration> {
+        self.delayed.first().map(|(until, _)| *until)
+    }
+
+    #[cfg(test)]
+    pub(crate) fn places(&self, node: NodeId) -> usize {
+        let timed = |set: &BTreeSet<(Duration, NodeId)>| set.iter().filter(|(_, other)| *other == node).count();
+        let plain = |set: &BTreeSet<NodeId>| usize::from(set.contains(&node));
+        plain(&self.queue) + timed(&self.delayed) + timed(&self.suspects) + plain(&self.checks)
+    }
+}

@@ -1,0 +1,204 @@
+//! Workers begin with nodes and answer for them: which answer counts, and what becomes of the others.
+
+use std::time::Duration;
+
+use lookalike::graph::{Blob, BlobHash, Completion, FailureReason, NodeFailure, NodeId, NodeSpec, NodeState, WorkerId};
+
+use super::{membership, schedule};
+use crate::comm::{Action, Departure, Outbox, RunEvent, Site};
+use crate::core::{Candidate, Core, Place};
+use crate::runner::{NodeAnswer, RunError};
+
+/// An answer: (where from, for which node, for which attempt).
+pub(super) type Answer = (Site, NodeId, u32);
+
+pub(super) fn started(
+    core: &mut Core,
+    worker: WorkerId,
+    node: NodeId,
+    attempt: u32,
+    now: Duration,
+    outbox: &mut Outbox,
+) {
+    membership::renew(core, worker, now);
+    // A lease that has ended or changed meanwhile: the message crossed ours.
+    if core.members.change(worker, |member| member.begin(node, attempt, now)) == Some(true) {
+        core.watch(node);
+        outbox.tell(RunEvent::NodeStarted { name: core.name(node), site: Site::Worker(worker) });
+    }
+}
+
+pub(super) fn finished(
+    core: &mut Core,
+    answer: Answer,
+    output: Blob,
+    now: Duration,
+    outbox: &mut Outbox,
+) -> Result<(), RunError> {
+    let (site, node, attempt) = answer;
+    let Some(took) = answered(core, answer, now, outbox) else {
+        return Ok(());
+    };
+    if matches!(site, Site::Worker(_)) {
+        core.summary.output_bytes_received += output.len() as u64;
+    }
+    let is_open = core.graph.state(node) == Some(&NodeState::Ready);
+    let result = Candidate { site, attempt, output, took };
+    if is_open && core.look(node).is_some_and(|record| record.is_verified) {
+        return verify(core, node, result, now, outbox);
+    }
+    accept(core, node, result, now, outbox)
+}
+
+pub(super) fn failed(
+    core: &mut Core,
+    answer: Answer,
+    failure: NodeFailure,
+    now: Duration,
+    outbox: &mut Outbox,
+) -> Result<(), RunError> {
+    let (second_site, node, _) = answer;
+    if answered(core, answer, now, outbox).is_none() || !core.graph.is_open(node) {
+        return Ok(());
+    }
+    if let Some(first) = core.record(node).and_then(|record| record.candidate.take()) {
+        let first_answer = NodeAnswer::Output(first.output.hash());
+        let second = NodeAnswer::Failure(Box::new(failure));
+        let name = Box::new(core.name(node));
+        return Err(RunError::ResultsDiffer { name, first_site: first.site, first: first_answer, second_site, second });
+    }
+    core.graph.fail(node, FailureReason::Node(failure));
+    Ok(())
+}
+
+/// An answer has come: its lease ends. How long the node has run, as far as it is known; `None` if nobody asked for this
+/// answer. What worker gives one to nothing is thrown out.
+fn answered(core: &mut Core, answer: Answer, now: Duration, outbox: &mut Outbox) -> Option<Duration> {
+    let (site, node, attempt) = answer;
+    let was_asked = core.was_given_out(node, attempt);
+    let since = match site {
+        Site::Coordinator => core.record(node).and_then(|record| record.here_since.take()),
+        Site::Worker(worker) if was_asked => {
+            membership::renew(core, worker, now);
+            let member = core.members.get(worker);
+            if member.is_some() {
+                outbox.push(Action::Acknowledge { worker, node, attempt });
+            }
+            let held = member.and_then(|member| member.leases.get(&node)).filter(|held| held.attempt == attempt);
+            let since = held.and_then(|held| held.started_at);
+            if held.is_some() {
+                core.end_lease(worker, node, now);
+            }
+            since
+        }
+        Site::Worker(worker) => {
+            let what = format!("it answered for {node}, attempt {attempt}, which was never given out");
+            membership::drop_worker(core, worker, &Departure::Violation(what), now, outbox);
+            None
+        }
+    };
+    was_asked.then(|| since.map_or(Duration::ZERO, |since| now.saturating_sub(since)))
+}
+
+/// An output of a node whose output has to come twice: keep the first, compare the second.
+fn verify(
+    core: &mut Core,
+    node: NodeId,
+    result: Candidate,
+    now: Duration,
+    outbox: &mut Outbox,
+) -> Result<(), RunError> {
+    // Whoever may kill its workers runs as often as it has to and not more.
+    let is_suspect = core.is_suspect(node);
+    let Some(record) = core.record(node) else { return Ok(()) };
+    let first = match record.candidate.take() {
+        None if is_suspect => return accept(core, node, result, now, outbox),
+        None => result,
+        Some(first) if first.output != result.output => {
+            return Err(differ(core, node, (first.site, first.output.hash()), &result));
+        }
+        Some(first) if first.attempt != result.attempt => {
+            core.summary.verified_nodes += 1;
+            return accept(core, node, *first, now, outbox);
+        }
+        // Sent again by a worker that did not hear our thanks: no second computation.
+        Some(first) => *first,
+    };
+    record.candidate = Some(Box::new(first));
+    if record.holders.is_empty() {
+        schedule::await_now(core, node, now);
+    }
+    Ok(())
+}
+
+/// Take the output of a node that is waiting for its verification as it is; `false` if there is none.
+pub(super) fn accept_candidate(core: &mut Core, node: NodeId, now: Duration, outbox: &mut Outbox) -> bool {
+    let candidate = core.record(node).and_then(|record| record.candidate.take());
+    // The node is open, so nothing can differ.
+    candidate.is_some_and(|candidate| accept(core, node, *candidate, now, outbox).is_ok())
+}
+
+fn accept(
+    core: &mut Core,
+    node: NodeId,
+    result: Candidate,
+    now: Duration,
+    outbox: &mut Outbox,
+) -> Result<(), RunError> {
+    let (site, bytes, took) = (result.site, result.output.len(), result.took);
+    match core.graph.complete(node, result.output.clone()) {
+        Completion::Accepted => {
+            retract(core, node, now, outbox);
+            core.record(node).into_iter().for_each(|record| record.finished_by = Some(site));
+            let name = core.name(node);
+            if took > Duration::ZERO {
+                core.pace.note(&name.kind, took);
+            }
+            outbox.tell(RunEvent::NodeFinished { name, site, bytes, elapsed: took });
+        }
+        Completion::Duplicate => core.summary.duplicate_results += 1,
+        // The node has failed before; the planner knows it, and nothing can be taken back.
+        Completion::Refused => {}
+        Completion::Different { first } => {
+            let site = core.look(node).and_then(|record| record.finished_by).unwrap_or(Site::Coordinator);
+            return Err(differ(core, node, (site, first), &result));
+        }
+    }
+    Ok(())
+}
+
+fn differ(core: &Core, node: NodeId, (first_site, first): (Site, BlobHash), second: &Candidate) -> RunError {
+    RunError::ResultsDiffer {
+        name: Box::new(core.name(node)),
+        first_site,
+        first: NodeAnswer::Output(first),
+        second_site: second.site,
+        second: NodeAnswer::Output(second.output.hash()),
+    }
+}
+
+/// Nobody needs to run this node any more.
+pub(super) fn retract(core: &mut Core, node: NodeId, now: Duration, outbox: &mut Outbox) {
+    core.put(node, Place::Nowhere);
+    let Some(record) = core.record(node) else { return };
+    record.candidate = None;
+    for worker in std::mem::take(&mut record.holders) {
+        schedule::take_back(core, worker, node, now, outbox);
+    }
+}
+
+/// Whether this node is among the share that is verified: the same nodes in every run.
+pub(super) fn is_chosen(core: &Core, spec: &NodeSpec, node: NodeId) -> bool {
+    let fraction = core.policy.verify_fraction;
+    if fraction <= 0.0 {
+        return false;
+    }
+    let inputs = core.graph.input_blobs(node).unwrap_or_default();
+    let mut named = core.policy.verify_seed.to_le_bytes().to_vec();
+    named.extend_from_slice(spec.kind.as_bytes());
+    named.extend_from_slice(&BlobHash::of(&spec.parameters).0);
+    inputs.iter().for_each(|input| named.extend_from_slice(&input.hash().0));
+    let [a, b, c, d, ..] = BlobHash::of(&named).0;
+    // Evenly spread over 0 to 1, the end not included.
+    f64::from(u32::from_le_bytes([a, b, c, d])) / (f64::from(u32::MAX) + 1.0) < fraction
+}

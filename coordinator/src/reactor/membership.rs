@@ -1,0 +1,132 @@
+//! Workers come, are heard of, are asked to end, leave.
+
+use std::time::Duration;
+
+use lookalike::graph::{BlobHash, FailureReason, NodeId, WorkerId};
+
+use super::{answers, quarantine, schedule};
+use crate::comm::{Action, Departure, Outbox, RunEvent};
+use crate::core::{Core, Place};
+
+/// The pause after a node in execution has lost its worker for the second time; each further one is twice as long.
+const FIRST_DELAY: Duration = Duration::from_millis(100);
+
+/// The longest of these pauses.
+const LONGEST_DELAY: Duration = Duration::from_secs(5);
+
+pub(super) fn join(
+    core: &mut Core,
+    worker: WorkerId,
+    threads: usize,
+    process: u32,
+    now: Duration,
+    outbox: &mut Outbox,
+) {
+    core.members.join(worker, threads, now + core.policy.lost_after, now);
+    core.summary.workers_joined += 1;
+    outbox.tell(RunEvent::WorkerJoined { worker, threads, process });
+}
+
+/// A worker was heard of.
+pub(super) fn renew(core: &mut Core, worker: WorkerId, now: Duration) {
+    core.members.renew(worker, now + core.policy.lost_after);
+}
+
+/// Take back what a worker held. The nodes it executed are suspects if it may have died of them.
+pub(super) fn leave(core: &mut Core, worker: WorkerId, departure: &Departure, now: Duration, outbox: &mut Outbox) {
+    let Some(member) = core.members.remove(worker) else { return };
+    core.clearing = core.clearing.filter(|clearing| *clearing != worker);
+    core.summary.workers_left += 1;
+    outbox.tell(RunEvent::WorkerLeft { worker, departure: departure.clone() });
+    // Whoever was asked to end may be ended by force, a time limit later: nobody's fault.
+    let was_asked = member.is_draining || *departure == Departure::Goodbye;
+    if departure.is_suspicious() && !was_asked {
+        quarantine::count_death(core, &member, now, outbox);
+    }
+    for (node, held) in member.leases {
+        core.forget_holder(worker, node);
+        if let Some(record) = core.record(node) {
+            record.losses += u32::from(!was_asked && held.started_at.is_some());
+        }
+        requeue(core, node, worker, now, outbox);
+    }
+}
+
+/// A worker begins with nothing more: take back what it has not begun with.
+pub(super) fn drain(core: &mut Core, worker: WorkerId, now: Duration, outbox: &mut Outbox) {
+    renew(core, worker, now);
+    core.clearing = core.clearing.filter(|clearing| *clearing != worker);
+    let unbegun = core.members.change(worker, |member| {
+        let is_news = !std::mem::replace(&mut member.is_draining, true);
+        is_news.then(|| member.waiting.clone())
+    });
+    let Some(Some(unbegun)) = unbegun else { return };
+    outbox.tell(RunEvent::WorkerDraining { worker });
+    for node in unbegun {
+        core.end_lease(worker, node, now);
+        requeue(core, node, worker, now, outbox);
+    }
+}
+
+/// Let a node that was taken from this worker wait for another one, unless another one has it already.
+fn requeue(core: &mut Core, node: NodeId, worker: WorkerId, now: Duration, outbox: &mut Outbox) {
+    let Some(record) = core.look(node) else { return };
+    let is_cared_for = !record.holders.is_empty() || record.place != Place::Nowhere;
+    if is_cared_for || !core.graph.is_open(node) {
+        return;
+    }
+    let deaths = record.deaths;
+    if core.is_suspect(node) && answers::accept_candidate(core, node, now, outbox) {
+        return;
+    }
+    if deaths.alone >= core.policy.node_crashes {
+        core.graph.fail(node, FailureReason::Crashed { crashes: deaths.alone });
+        return;
+    }
+    await_worker(core, node, now);
+    core.summary.requeued_nodes += 1;
+    outbox.tell(RunEvent::NodeRequeued { name: core.name(node), worker, crashes: deaths.total() });
+}
+
+/// Let a node wait in its place; after each loss while it was executed a little longer, so that what always fails does not spin.
+fn await_worker(core: &mut Core, node: NodeId, now: Duration) {
+    let losses = core.look(node).map_or(0, |record| record.losses);
+    let doublings = losses.saturating_sub(2).min(16);
+    let delay = (FIRST_DELAY * 2_u32.pow(doublings)).min(LONGEST_DELAY);
+    if losses < 2 || core.is_suspect(node) {
+        schedule::await_now(core, node, now);
+    } else {
+        core.put(node, Place::Delayed(now + delay));
+    }
+}
+
+/// Throw a worker out.
+pub(super) fn drop_worker(
+    core: &mut Core,
+    worker: WorkerId,
+    departure: &Departure,
+    now: Duration,
+    outbox: &mut Outbox,
+) {
+    if core.members.get(worker).is_some() {
+        outbox.push(Action::Drop { worker });
+        leave(core, worker, departure, now, outbox);
+    }
+}
+
+pub(super) fn send_blob(core: &mut Core, worker: WorkerId, hash: BlobHash, now: Duration, outbox: &mut Outbox) {
+    renew(core, worker, now);
+    let Some(member) = core.members.get(worker) else { return };
+    if !member.readable.contains(&hash) {
+        let what = format!("it asked for blob {hash}, which none of its nodes reads");
+        drop_worker(core, worker, &Departure::Violation(what), now, outbox);
+        return;
+    }
+    // A node that was taken back meanwhile may have been completed, and its inputs may be gone; it is not needed then.
+    let Some(blob) = core.graph.blob(hash).cloned() else { return };
+    let bytes = blob.len();
+    core.summary.blobs_sent += 1;
+    core.summary.blob_bytes_sent += bytes as u64;
+    outbox.push(Action::SendBlob { worker, blob });
+    outbox.tell(RunEvent::BlobSent { worker, bytes });
+}

@@ -1,0 +1,147 @@
+//! Who gets what: suspects first, then second runs of outputs to be verified, then the queue; with nothing left there, work
+//! is moved to workers that have none.
+
+use std::time::Duration;
+
+use lookalike::graph::{NodeId, WorkerId};
+
+use super::speculation;
+use crate::comm::{Action, Lease, Outbox, Site};
+use crate::core::{Core, Place};
+
+/// How many nodes are looked at to find one that a worker may check. More are only more of the same: outputs of this very
+/// worker, which another one will check.
+const CHECKS_LOOKED_AT: usize = 8;
+
+/// Give out leases as long as there are both nodes and places.
+pub(super) fn schedule(core: &mut Core, now: Duration, outbox: &mut Outbox) {
+    while let Some(node) = core.waiting.rested(now) {
+        await_now(core, node, now);
+    }
+    isolate_suspects(core, now, outbox);
+    give_checks(core, now, outbox);
+    while let Some(node) = core.waiting.next() {
+        let Some(worker) = core.members.with_place().next() else { break };
+        assign(core, worker, node, now, outbox);
+    }
+    balance(core, now, outbox);
+    speculation::speculate(core, now, outbox);
+}
+
+/// Let a node wait for a worker from now on.
+pub(super) fn await_now(core: &mut Core, node: NodeId, now: Duration) {
+    let has_candidate = core.look(node).is_some_and(|record| record.candidate.is_some());
+    let place = match (core.is_suspect(node), has_candidate) {
+        (true, _) => Place::Suspects(now),
+        (false, true) => Place::Checks,
+        (false, false) => Place::Queue,
+    };
+    core.put(node, place);
+}
+
+/// Give every suspect a worker for itself: a fresh one, or after a while any that holds nothing; if there is none, one after
+/// the other gets no more leases until it holds nothing.
+fn isolate_suspects(core: &mut Core, now: Duration, outbox: &mut Outbox) {
+    core.next_patience = None;
+    while let Some((since, node)) = core.waiting.suspect() {
+        let patience_ends = since + core.policy.suspect_patience;
+        let is_patient = now < patience_ends;
+        let any = || (!is_patient).then(|| cleared(core).or_else(|| core.members.idle())).flatten();
+        if let Some(worker) = core.members.fresh().or_else(any) {
+            isolate(core, worker, node, now, outbox);
+        } else if is_patient {
+            core.next_patience = Some(patience_ends);
+            break;
+        } else if core.clearing.is_some() || !clear_one(core, now, outbox) {
+            return;
+        }
+    }
+    // Nobody waits for it any more.
+    if let Some(worker) = core.clearing.take() {
+        core.members.change(worker, |member| member.is_clearing = false);
+    }
+}
+
+/// The worker that was cleared, once it holds nothing.
+fn cleared(core: &Core) -> Option<WorkerId> {
+    core.clearing.filter(|worker| core.members.get(*worker).is_some_and(|member| member.leases.is_empty()))
+}
+
+/// Begin to clear a worker; `false` if there is none.
+fn clear_one(core: &mut Core, now: Duration, outbox: &mut Outbox) -> bool {
+    let Some(worker) = core.members.least_busy() else { return false };
+    core.clearing = Some(worker);
+    let unbegun = core.members.change(worker, |member| {
+        member.is_clearing = true;
+        member.waiting.clone()
+    });
+    for node in unbegun.into_iter().flatten() {
+        take_back(core, worker, node, now, outbox);
+        if core.look(node).is_some_and(|record| record.holders.is_empty()) {
+            await_now(core, node, now);
+        }
+    }
+    true
+}
+
+fn isolate(core: &mut Core, worker: WorkerId, node: NodeId, now: Duration, outbox: &mut Outbox) {
+    core.clearing = core.clearing.filter(|clearing| *clearing != worker);
+    core.members.change(worker, |member| {
+        member.is_clearing = false;
+        member.alone_with = Some(node);
+    });
+    assign(core, worker, node, now, outbox);
+}
+
+/// Give nodes whose output is to be verified to another worker than the one it came from, if there is another.
+fn give_checks(core: &mut Core, now: Duration, outbox: &mut Outbox) {
+    loop {
+        let is_only_one = core.members.accepting() == 1;
+        let places: Vec<_> = core.members.with_place().take(2).collect();
+        let pair = core.waiting.checks().take(CHECKS_LOOKED_AT).find_map(|node| {
+            let mut able = places.iter().filter(|worker| is_only_one || !is_origin(core, node, **worker));
+            Some((node, *able.next()?))
+        });
+        let Some((node, worker)) = pair else { return };
+        assign(core, worker, node, now, outbox);
+    }
+}
+
+/// Whether the output that is to be verified came from this worker.
+pub(super) fn is_origin(core: &Core, node: NodeId, worker: WorkerId) -> bool {
+    let candidate = core.look(node).and_then(|record| record.candidate.as_ref());
+    candidate.is_some_and(|candidate| candidate.site == Site::Worker(worker))
+}
+
+/// Move nodes that merely wait on one worker to a worker with an idle thread.
+fn balance(core: &mut Core, now: Duration, outbox: &mut Outbox) {
+    loop {
+        let idle = core.members.with_thread().next();
+        let (Some(idle), Some((from, member))) = (idle, core.members.busiest()) else { return };
+        let has = |node: &NodeId| core.members.get(idle).is_some_and(|member| member.leases.contains_key(node));
+        let movable = member.waiting.iter().rev().take(CHECKS_LOOKED_AT);
+        let Some(node) = movable.copied().find(|node| !has(node) && !is_origin(core, *node, idle)) else { return };
+        take_back(core, from, node, now, outbox);
+        assign(core, idle, node, now, outbox);
+    }
+}
+
+/// Give a worker a lease of a node.
+pub(super) fn assign(core: &mut Core, worker: WorkerId, node: NodeId, now: Duration, outbox: &mut Outbox) {
+    core.put(node, Place::Nowhere);
+    let epoch = core.epoch;
+    let Some(record) = core.record(node) else { return };
+    record.attempts += 1;
+    let attempt = record.attempts;
+    core.summary.attempts += 1;
+    core.give(worker, node, attempt, now);
+    outbox.push(Action::Assign { worker, lease: Lease { node, attempt, epoch } });
+}
+
+/// End a lease and tell its worker.
+pub(super) fn take_back(core: &mut Core, worker: WorkerId, node: NodeId, now: Duration, outbox: &mut Outbox) {
+    let epoch = core.epoch;
+    if let Some(held) = core.end_lease(worker, node, now) {
+        outbox.push(Action::Cancel { worker, lease: Lease { node, attempt: held.attempt, epoch } });
+    }
+}

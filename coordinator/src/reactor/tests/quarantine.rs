@@ -1,0 +1,231 @@
+use super::*;
+
+/// Worker `number` joins, executes node 0 and dies of it.
+fn die(bench: &mut Bench, number: u64) -> Vec<String> {
+    let worker = WorkerId(number);
+    bench.join(worker, 2);
+    let attempt = bench.core.look(NodeId(0)).unwrap().attempts;
+    bench.start(worker, 0, attempt);
+    bench.lose(worker, Departure::Lost)
+}
+
+/// A node that has killed two workers.
+fn suspected(planner: Script) -> Bench {
+    let mut bench = Bench::new(planner);
+    assert_eq!(die(&mut bench, 11)[0], "n0 requeued, 1");
+    let second = die(&mut bench, 12);
+    assert_eq!(second[..2], ["n0 suspected, 2", "n0 requeued, 2"]);
+    bench
+}
+
+#[test]
+fn node_that_kills_its_workers_runs_alone_and_fails_by_name_after_three_more_deaths() {
+    let mut bench = suspected(independent(3));
+    for crash in 1..=2 {
+        let worker = WorkerId(20 + crash);
+        let attempt = u32::try_from(crash).unwrap() + 2;
+        assert_eq!(bench.join(worker, 4), [format!("{worker} gets 0.{attempt}")], "and nothing else");
+        bench.start(worker, 0, attempt);
+        assert_eq!(bench.lose(worker, Departure::Lost)[0], format!("n0 requeued, {}", crash + 2));
+    }
+    bench.join(A, 2);
+    bench.start(A, 0, 5);
+    let error = bench.try_handle(Event::WorkerLeft { worker: A, departure: Departure::Lost }).unwrap_err();
+    let message = error.to_string();
+    assert!(message.starts_with("test \"n0\" failed: 3 worker processes died while they executed it"), "{message}");
+    assert_eq!(error.exit_code(), 3);
+    assert_eq!(bench.planner.failed, [(NodeId(0), FailureReason::Crashed { crashes: 3 })]);
+}
+
+#[test]
+fn failure_of_a_suspect_is_its_own_and_the_others_complete() {
+    let mut bench = suspected(Script { tolerates_failures: true, ..independent(2) });
+    for number in 20..23 {
+        die(&mut bench, number);
+    }
+    bench.join(A, 1);
+    bench.finish(A, 1, bench.core.look(NodeId(1)).unwrap().attempts, 1);
+    assert!(bench.core.is_finished());
+    assert_eq!((bench.core.summary().completed_nodes, bench.core.summary().failed_nodes), (1, 1));
+}
+
+#[test]
+fn innocent_node_completes_alone_and_its_worker_goes_on() {
+    let mut bench = suspected(independent(2));
+    assert_eq!(bench.join(A, 1), ["worker 1 gets 0.3"]);
+    bench.start(A, 0, 3);
+    let attempt = bench.core.look(NodeId(1)).unwrap().attempts + 1;
+    assert_eq!(
+        bench.finish(A, 0, 3, 0),
+        ["worker 1 is thanked for 0.3".to_owned(), format!("worker 1 gets 1.{attempt}")]
+    );
+}
+
+#[test]
+fn only_deaths_alone_and_while_executing_count_against_a_suspect() {
+    let mut bench = suspected(independent(1));
+    bench.join(A, 1);
+    // In transfer: nobody's fault.
+    assert_eq!(bench.lose(A, Departure::Lost), ["n0 requeued, 2"]);
+    for departure in [Departure::Silent, Departure::Goodbye, Departure::TooSlow] {
+        bench.join(A, 1);
+        bench.start(A, 0, bench.core.look(NodeId(0)).unwrap().attempts);
+        assert_eq!(bench.lose(A, departure), ["n0 requeued, 2"]);
+    }
+    assert_eq!(bench.core.look(NodeId(0)).unwrap().deaths.alone, 0);
+}
+
+#[test]
+fn nodes_that_shared_a_worker_with_a_killer_are_told_apart_from_it() {
+    let mut bench = Bench::new(Script { tolerates_failures: true, ..independent(2) });
+    for number in 11..=12 {
+        let worker = WorkerId(number);
+        bench.join(worker, 2);
+        for node in 0..2 {
+            bench.start(worker, node, u32::try_from(number).unwrap() - 10);
+        }
+        bench.lose(worker, Departure::Lost);
+    }
+    // Each gets a worker of its own, however many threads it has.
+    assert_eq!(bench.join(A, 2), ["worker 1 gets 0.3"]);
+    assert_eq!(bench.join(B, 2), ["worker 2 gets 1.3"]);
+    bench.start(A, 0, 3);
+    bench.start(B, 1, 3);
+    bench.finish(B, 1, 3, 1);
+    bench.lose(A, Departure::Lost);
+    for number in 21..=22 {
+        die(&mut bench, number);
+    }
+    assert!(bench.core.is_finished());
+    assert_eq!((&bench.planner.completed[..], bench.planner.failed.len()), (&[NodeId(1)][..], 1));
+}
+
+/// Worker 1 has executed something and holds node 0 as well, which then kills worker 2 twice.
+fn suspected_beside_a_worker(nodes: usize) -> Bench {
+    let mut bench = Bench::new(independent(nodes));
+    bench.join(A, 1);
+    let last = nodes as u64 - 1;
+    bench.join(B, 1);
+    for crash in 1..=2 {
+        let held = bench.core.members.get(B).unwrap().leases.iter().next().map(|(node, held)| (*node, held.attempt));
+        let (node, attempt) = held.unwrap();
+        assert!(node.0 <= last);
+        bench.start(B, node.0, attempt);
+        bench.lose(B, Departure::Lost);
+        if crash == 1 {
+            bench.join(B, 1);
+        }
+    }
+    bench
+}
+
+#[test]
+fn suspect_waits_a_moment_for_a_fresh_worker_and_then_takes_an_idle_one() {
+    let mut bench = Bench::new(independent(2));
+    bench.join(A, 1);
+    bench.start(A, 0, 1);
+    bench.finish(A, 0, 1, 0);
+    bench.handle(Event::WorkerLeft { worker: A, departure: Departure::Goodbye });
+    let mut deaths = Vec::new();
+    for number in 11..=12 {
+        let worker = WorkerId(number);
+        bench.join(worker, 1);
+        bench.start(worker, 1, bench.core.look(NodeId(1)).unwrap().attempts);
+        if number == 12 {
+            // Another one comes, and is not fresh any more: it helps with what seems slow.
+            bench.join(B, 1);
+            bench.live(5000, &[worker, B]);
+        }
+        deaths.extend(bench.lose(worker, Departure::Lost));
+    }
+    assert!(deaths.contains(&"n1 suspected, 2".to_owned()), "{deaths:?}");
+    assert_eq!(bench.core.look(NodeId(1)).unwrap().holders, [B], "it is fresh, and there");
+}
+
+#[test]
+fn worker_that_has_executed_something_takes_a_suspect_only_after_a_moment() {
+    let mut bench = Bench::new(independent(3));
+    bench.join(A, 1);
+    bench.start(A, 0, 1);
+    bench.finish(A, 0, 1, 0);
+    bench.start(A, 1, 1);
+    bench.finish(A, 1, 1, 1);
+    // Worker 2 takes the last node and dies of it, and so does worker 3.
+    bench.handle(Event::WorkerDrains { worker: A });
+    for worker in [B, C] {
+        bench.join(worker, 1);
+        bench.start(worker, 2, bench.core.look(NodeId(2)).unwrap().attempts);
+        bench.lose(worker, Departure::Lost);
+    }
+    bench.lose(A, Departure::Goodbye);
+    assert!(bench.core.is_suspect(NodeId(2)));
+    let fresh = bench.join(A, 1);
+    assert_eq!(fresh, ["worker 1 gets 2.4"]);
+}
+
+#[test]
+fn without_a_fresh_worker_an_idle_one_is_cleared_and_has_the_suspect_for_itself() {
+    let mut bench = suspected_beside_a_worker(6);
+    let suspect = (0..6).map(NodeId).find(|node| bench.core.is_suspect(*node));
+    // Both deaths were of whatever node was first on worker 2.
+    let Some(suspect) = suspect else { panic!("{:?}", bench.core.records) };
+    // Worker 1 is busy with others and has executed something.
+    let (first, attempt) = {
+        let member = bench.core.members.get(A).unwrap();
+        member.leases.iter().next().map(|(node, held)| (*node, held.attempt)).unwrap()
+    };
+    bench.start(A, first.0, attempt);
+    assert!(bench.live(1000, &[A]).is_empty(), "it waits for a fresh one");
+    let cleared = bench.live(1000, &[A]);
+    assert!(cleared.iter().all(|said| said.starts_with("worker 1 drops")) && cleared.len() == 2, "{cleared:?}");
+    let alone = bench.finish(A, first.0, attempt, 1);
+    let attempt = bench.core.look(suspect).unwrap().attempts;
+    assert_eq!(alone[1..], [format!("worker 1 gets {}.{attempt}", suspect.0)]);
+    bench.start(A, suspect.0, attempt);
+    let after = bench.finish(A, suspect.0, attempt, 0);
+    assert_eq!(after.len(), 4, "worker 1 goes on with three others: {after:?}");
+}
+
+#[test]
+fn while_workers_die_that_executed_nothing_a_suspect_is_excused_but_not_for_ever() {
+    let mut bench = suspected(independent(1));
+    let mut deaths = 0;
+    while bench.planner.failed.is_empty() {
+        bench.join(A, 1);
+        bench.join(B, 1);
+        bench.start(A, 0, bench.core.look(NodeId(0)).unwrap().attempts);
+        bench.lose(B, Departure::Lost);
+        let _ = bench.try_handle(Event::WorkerLeft { worker: A, departure: Departure::Lost });
+        deaths += 1;
+        assert!(deaths < 99, "it fails in the end");
+    }
+    // Three count, and ten times as many were excused.
+    assert_eq!(deaths, 33);
+}
+
+#[test]
+fn node_whose_workers_are_lost_time_and_again_waits_longer_and_longer() {
+    let mut bench = Bench::new(independent(1));
+    let mut delays = Vec::new();
+    for _ in 0..9 {
+        bench.join(A, 1);
+        let before = bench.now;
+        while bench.core.members.get(A).unwrap().leases.is_empty() {
+            bench.now = bench.core.next_deadline().unwrap();
+            bench.handle(Event::Heartbeat { worker: A, executing: vec![] });
+        }
+        delays.push((bench.now - before).as_millis());
+        bench.start(A, 0, bench.core.look(NodeId(0)).unwrap().attempts);
+        bench.lose(A, Departure::Silent);
+    }
+    assert_eq!(delays, [0, 0, 100, 200, 400, 800, 1600, 3200, 5000]);
+}
+
+#[test]
+fn worker_that_ends_in_order_costs_its_nodes_no_time() {
+    let mut bench = Bench::new(independent(1));
+    for _ in 0..9 {
+        assert_eq!(bench.join(A, 1).len(), 1);
+        bench.lose(A, Departure::Goodbye);
+    }
+}

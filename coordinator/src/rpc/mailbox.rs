@@ -1,0 +1,179 @@
+//! What waits to be written to one worker: bounded, whatever the worker does.
+
+use std::io;
+use std::pin::Pin;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::task::{Context, Poll, ready};
+use std::time::Duration;
+
+use lookalike::protocol::ToWorker;
+use tokio::io::AsyncWrite;
+use tokio::sync::mpsc::{UnboundedReceiver, UnboundedSender, unbounded_channel};
+use tokio::time::{Instant, Sleep, sleep};
+use tokio_util::sync::CancellationToken;
+
+use super::Outgoing;
+
+/// What a message takes in a queue beside what it points to.
+const MESSAGE_BYTES: usize = 128;
+
+/// Where messages for a worker are put. Dropped, it lets what is in it be written and the connection end in order.
+#[derive(Debug)]
+pub(crate) struct Mailbox {
+    queue: UnboundedSender<Outgoing>,
+    state: Arc<State>,
+}
+
+/// Where they are taken from.
+#[derive(Debug)]
+pub(super) struct Postman {
+    queue: UnboundedReceiver<Outgoing>,
+    state: Arc<State>,
+}
+
+#[derive(Debug)]
+struct State {
+    waiting_bytes: AtomicUsize,
+    bound_bytes: usize,
+    overflowing: CancellationToken,
+    closed: CancellationToken,
+}
+
+/// A mailbox that takes so many bytes. Blobs count as references: their bytes are in memory once, whoever waits for them.
+pub(super) fn mailbox(bound_bytes: usize) -> (Mailbox, Postman) {
+    let (sender, receiver) = unbounded_channel();
+    let (overflowing, closed) = (CancellationToken::new(), CancellationToken::new());
+    let state = Arc::new(State { waiting_bytes: AtomicUsize::new(0), bound_bytes, overflowing, closed });
+    (Mailbox { queue: sender, state: Arc::clone(&state) }, Postman { queue: receiver, state })
+}
+
+impl Mailbox {
+    /// Put something in. When it does not fit, the worker is too slow, and its connection ends.
+    pub(crate) fn send(&self, outgoing: Outgoing) {
+        let bytes = weight(&outgoing);
+        if self.state.waiting_bytes.fetch_add(bytes, Ordering::Relaxed) + bytes > self.state.bound_bytes {
+            self.state.overflowing.cancel();
+            return;
+        }
+        // A connection that has ended takes nothing any more.
+        let _ = self.queue.send(outgoing);
+    }
+
+    /// End the connection at once, whatever is still to be written.
+    pub(crate) fn close(&self) {
+        self.state.closed.cancel();
+    }
+}
+
+impl Postman {
+    /// The next thing to write; `None` once the mailbox is dropped and empty.
+    pub(super) async fn next(&mut self) -> Option<Outgoing> {
+        let next = self.queue.recv().await?;
+        self.state.waiting_bytes.fetch_sub(weight(&next), Ordering::Relaxed);
+        Some(next)
+    }
+
+    /// Wait until more was sent than fits.
+    pub(super) fn overflowing(&self) -> impl Future<Output = ()> + use<> {
+        self.state.overflowing.clone().cancelled_owned()
+    }
+
+    /// Wait until the connection shall end at once.
+    pub(super) fn closed(&self) -> impl Future<Output = ()> + use<> {
+        self.state.closed.clone().cancelled_owned()
+    }
+}
+
+fn weight(outgoing: &Outgoing) -> usize {
+    MESSAGE_BYTES
+        + match outgoing {
+            Outgoing::Message(ToWorker::Assign(node)) => {
+                node.parameters.len() + node.kind.len() + node.label.len() + node.inputs.len() * size_of::<[u8; 32]>()
+            }
+            Outgoing::Message(ToWorker::Stop { reason }) => reason.len(),
+            Outgoing::Message(_) | Outgoing::Blob(_) => 0,
+        }
+}
+
+/// A stream that fails with [`io::ErrorKind::TimedOut`] when the other side takes nothing for too long. What it takes, be it
+/// little, is a sign that it reads; heartbeats only tell that it writes.
+#[derive(Debug)]
+pub(super) struct Patient<W> {
+    stream: W,
+    patience: Duration,
+    /// Runs while the stream takes nothing.
+    running_out: Option<Pin<Box<Sleep>>>,
+}
+
+impl<W> Patient<W> {
+    pub(super) fn new(stream: W, patience: Duration) -> Self {
+        Self { stream, patience, running_out: None }
+    }
+
+    fn wait<T>(&mut self, context: &mut Context<'_>, outcome: Poll<io::Result<T>>) -> Poll<io::Result<T>> {
+        if outcome.is_ready() {
+            self.running_out = None;
+            return outcome;
+        }
+        let patience = self.patience;
+        let running_out = self.running_out.get_or_insert_with(|| Box::pin(sleep(patience)));
+        ready!(running_out.as_mut().poll(context));
+        // Whoever polls again after this error starts anew.
+        running_out.as_mut().reset(Instant::now() + patience);
+        Poll::Ready(Err(io::Error::new(io::ErrorKind::TimedOut, "the worker does not read")))
+    }
+}
+
+impl<W: AsyncWrite + Unpin> AsyncWrite for Patient<W> {
+    fn poll_write(self: Pin<&mut Self>, context: &mut Context<'_>, bytes: &[u8]) -> Poll<io::Result<usize>> {
+        let this = self.get_mut();
+        let outcome = Pin::new(&mut this.stream).poll_write(context, bytes);
+        this.wait(context, outcome)
+    }
+
+    fn poll_flush(self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<io::Result<()>> {
+        let this = self.get_mut();
+        let outcome = Pin::new(&mut this.stream).poll_flush(context);
+        this.wait(context, outcome)
+    }
+
+    fn poll_shutdown(self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<io::Result<()>> {
+        let this = self.get_mut();
+        let outcome = Pin::new(&mut this.stream).poll_shutdown(context);
+        this.wait(context, outcome)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use lookalike::graph::Blob;
+    use tokio::io::{AsyncReadExt, AsyncWriteExt, duplex};
+
+    #[test]
+    fn mailbox_that_nobody_empties_overflows_and_blobs_weigh_nothing() {
+        let (mailbox, postman) = mailbox(10_000);
+        let blob = Blob::new(vec![0; 1 << 20]);
+        (0..50).for_each(|_| mailbox.send(Outgoing::Blob(blob.clone())));
+        assert!(!postman.state.overflowing.is_cancelled());
+        (0..50).for_each(|_| mailbox.send(Outgoing::Message(ToWorker::Stop { reason: "x".repeat(100) })));
+        assert!(postman.state.overflowing.is_cancelled());
+        assert!(postman.queue.len() < 100);
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn stream_is_given_up_on_only_when_nothing_at_all_is_read_for_too_long() {
+        let (near, mut far) = duplex(10);
+        let mut near = Patient::new(near, Duration::from_secs(5));
+        let writing = tokio::spawn(async move { near.write_all(&[7; 100]).await });
+        let began = Instant::now();
+        for _ in 0..5 {
+            sleep(Duration::from_secs(4)).await;
+            far.read_exact(&mut [0; 10]).await.unwrap();
+        }
+        let error = writing.await.unwrap().unwrap_err();
+        assert_eq!(error.kind(), io::ErrorKind::TimedOut);
+        assert_eq!(began.elapsed(), Duration::from_secs(25));
+    }
+}

@@ -1,0 +1,173 @@
+//! Real workers that are stopped, asked to end, or wrong: nodes are neither lost nor blamed, and results are those of a run in a
+//! single process.
+
+use std::process::Command;
+use std::time::Duration;
+
+use lookalike_coordinator::comm::{Departure, RunEvent};
+use lookalike_coordinator::core::Policy;
+use lookalike_coordinator::runner::{RunError, RunnerOptions};
+use lookalike_tests::cluster::{Cluster, options};
+use lookalike_tests::gate::Gate;
+use lookalike_tests::plan::{Leaves, TestPlanner};
+use lookalike_tests::process::{Process, signal, stderr};
+
+const PROGRAM: &str = env!("CARGO_BIN_EXE_lookalike-test-cluster");
+
+fn gates(gate: &Gate, count: usize) -> Leaves {
+    Leaves::Gates { count, address: gate.address().to_string() }
+}
+
+/// The result of one gate; to pass it gives the same bytes anywhere.
+fn reference() -> Option<Vec<u8>> {
+    let gate = Gate::new();
+    let leaves = gates(&gate, 1);
+    let keeper = std::thread::spawn(move || gate.next().release());
+    let reference = TestPlanner::reference(leaves);
+    keeper.join().expect("the gate is passed");
+    reference
+}
+
+fn impatient() -> Policy {
+    Policy { heartbeat: Duration::from_millis(100), lost_after: Duration::from_millis(700), ..Policy::default() }
+}
+
+fn wait_for_drain(cluster: &Cluster) {
+    cluster.wait_for(|event| matches!(event, RunEvent::WorkerDraining { .. }).then_some(()));
+}
+
+fn departure(cluster: &Cluster) -> Departure {
+    cluster.wait_for(|event| match event {
+        RunEvent::WorkerLeft { departure, .. } => Some(departure.clone()),
+        _ => None,
+    })
+}
+
+fn deaths_when_requeued(cluster: &Cluster) -> u32 {
+    cluster.wait_for(|event| match event {
+        RunEvent::NodeRequeued { crashes, .. } => Some(*crashes),
+        _ => None,
+    })
+}
+
+#[test]
+fn worker_that_hangs_is_lost_after_its_lease() {
+    let gate = Gate::new();
+    let cluster = Cluster::start(gates(&gate, 1), RunnerOptions { policy: impatient(), ..options(PROGRAM, 2) });
+    let first = gate.next();
+    signal(first.process(), "STOP");
+    let second = gate.next();
+    assert_ne!(second.process(), first.process());
+    second.release();
+    assert_eq!(cluster.finish().0, reference());
+    // The run has ended, and with it the process that could not end itself.
+    first.wait_for_death();
+}
+
+#[test]
+fn worker_that_wakes_up_again_brings_its_result_and_it_counts() {
+    let gate = Gate::new();
+    let cluster = Cluster::start(gates(&gate, 1), RunnerOptions { policy: impatient(), ..options(PROGRAM, 2) });
+    let first = gate.next();
+    signal(first.process(), "STOP");
+    assert_eq!(departure(&cluster), Departure::Silent);
+    let second = gate.next();
+    signal(first.process(), "CONT");
+    first.release();
+    // The second one never answers: it is the result of the first that ends the run.
+    let (result, summary) = cluster.finish();
+    assert_eq!((result, summary.requeued_nodes), (reference(), 1));
+    assert_eq!(summary.workers_joined, 3);
+    second.wait_for_death();
+}
+
+#[test]
+fn worker_that_is_asked_to_end_finishes_what_it_executes() {
+    for name in ["TERM", "INT"] {
+        let gate = Gate::new();
+        let listen = Some(([127, 0, 0, 1], 0).into());
+        let cluster = Cluster::start(gates(&gate, 1), RunnerOptions { listen, ..options(PROGRAM, 0) });
+        cluster.address();
+        let mut command = Command::new(PROGRAM);
+        let worker = Process::start(command.args(["worker", "--threads", "1", "--access"]).arg(cluster.access_file()));
+        let waiting = gate.next();
+        signal(worker.id(), name);
+        wait_for_drain(&cluster);
+        waiting.release();
+        assert_eq!(departure(&cluster), Departure::Goodbye);
+        let output = worker.output();
+        assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+        assert!(stderr(&output).contains("asked to end: finishing what is being computed"), "{}", stderr(&output));
+        // The last node waits for another one.
+        let another = Process::start(Command::new(PROGRAM).args(["worker", "--access"]).arg(cluster.access_file()));
+        let (result, summary) = cluster.finish();
+        assert_eq!((result, summary.requeued_nodes), (reference(), 0));
+        assert_eq!(another.output().status.code(), Some(0));
+    }
+}
+
+#[test]
+fn worker_that_is_asked_twice_ends_at_once_and_is_not_held_against_its_node() {
+    let gate = Gate::new();
+    let cluster = Cluster::start(gates(&gate, 1), options(PROGRAM, 1));
+    let first = gate.next();
+    signal(first.process(), "TERM");
+    wait_for_drain(&cluster);
+    signal(first.process(), "TERM");
+    assert_eq!(departure(&cluster), Departure::Goodbye);
+    assert_eq!(deaths_when_requeued(&cluster), 0);
+    first.wait_for_death();
+    gate.next().release();
+    assert_eq!(cluster.finish().0, reference());
+}
+
+#[test]
+fn worker_whose_time_to_drain_is_over_hands_back_what_it_executes() {
+    let gate = Gate::new();
+    let policy = Policy { drain_time: Duration::from_millis(300), ..Policy::default() };
+    let cluster = Cluster::start(gates(&gate, 1), RunnerOptions { policy, ..options(PROGRAM, 1) });
+    let first = gate.next();
+    signal(first.process(), "TERM");
+    assert_eq!(departure(&cluster), Departure::Goodbye);
+    assert_eq!(deaths_when_requeued(&cluster), 0);
+    first.wait_for_death();
+    gate.next().release();
+    assert_eq!(cluster.finish().0, reference());
+}
+
+#[test]
+fn worker_that_is_killed_while_it_drains_is_not_held_against_its_node() {
+    let gate = Gate::new();
+    let cluster = Cluster::start(gates(&gate, 1), options(PROGRAM, 1));
+    let first = gate.next();
+    signal(first.process(), "TERM");
+    wait_for_drain(&cluster);
+    // As Slurm does when the time is over.
+    signal(first.process(), "KILL");
+    assert_eq!(departure(&cluster), Departure::Lost);
+    assert_eq!(deaths_when_requeued(&cluster), 0);
+    gate.next().release();
+    assert_eq!(cluster.finish().0, reference());
+}
+
+#[test]
+fn run_whose_every_output_is_verified_gives_the_same_bytes() {
+    let leaves = Leaves::Digests { count: 21, shared_bytes: 300_000 };
+    let reference = TestPlanner::reference(leaves.clone());
+    for workers in [1, 2, 3] {
+        let policy = Policy { verify_fraction: 1.0, ..Policy::default() };
+        let options = RunnerOptions { policy, ..options(PROGRAM, workers) };
+        let (result, summary) = Cluster::start(leaves.clone(), options).finish();
+        assert_eq!(result, reference, "{workers} workers");
+        // The digests and the last node; the one of the coordinator is its own.
+        assert_eq!((summary.completed_nodes, summary.verified_nodes), (23, 22));
+    }
+}
+
+#[test]
+fn policy_that_makes_no_sense_is_refused_before_anything_is_started() {
+    let policy = Policy { lost_after: Duration::from_secs(1), ..Policy::default() };
+    let error = Cluster::start(Leaves::Panic, RunnerOptions { policy, ..options(PROGRAM, 1) }).error();
+    assert!(matches!(error, RunError::Policy(_)), "{error}");
+    assert_eq!(error.exit_code(), 2);
+}
