@@ -15,15 +15,17 @@ use tempfile::TempDir;
 /// Several shards of the subset's table, so that something can die between them.
 const FLAGS: &str = "--samples 128 --seed 5";
 
-/// The node that a step is for is in its environment, as Slurm would have it.
+/// The node that a step is for is in its environment, and what ends the step is told to all its processes, as Slurm would have it.
 const SRUN: &str = r#"for argument; do
   case "$argument" in
     --nodelist=*) export SLURMD_NODENAME="${argument#--nodelist=}" ;;
-    bash) exec "$@" ;;
+    bash) break ;;
   esac
   shift
 done
-exit 9"#;
+setsid "$@" &
+trap 'kill -TERM -$!; wait $!' TERM
+wait $!"#;
 
 /// Lists of hosts are written out; what was requeued is noted.
 const SCONTROL: &str = r#"case "$1" in
