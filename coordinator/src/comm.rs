@@ -150,6 +150,18 @@ pub enum RunEvent {
         /// What the access file tells the workers.
         address: String,
     },
+    /// An earlier coordinator of this run is gone on with.
+    Resumed {
+        /// Counts the coordinator processes of the run, from 1.
+        epoch: u64,
+        /// How many nodes have their output in the journal.
+        results: usize,
+    },
+    /// A local worker process was started.
+    LocalWorkerStarted {
+        /// Its process id.
+        process: u32,
+    },
     /// A worker has joined.
     WorkerJoined {
         /// Its number.
@@ -189,6 +201,23 @@ pub enum RunEvent {
     },
     /// The planner has added a node.
     NodeAdded {
+        /// The node.
+        name: NodeName,
+    },
+    /// The inputs of a node are there. Told of runs that are remembered only.
+    NodeReady {
+        /// The node.
+        node: NodeId,
+    },
+    /// A node has the output that it got from an earlier coordinator of this run.
+    NodeRecalled {
+        /// The node.
+        name: NodeName,
+        /// The size of the output in bytes.
+        bytes: usize,
+    },
+    /// Nobody needs the output of a node any more, not even a coordinator that goes on with this run: only its hash is kept.
+    NodeReleased {
         /// The node.
         name: NodeName,
     },

@@ -8,19 +8,22 @@ mod waiting;
 use std::collections::VecDeque;
 use std::time::Duration;
 
-use lookalike::graph::{Blob, Graph, NodeId, WorkerId};
+use lookalike::graph::{Blob, Graph, NodeId, NodeKey, WorkerId};
 
 pub(crate) use self::members::{Held, Member, Members};
 use self::pace::Pace;
 pub(crate) use self::waiting::{Place, Waiting};
 use crate::comm::{NodeName, Site};
 pub use crate::policy::Policy;
+use crate::recall::Recall;
 
 /// What a run has cost, for people: nothing of it may reach a result.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct RunSummary {
     /// How many nodes were completed.
     pub completed_nodes: usize,
+    /// How many of them had been completed by an earlier coordinator of this run.
+    pub recalled_nodes: usize,
     /// How many nodes failed.
     pub failed_nodes: usize,
     /// How many leases were given out, and how often a node was run by the coordinator.
@@ -71,6 +74,10 @@ pub struct Core {
     /// How the last local worker ended, once none will be started again and no other can join.
     pub(crate) given_up: Option<String>,
     pub(crate) summary: RunSummary,
+    /// Which workers that are about to join execute which nodes for an earlier coordinator of this run.
+    pub(crate) continued: Vec<(WorkerId, NodeId)>,
+    /// What earlier coordinators of this run have left.
+    pub(crate) recall: Option<Box<dyn Recall>>,
 }
 
 /// What the coordinator knows of a node beside the graph.
@@ -94,17 +101,19 @@ pub(crate) struct Record {
     /// How often it has lost a worker that executed it, for whatever reason but a drain.
     pub(crate) losses: u32,
     pub(crate) deaths: Deaths,
+    /// What it computes: known once it is ready, where the run is remembered.
+    pub(crate) key: Option<NodeKey>,
 }
 
 /// The deaths of workers that executed a node.
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Deaths {
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Deaths {
     /// While they executed it, perhaps with others, or before it was a suspect.
-    pub(crate) in_company: u32,
+    pub in_company: u32,
     /// While it had its worker for itself.
-    pub(crate) alone: u32,
+    pub alone: u32,
     /// While it had its worker for itself, when other workers died of something else.
-    pub(crate) excused: u32,
+    pub excused: u32,
 }
 
 impl Deaths {
@@ -147,7 +156,15 @@ impl Core {
             starving: None,
             given_up: None,
             summary: RunSummary::default(),
+            continued: Vec::new(),
+            recall: None,
         }
+    }
+
+    /// Complete nodes from what earlier coordinators of this run have left, wherever there is something.
+    #[must_use]
+    pub fn with_recall(self, recall: Box<dyn Recall>) -> Self {
+        Self { recall: Some(recall), ..self }
     }
 
     /// The graph of the run.

@@ -16,11 +16,12 @@ mod speculation;
 use std::time::Duration;
 
 use lookalike::graph::{
-    Blob, BlobHash, Change, GraphEdit, NodeFailure, NodeId, NodeState, Placement, PlanError, Planner, WorkerId,
+    Blob, BlobHash, Change, Completion, GraphEdit, NodeFailure, NodeId, NodeState, Placement, PlanError, Planner,
+    WorkerId,
 };
 
 use crate::comm::{Action, Departure, Outbox, RunEvent, Site};
-use crate::core::{Core, Place, Record, Starving};
+use crate::core::{Core, Record, Starving};
 use crate::runner::RunError;
 
 /// Something that happened.
@@ -71,6 +72,22 @@ pub enum Event {
         node: NodeId,
         /// The attempt under which it was assigned.
         attempt: u32,
+        /// The output.
+        output: Blob,
+    },
+    /// A worker that is about to join executes a node already: an earlier coordinator of this run gave it.
+    Continues {
+        /// The worker.
+        worker: WorkerId,
+        /// The node, by its number of today.
+        node: NodeId,
+    },
+    /// A worker has the output of a node that an earlier coordinator of this run gave it; its hash was verified.
+    Recovered {
+        /// The worker.
+        worker: WorkerId,
+        /// The node, by its number of today.
+        node: NodeId,
         /// The output.
         output: Blob,
     },
@@ -140,6 +157,8 @@ pub fn handle(
         Event::Finished { site, node, attempt, output } => {
             answers::finished(core, (site, node, attempt), output, now, outbox)?;
         }
+        Event::Continues { worker, node } => core.continued.push((worker, node)),
+        Event::Recovered { worker, node, output } => answers::recovered(core, worker, node, output, now, outbox)?,
         Event::Failed { site, node, attempt, failure } => {
             answers::failed(core, (site, node, attempt), failure, now, outbox)?;
         }
@@ -193,12 +212,36 @@ fn refused(core: &Core, node: NodeId, error: PlanError) -> RunError {
     RunError::WrongResult { name: Box::new(core.name(node)), site, error }
 }
 
+/// Complete a node from what an earlier coordinator of this run has left. Whether there was something.
+fn recall(core: &mut Core, node: NodeId, outbox: &mut Outbox) -> bool {
+    let Some(key) = core.graph.key(node) else { return false };
+    let Some(memory) = core.recall.as_mut().map(|recall| recall.recall(key)) else { return false };
+    if let Some(record) = core.record(node) {
+        record.key = Some(key);
+        record.deaths = memory.deaths;
+    }
+    let Some(output) = memory.output else { return false };
+    let bytes = output.len();
+    if core.graph.complete(node, output) != Completion::Accepted {
+        return false;
+    }
+    core.summary.recalled_nodes += 1;
+    outbox.tell(RunEvent::NodeRecalled { name: core.name(node), bytes });
+    true
+}
+
 fn make_ready(core: &mut Core, planner: &impl Planner, node: NodeId, now: Duration, outbox: &mut Outbox) {
+    if core.recall.is_some() {
+        if recall(core, node, outbox) {
+            return;
+        }
+        outbox.tell(RunEvent::NodeReady { node });
+    }
     let Some(spec) = core.graph.spec(node) else { return };
     if spec.placement == Placement::Worker {
         let is_verified = answers::is_chosen(core, spec, node) && planner.is_verified_by_repetition(spec);
         core.record(node).into_iter().for_each(|record| record.is_verified = is_verified);
-        core.put(node, Place::Queue);
+        schedule::await_now(core, node, now);
         return;
     }
     core.summary.attempts += 1;
@@ -238,6 +281,8 @@ fn watch_starvation(core: &mut Core, now: Duration, outbox: &mut Outbox) -> Resu
 
 #[cfg(test)]
 mod property_tests;
+#[cfg(test)]
+mod recall_tests;
 #[cfg(test)]
 mod storm_tests;
 #[cfg(test)]

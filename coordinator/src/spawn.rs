@@ -1,9 +1,13 @@
 //! Local worker processes: started with the run, started again when they die, gone when the run ends.
 //!
-//! Each one is on a leash: a pipe to its stdin that nobody writes to. When it ends, because the run ended or because the
-//! coordinator was killed by whatever means, the worker ends itself. Each one is in a process group of its own, so that a
-//! Ctrl-C at the terminal reaches the coordinator alone, which ends its workers in order.
+//! Each one is on a leash: a pipe to its stdin. One byte in it means that the run is over, its end without that byte that the
+//! coordinator was killed, by whatever means. In both cases the worker ends itself, but where a run can be gone on with it
+//! survives a killed coordinator for a while, and the next one takes it over. Each one is in a process group of its own, so that
+//! a Ctrl-C at the terminal reaches the coordinator alone, which ends its workers in order.
 
+mod orphan;
+
+use std::collections::BTreeSet;
 use std::ffi::OsString;
 use std::io;
 use std::num::NonZeroUsize;
@@ -11,13 +15,17 @@ use std::path::PathBuf;
 use std::process::{ExitStatus, Stdio};
 use std::time::Duration;
 
+use tokio::io::AsyncWriteExt;
 use tokio::process::{Child, ChildStdin, Command};
 use tokio::sync::mpsc::Sender;
+use tokio::sync::watch;
 use tokio::task::JoinSet;
 use tokio::time::{Instant, sleep, timeout};
 use tokio_util::sync::CancellationToken;
 use tracing::{debug, warn};
 
+use self::orphan::Orphan;
+pub(crate) use self::orphan::is_worker_alive;
 use crate::comm::RunEvent;
 use crate::reactor::Event;
 use crate::rpc::Inbound;
@@ -35,6 +43,8 @@ const LONGEST_PAUSE: Duration = Duration::from_secs(5);
 const FAREWELL_TIME: Duration = Duration::from_secs(2);
 /// How long a local worker tries to reach its coordinator, as its command line says it.
 const RECONNECT_FOR: &str = "60s";
+/// What the leash says before it ends, when the run is over.
+const RUN_IS_OVER: &[u8] = b".";
 /// The exit code of a worker for which a new attempt would fail too: bad usage, or refused.
 const HOPELESS: i32 = 2;
 
@@ -70,6 +80,8 @@ pub(crate) struct LocalWorkers {
     pub(crate) threads: NonZeroUsize,
     /// Whether other workers may come when all local ones are given up.
     pub(crate) others_may_come: bool,
+    /// Whether they live on for a while when the coordinator is killed.
+    pub(crate) may_survive: bool,
 }
 
 /// The threads of each of `workers` workers, so that together they use the cores once.
@@ -79,17 +91,27 @@ pub(crate) fn threads_per_worker(workers: usize) -> NonZeroUsize {
 }
 
 impl LocalWorkers {
-    /// Start the workers. A program that cannot be started at all is an error at once.
-    pub(crate) fn start(&self, inbound: &Sender<Inbound>, stop: &CancellationToken) -> Result<JoinSet<()>, RunError> {
-        let mut first = Vec::new();
-        for _ in 0..self.count {
-            first.push(
-                self.spawn().map_err(|source| RunError::Spawn { program: self.command.program.clone(), source })?,
-            );
+    /// Start the workers but for those that are there already, each of which keeps the place of one. A program that cannot be
+    /// started at all is an error at once.
+    pub(crate) fn start(
+        &self,
+        inbound: &Sender<Inbound>,
+        stop: &CancellationToken,
+        orphans: &[u32],
+        present: &watch::Sender<BTreeSet<u32>>,
+    ) -> Result<JoinSet<()>, RunError> {
+        let mut first: Vec<_> = orphans
+            .iter()
+            .map(|process| Place::Orphan(Orphan { process: *process, present: present.subscribe() }))
+            .collect();
+        for _ in orphans.len()..self.count {
+            let process =
+                self.spawn().map_err(|source| RunError::Spawn { program: self.command.program.clone(), source })?;
+            first.push(Place::Child(Box::new(process)));
         }
         let mut given_up = JoinSet::new();
-        for process in first {
-            given_up.spawn(self.clone().keep_alive(process, inbound.clone(), stop.clone()));
+        for place in first {
+            given_up.spawn(self.clone().keep_alive(place, inbound.clone(), stop.clone()));
         }
         let mut keeping = JoinSet::new();
         let (inbound, others_may_come) = (inbound.clone(), self.others_may_come);
@@ -100,19 +122,30 @@ impl LocalWorkers {
     }
 
     /// Keep one worker alive until `stop`. When it is given up, how it ended last.
-    async fn keep_alive(self, first: Process, inbound: Sender<Inbound>, stop: CancellationToken) -> Option<String> {
+    async fn keep_alive(self, first: Place, inbound: Sender<Inbound>, stop: CancellationToken) -> Option<String> {
         let mut quick_deaths = 0;
-        let mut next = Ok(first);
+        let mut next = match first {
+            Place::Child(process) => Ok(*process),
+            Place::Orphan(orphan) => match self.keep_orphan(orphan, &inbound, &stop).await {
+                true => self.spawn(),
+                false => return None,
+            },
+        };
         loop {
             let begin = Instant::now();
             let (process, status, is_hopeless) = match next {
-                Ok(mut process) => tokio::select! {
-                    ended = process.child.wait() => (process.id, describe(&ended), is_hopeless(&ended)),
-                    () = stop.cancelled() => {
-                        process.end().await;
-                        return None;
+                Ok(mut process) => {
+                    let started = RunEvent::LocalWorkerStarted { process: process.id };
+                    // When nobody listens any more the run is over, and `stop` will say so.
+                    let _ = inbound.send(Inbound::Tell(started)).await;
+                    tokio::select! {
+                        ended = process.child.wait() => (process.id, describe(&ended), is_hopeless(&ended)),
+                        () = stop.cancelled() => {
+                            process.end().await;
+                            return None;
+                        }
                     }
-                },
+                }
                 Err(error) => (0, format!("an error at its start: {error}"), false),
             };
             quick_deaths = if begin.elapsed() < HEALTHY_LIFE { quick_deaths + 1 } else { 1 };
@@ -134,11 +167,35 @@ impl LocalWorkers {
         }
     }
 
+    /// Let a worker of an earlier coordinator work for us, as long as it does. Whether another one has to take its place.
+    async fn keep_orphan(&self, mut orphan: Orphan, inbound: &Sender<Inbound>, stop: &CancellationToken) -> bool {
+        let process = orphan.process;
+        let was_here = tokio::select! {
+            was_here = orphan.replaced() => was_here,
+            () = stop.cancelled() => {
+                orphan.end().await;
+                return false;
+            }
+        };
+        if was_here {
+            let status = "an unknown status: an earlier coordinator had started it".to_owned();
+            let event = RunEvent::LocalWorkerEnded { process, status, restart_after: Some(Duration::ZERO) };
+            // When nobody listens any more the run is over, and `stop` will say so.
+            let _ = inbound.send(Inbound::Tell(event)).await;
+        } else {
+            debug!(process, "a local worker of an earlier coordinator has not come");
+        }
+        true
+    }
+
     fn spawn(&self) -> io::Result<Process> {
         let mut command = Command::new(&self.command.program);
         command.args(&self.command.arguments).arg("--access").arg(&self.access);
         command.args(["--address", &self.address, "--threads", &self.threads.to_string()]);
         command.args(["--reconnect-for", RECONNECT_FOR, "--leash"]);
+        if self.may_survive {
+            command.arg("--survive");
+        }
         if let Some(log) = &self.log {
             command.arg("--log").arg(log);
         }
@@ -175,6 +232,14 @@ async fn drain(mut keepers: JoinSet<Option<String>>) {
     while keepers.join_next().await.is_some() {}
 }
 
+/// A worker in its place.
+enum Place {
+    /// A process of ours.
+    Child(Box<Process>),
+    /// A process of an earlier coordinator.
+    Orphan(Orphan),
+}
+
 struct Process {
     id: u32,
     child: Child,
@@ -184,7 +249,10 @@ struct Process {
 impl Process {
     /// Let the worker end by itself, or else kill it; when this returns there is no process.
     async fn end(mut self) {
-        drop(self.leash.take());
+        if let Some(mut leash) = self.leash.take() {
+            // A worker that has ended does not read it.
+            let _ = leash.write_all(RUN_IS_OVER).await;
+        }
         if timeout(FAREWELL_TIME, self.child.wait()).await.is_err() {
             warn!(process = self.id, "a local worker does not end by itself: killing it");
             // An error means that it has ended meanwhile.

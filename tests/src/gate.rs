@@ -1,6 +1,6 @@
 //! The test's end of `gate` nodes.
 
-use std::io::{Read, Write};
+use std::io::{ErrorKind, Read, Write};
 use std::net::{SocketAddr, TcpListener, TcpStream};
 
 /// Where `gate` nodes wait.
@@ -33,6 +33,18 @@ impl Gate {
     #[must_use]
     pub fn address(&self) -> SocketAddr {
         self.listener.local_addr().expect("the address of a bound socket")
+    }
+
+    /// Whether no `gate` node is executing that was not met yet.
+    ///
+    /// # Panics
+    /// When the system does not know its own socket.
+    #[must_use]
+    pub fn is_deserted(&self) -> bool {
+        self.listener.set_nonblocking(true).expect("a socket of ours");
+        let nobody = self.listener.accept().is_err_and(|error| error.kind() == ErrorKind::WouldBlock);
+        self.listener.set_nonblocking(false).expect("a socket of ours");
+        nobody
     }
 
     /// Wait until the next `gate` node executes.

@@ -2,6 +2,7 @@
 
 pub mod cluster;
 pub mod gate;
+pub mod journal;
 pub mod nodes;
 pub mod plan;
 pub mod process;

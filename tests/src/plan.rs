@@ -87,7 +87,9 @@ impl Planner for TestPlanner {
                 ("digest", parameters, *shared_bytes)
             }
             Leaves::Large { bytes } => ("grow", vec![(*bytes as u64).to_le_bytes().to_vec(); 2], *bytes),
-            Leaves::Gates { count, address } => ("gate", vec![address.clone().into_bytes(); *count], 0),
+            Leaves::Gates { count, address } => {
+                ("gate", (0..*count).map(|leaf| format!("{address}#{leaf}").into_bytes()).collect(), 0)
+            }
             Leaves::Abort { marker } => ("abort", vec![marker.clone().into_bytes()], 0),
             Leaves::GateHere { address } => ("gate", vec![address.clone().into_bytes()], 0),
             Leaves::Panic => ("panic", vec![Vec::new()], 0),

@@ -25,6 +25,29 @@ impl Process {
         self.0.as_ref().map_or(0, Child::id)
     }
 
+    /// Read its stderr up to the first line that `pick` takes, each as JSON where it is JSON; `None` if it ends before. What is still
+    /// said after that is lost.
+    ///
+    /// # Panics
+    /// When it cannot be read.
+    pub fn stderr_until<T>(&mut self, mut pick: impl FnMut(&Value) -> Option<T>) -> Option<T> {
+        let stderr = self.0.as_mut().and_then(|child| child.stderr.take()).expect("a process that is watched once");
+        BufReader::new(stderr).lines().find_map(|line| {
+            let line = line.expect("lines of text");
+            pick(&serde_json::from_str(&line).unwrap_or(Value::String(line)))
+        })
+    }
+
+    /// Kill it with SIGKILL, and wait until it is gone. Processes that it has started are not.
+    ///
+    /// # Panics
+    /// When it cannot be killed.
+    pub fn kill(mut self) {
+        let mut child = self.0.take().expect("a process that was not waited for");
+        child.kill().expect("a process that can be killed");
+        child.wait().expect("an end");
+    }
+
     /// Wait for its end, and for that of all who share its stderr; `watch` is told of each line of it, as part of all lines so far:
     /// JSON where it is JSON, else a string.
     ///

@@ -3,12 +3,16 @@
 //! ```text
 //!   lookalike-test-cluster worker --access FILE ...
 //!   lookalike-test-cluster gates COUNT ADDRESS WORKERS ACCESS_FILE [STRANGERS]
+//!   lookalike-test-cluster resume COUNT ADDRESS WORKERS ACCESS_FILE
 //! ```
+//! `resume` keeps a journal beside the access file, or goes on with the run in it.
 
 use std::io::Write;
+use std::path::Path;
 use std::process::ExitCode;
 use std::sync::Arc;
 
+use lookalike_coordinator::journal::{JOURNAL_FILE, JournalOptions, RunIdentity};
 use lookalike_coordinator::limits::Limits;
 use lookalike_coordinator::runner::{RunError, RunnerOptions, run};
 
@@ -24,7 +28,7 @@ pub fn main() -> ExitCode {
     }
     let arguments: Vec<_> = arguments.iter().map(|argument| argument.to_string_lossy().into_owned()).collect();
     let mut limits = Limits::default();
-    let ["gates", count, address, workers, access_file, ref strangers @ ..] =
+    let [command @ ("gates" | "resume"), count, address, workers, access_file, ref strangers @ ..] =
         arguments[1..].iter().map(String::as_str).collect::<Vec<_>>()[..]
     else {
         return ExitCode::from(2);
@@ -35,7 +39,11 @@ pub fn main() -> ExitCode {
     if let Some(Ok(strangers)) = strangers.first().map(|strangers| strangers.parse()) {
         limits.strangers = strangers;
     }
-    let options = RunnerOptions { limits, ..RunnerOptions::new(workers, access_file.into()) };
+    let mut options = RunnerOptions { limits, ..RunnerOptions::new(workers, access_file.into()) };
+    if command == "resume" {
+        let journal = JournalOptions::new(Path::new(access_file).with_file_name(JOURNAL_FILE), RunIdentity::default());
+        options.journal = Some(JournalOptions { resume: true, survivors: true, ..journal });
+    }
     match coordinate(Leaves::Gates { count, address: address.to_owned() }, options) {
         Ok(result) => {
             // Nobody reads it when the test is over.

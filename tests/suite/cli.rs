@@ -126,12 +126,10 @@ fn what_is_not_there_yet_says_so_and_what_to_do() {
     for (arguments, phrases) in [
         ("batch all.toml --out runs".to_owned(), &["lookalike batch is not there yet", "once per photo"][..]),
         ("batch all.toml --out runs --slurm --metrics 127.0.0.1:9100 --keep-going".into(), &["not there yet"]),
-        ("status run --json".into(), &["lookalike status is not there yet", "fit.json"]),
         ("check ball.exr --env garden.hdr".into(), &["lookalike check is not there yet"]),
         ("export run --format materialx -o m.mtlx".into(), &["lookalike export is not there yet"]),
         ("study study.toml --out study".into(), &["lookalike study is not there yet"]),
         ("report run".into(), &["lookalike report is not there yet"]),
-        (format!("{fit} --resume"), &["--resume is not there yet", "another --out"]),
         (format!("{fit} --exposure-gain rgb"), &["degenerate", "--anchor"]),
         (format!("{fit} --exposure-gain rgb --anchor f0=.04"), &["--anchor is not there yet"]),
         (format!("{fit} --model disney"), &["the model disney is not there yet", "ggx and cook-torrance"]),

@@ -2,6 +2,7 @@
 
 mod ending;
 mod outputs;
+mod resume;
 mod same_bits;
 pub(crate) mod scene;
 mod settings;

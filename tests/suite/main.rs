@@ -22,4 +22,5 @@ mod program;
 #[cfg(feature = "slow")]
 mod recovery;
 mod render;
+mod resume;
 mod tidy;

@@ -20,6 +20,7 @@ pub mod wire;
 mod tests;
 
 use std::ffi::OsString;
+use std::io::Write;
 use std::process::ExitCode;
 
 use clap::Parser;
@@ -70,7 +71,8 @@ pub fn run_and_report(options: &WorkerOptions, registry: Registry) -> ExitCode {
     match run(options, registry) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("error: {}", error.with_causes());
+            // Whoever read its stderr may be gone.
+            let _ = writeln!(std::io::stderr(), "error: {}", error.with_causes());
             ExitCode::from(error.exit_code())
         }
     }
@@ -105,5 +107,10 @@ fn init_tracing(level: Option<&str>) {
         |level| EnvFilter::try_new(level).unwrap_or_else(|_| EnvFilter::new("warn")),
     );
     // A second subscriber in one process (tests) is not wanted, and no reason to fail.
-    let _ = tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).try_init();
+    // A worker may outlive whoever reads its stderr, and must not die of that.
+    let _ = tracing_subscriber::fmt()
+        .with_env_filter(filter)
+        .with_writer(std::io::stderr)
+        .log_internal_errors(false)
+        .try_init();
 }

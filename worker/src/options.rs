@@ -6,6 +6,8 @@ use std::time::Duration;
 
 use clap::Args;
 
+use crate::ending::Leash;
+
 /// The flags of `lookalike-worker` and `lookalike worker`.
 #[derive(Clone, Debug, Args)]
 pub struct Arguments {
@@ -33,6 +35,10 @@ pub struct Arguments {
     /// End when stdin ends: the coordinator holds the other end of the pipe
     #[arg(long, hide = true)]
     pub leash: bool,
+
+    /// With --leash: do not end when the coordinator was killed, but wait for the next one as long as --reconnect-for says
+    #[arg(long, requires = "leash", hide = true)]
+    pub survive: bool,
 }
 
 impl Arguments {
@@ -45,7 +51,11 @@ impl Arguments {
             reconnect_for: self.reconnect_for,
             drain_time: self.drain_time,
             address: self.address,
-            leash: self.leash,
+            leash: match (self.leash, self.survive) {
+                (false, _) => Leash::None,
+                (true, false) => Leash::Tight,
+                (true, true) => Leash::Loose,
+            },
             ..WorkerOptions::new(self.access)
         }
     }
@@ -64,8 +74,8 @@ pub struct WorkerOptions {
     pub reconnect_for: Duration,
     /// How long to finish what executes when asked to end; `None`: as the coordinator says.
     pub drain_time: Option<Duration>,
-    /// End when stdin ends.
-    pub leash: bool,
+    /// What the end of stdin means.
+    pub leash: Leash,
     /// How many bytes of blobs to keep beyond those that assigned nodes need.
     pub cached_blob_bytes: usize,
     /// How many bytes of blobs (counted encoded) to keep decoded.
@@ -82,7 +92,7 @@ impl WorkerOptions {
             threads: NonZeroUsize::MIN,
             reconnect_for: Duration::from_mins(10),
             drain_time: None,
-            leash: false,
+            leash: Leash::None,
             cached_blob_bytes: 256 << 20,
             decoded_blob_bytes: 128 << 20,
         }

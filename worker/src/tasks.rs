@@ -8,7 +8,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use lookalike::graph::{Blob, BlobHash, NodeFailure, RunContext};
+use lookalike::graph::{Blob, BlobHash, NodeFailure, NodeKey, RunContext};
 use lookalike::protocol::{Assignment, Executing, FailureKind, LeaseName, RunName, ToCoordinator, bounded_text};
 
 use crate::cache::BlobCache;
@@ -33,8 +33,7 @@ pub(crate) struct Tasks {
     threads: usize,
     cache: BlobCache,
     run: Option<RunName>,
-    /// By node number.
-    tasks: BTreeMap<u64, Task>,
+    tasks: BTreeMap<Place, Task>,
     /// Blobs that were asked for and have not come.
     fetching: BTreeSet<BlobHash>,
     /// Nothing more begins.
@@ -44,9 +43,18 @@ pub(crate) struct Tasks {
     next_serial: u64,
 }
 
+/// A node's number, after the epoch that gave it: another coordinator of the run may count otherwise.
+type Place = (u64, u64);
+
+fn place(lease: LeaseName) -> Place {
+    (lease.epoch, lease.node)
+}
+
 #[derive(Debug)]
 struct Task {
     lease: LeaseName,
+    /// What it computes, whatever its number.
+    key: NodeKey,
     stage: Stage,
 }
 
@@ -90,13 +98,18 @@ impl Tasks {
                 Stage::Gathering { .. } => {}
                 Stage::Announcing(job) => _ = self.running.remove(&job.serial),
                 Stage::Executing { .. } | Stage::Answered(_) if is_same_run => {
-                    self.tasks.insert(task.lease.node, task);
+                    self.tasks.insert(place(task.lease), task);
                 }
                 Stage::Executing { context, .. } => context.cancel(),
                 Stage::Answered(_) => {}
             }
         }
-        self.tasks.values().filter_map(Task::answer).collect()
+        let mut actions: Vec<_> = self.tasks.values().filter_map(Task::answer).collect();
+        if is_same_run {
+            // At once: perhaps it is another coordinator, which waits for this before it gives out anything.
+            actions.push(Action::Send(ToCoordinator::Heartbeat { executing: self.executing() }));
+        }
+        actions
     }
 
     /// This process shall end: begin with nothing more. What had not begun goes back to the coordinator.
@@ -113,7 +126,10 @@ impl Tasks {
     /// A node was assigned.
     pub(crate) fn assigned(&mut self, assignment: Assignment, new_context: impl Fn() -> RunContext) -> Vec<Action> {
         let lease = assignment.lease;
-        if let Some(task) = self.tasks.get_mut(&lease.node) {
+        let inputs = assignment.inputs.iter().map(|hash| BlobHash(*hash));
+        let key = NodeKey::of(&assignment.kind, &assignment.parameters, inputs);
+        self.take_over(lease, key);
+        if let Some(task) = self.tasks.get_mut(&place(lease)) {
             // We had it before the connection broke: answer under the new lease.
             task.lease = lease;
             return match &task.stage {
@@ -134,9 +150,18 @@ impl Tasks {
             }
         }
         let arrival = self.serial();
-        self.tasks.insert(lease.node, Task { lease, stage: Stage::Gathering { assignment, inputs, arrival } });
+        self.tasks.insert(place(lease), Task { lease, key, stage: Stage::Gathering { assignment, inputs, arrival } });
         actions.extend(self.begin(new_context));
         actions
+    }
+
+    /// If an earlier coordinator gave us what this one gives us under a new lease, go on with that.
+    fn take_over(&mut self, lease: LeaseName, key: NodeKey) {
+        let is_same = |(_, task): &(&Place, &Task)| task.lease.epoch < lease.epoch && task.key == key;
+        let earlier = self.tasks.iter().find(is_same).map(|(place, _)| *place);
+        if let Some(task) = earlier.and_then(|earlier| self.tasks.remove(&earlier)) {
+            self.tasks.insert(place(lease), task);
+        }
     }
 
     /// The "started" of this execution is on the wire.
@@ -183,10 +208,10 @@ impl Tasks {
 
     /// The coordinator does not want this node any more.
     pub(crate) fn cancelled(&mut self, lease: LeaseName, new_context: impl Fn() -> RunContext) -> Vec<Action> {
-        if self.tasks.get(&lease.node).is_none_or(|task| task.lease != lease) {
+        if self.tasks.get(&place(lease)).is_none_or(|task| task.lease != lease) {
             return Vec::new();
         }
-        match self.tasks.remove(&lease.node).map(|task| task.stage) {
+        match self.tasks.remove(&place(lease)).map(|task| task.stage) {
             Some(Stage::Announcing(job)) => _ = self.running.remove(&job.serial),
             Some(Stage::Executing { context, .. }) => context.cancel(),
             Some(Stage::Gathering { .. } | Stage::Answered(_)) | None => {}
@@ -196,8 +221,8 @@ impl Tasks {
 
     /// The coordinator has our answer.
     pub(crate) fn acknowledged(&mut self, lease: LeaseName) {
-        if self.tasks.get(&lease.node).is_some_and(|task| matches!(task.stage, Stage::Answered(_))) {
-            self.tasks.remove(&lease.node);
+        if self.tasks.get(&place(lease)).is_some_and(|task| matches!(task.stage, Stage::Answered(_))) {
+            self.tasks.remove(&place(lease));
         }
     }
 
@@ -218,12 +243,12 @@ impl Tasks {
         let mut actions = Vec::new();
         let mut gathering: Vec<_> = self.tasks.values().filter_map(Task::gathering).collect();
         gathering.sort_unstable();
-        for (_, node) in gathering {
+        for (_, place) in gathering {
             if self.running.len() >= self.threads {
                 break;
             }
             let serial = self.serial();
-            let Some(task) = self.tasks.get_mut(&node) else { continue };
+            let Some(task) = self.tasks.get_mut(&place) else { continue };
             let Stage::Gathering { assignment, inputs, .. } = &mut task.stage else { continue };
             let Some(inputs) = inputs.iter().cloned().collect::<Option<Vec<_>>>() else { continue };
             let kind = std::mem::take(&mut assignment.kind);
@@ -254,9 +279,9 @@ impl Task {
         }
     }
 
-    fn gathering(&self) -> Option<(u64, u64)> {
+    fn gathering(&self) -> Option<(u64, Place)> {
         match &self.stage {
-            Stage::Gathering { arrival, .. } => Some((*arrival, self.lease.node)),
+            Stage::Gathering { arrival, .. } => Some((*arrival, place(self.lease))),
             _ => None,
         }
     }

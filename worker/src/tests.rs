@@ -38,6 +38,10 @@ fn said(actions: &[Action]) -> Vec<String> {
         Action::Send(ToCoordinator::Failed { lease, kind, message }) => {
             format!("failed {} ({kind:?}): {message}", lease.node)
         }
+        Action::Send(ToCoordinator::Heartbeat { executing }) => {
+            let nodes: Vec<_> = executing.iter().map(|node| node.lease.node).collect();
+            format!("executes {nodes:?}")
+        }
         Action::Send(other) => format!("{other:?}"),
         Action::Announce { lease, serial: _ } => format!("announce {}.{}", lease.node, lease.attempt),
         Action::SendOutput { lease, output } => format!("output {}.{} {}", lease.node, lease.attempt, output[0]),
@@ -114,7 +118,7 @@ fn unacknowledged_answers_are_sent_again_on_a_new_connection() {
     let failure = Err(NodeFailure::Panicked { message: "no".into() });
     tasks.completed(Completed { serial: serials[1], result: failure }, context);
     tasks.acknowledged(lease(0, 1));
-    assert_eq!(said(&tasks.welcomed(RUN)), ["failed 1 (Panic): no"]);
+    assert_eq!(said(&tasks.welcomed(RUN)), ["failed 1 (Panic): no", "executes [2]"]);
     // Node 2 went on executing; it comes back to us under a new lease.
     assert_eq!(said(&tasks.assigned(assignment(lease(2, 2), &[]), context)), ["started 2.2"]);
     assert_eq!(said(&tasks.completed(output(serials[2], 12), context)), ["output 2.2 12"]);
@@ -126,9 +130,29 @@ fn what_had_not_begun_is_forgotten_with_its_connection() {
     let mut tasks = tasks(1);
     let unwritten = tasks.assigned(assignment(lease(0, 1), &[]), context);
     tasks.assigned(assignment(lease(1, 1), &[]), context);
-    assert!(tasks.welcomed(RUN).is_empty());
+    assert_eq!(said(&tasks.welcomed(RUN)), ["executes []"]);
     assert!(announce(&mut tasks, &unwritten).is_empty());
     assert_eq!(said(&tasks.assigned(assignment(lease(1, 2), &[]), context)), ["announce 1.2"]);
+}
+
+#[test]
+fn another_coordinator_of_the_run_may_number_nodes_otherwise() {
+    let mut tasks = tasks(3);
+    let node = |lease, kind: &str| Assignment { kind: kind.into(), ..assignment(lease, &[]) };
+    let later = |node, attempt| LeaseName { node, attempt, epoch: 2 };
+    let mut actions = tasks.assigned(node(lease(0, 1), "x"), context);
+    actions.extend(tasks.assigned(node(lease(1, 1), "y"), context));
+    let serials = announce(&mut tasks, &actions);
+    tasks.completed(output(serials[0], 10), context);
+    assert_eq!(said(&tasks.welcomed(RUN)), ["output 0.1 10", "executes [1]"]);
+    // The number of the one, but what the other computes: that goes on under its new name.
+    assert_eq!(said(&tasks.assigned(node(later(0, 1), "y"), context)), ["started 0.1"]);
+    assert_eq!(said(&tasks.assigned(node(later(1, 1), "x"), context)), ["output 1.1 10"]);
+    // The number of both, and something else.
+    assert_eq!(said(&tasks.assigned(node(later(2, 1), "z"), context)), ["announce 2.1"]);
+    tasks.acknowledged(lease(0, 1));
+    tasks.acknowledged(later(1, 1));
+    assert_eq!(said(&tasks.completed(output(serials[1], 11), context)), ["output 0.1 11"]);
 }
 
 #[test]
@@ -171,7 +195,7 @@ fn draining_worker_finishes_what_it_began_and_begins_with_nothing_more() {
     assert!(tasks.assigned(assignment(lease(2, 1), &[]), context).is_empty());
     assert_eq!(said(&tasks.completed(output(serials[0], 9), context)), ["output 0.1 9"]);
     assert!(!tasks.are_done(), "the answer may be lost");
-    assert_eq!(said(&tasks.welcomed(RUN)), ["output 0.1 9"]);
+    assert_eq!(said(&tasks.welcomed(RUN)), ["output 0.1 9", "executes []"]);
     tasks.acknowledged(lease(0, 1));
     assert!(tasks.are_done());
 }

@@ -19,6 +19,7 @@ mod blob;
 mod context;
 mod decoded;
 mod in_process;
+mod key;
 mod node;
 mod planner;
 mod registry;
@@ -28,6 +29,7 @@ pub use blob::{Blob, BlobHash, HashMismatch, MAX_BLOB_BYTES};
 pub use context::RunContext;
 pub use decoded::DecodedCache;
 pub use in_process::{Execution, run_in_process};
+pub use key::NodeKey;
 pub use node::{
     FailureReason, Input, MAX_INPUTS, MAX_NAME_BYTES, MAX_PARAMETER_BYTES, NodeFailure, NodeId, NodeSpec, Placement,
     WorkerId,

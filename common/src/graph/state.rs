@@ -7,7 +7,7 @@ use std::collections::{BTreeMap, VecDeque};
 
 use super::{
     Blob, BlobHash, FailureReason, Input, MAX_BLOB_BYTES, MAX_INPUTS, MAX_NAME_BYTES, MAX_PARAMETER_BYTES, NodeId,
-    NodeSpec, PlanError,
+    NodeKey, NodeSpec, PlanError,
 };
 
 /// Where a node is on its way.
@@ -207,6 +207,21 @@ impl Graph {
             Input::OutputOf(source) => self.output(source).cloned(),
         };
         self.get(node)?.spec.inputs.iter().map(blob_of).collect()
+    }
+
+    /// What a node computes; `None` while an input is missing. It stays the same when blobs are gone.
+    #[must_use]
+    pub fn key(&self, node: NodeId) -> Option<NodeKey> {
+        let spec = self.spec(node)?;
+        let hash_of = |input: &Input| match *input {
+            Input::Blob(hash) => Some(hash),
+            Input::OutputOf(source) => match self.state(source)? {
+                NodeState::Completed(hash) => Some(*hash),
+                _ => None,
+            },
+        };
+        let inputs: Vec<BlobHash> = spec.inputs.iter().map(hash_of).collect::<Option<_>>()?;
+        Some(NodeKey::of(&spec.kind, &spec.parameters, inputs))
     }
 
     /// Whether a node has neither an output nor a failure yet.

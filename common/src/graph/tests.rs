@@ -108,6 +108,24 @@ fn node_becomes_ready_when_its_last_input_is_there() {
 }
 
 #[test]
+fn key_of_a_node_is_known_with_its_inputs_and_does_not_know_its_number() {
+    let join_of = |outputs: [u8; 2], labels: [&str; 2]| {
+        let mut graph = Graph::new();
+        let leaves = labels.map(|label| graph.add_node(NodeSpec { label: label.into(), ..spec("sum", &[1], vec![]) }));
+        let leaves = leaves.map(Result::unwrap);
+        let join = graph.add_node(spec("sum", &[], leaves.map(Input::OutputOf).to_vec())).unwrap();
+        assert!(graph.key(join).is_none() && graph.key(NodeId(9)).is_none());
+        assert_eq!(graph.key(leaves[0]), graph.key(leaves[1]));
+        for (leaf, output) in leaves.into_iter().zip(outputs) {
+            graph.complete(leaf, Blob::new(vec![output]));
+        }
+        graph.key(join).unwrap()
+    };
+    assert_eq!(join_of([1, 2], ["a", "b"]), join_of([1, 2], ["x", "y"]));
+    assert_ne!(join_of([1, 2], ["a", "b"]), join_of([2, 1], ["a", "b"]));
+}
+
+#[test]
 fn second_output_is_compared_bit_for_bit() {
     let mut graph = Graph::new();
     let node = graph.add_node(spec("sum", &[1], vec![])).unwrap();

@@ -56,12 +56,14 @@ fn start_tracing(filter: &str) -> anyhow::Result<()> {
         .with_env_filter(EnvFilter::try_new(filter).context("--log")?)
         .with_writer(io::stderr)
         .with_ansi(io::stderr().is_terminal())
+        // A worker may outlive whoever reads its stderr, and must not die of that.
+        .log_internal_errors(false)
         .try_init()
         .map_err(anyhow::Error::from_boxed)
 }
 
 fn dispatch(Cli { log, command }: Cli) -> anyhow::Result<ExitCode> {
-    use crate::commands::{access, compare, demo, fit, render, worker};
+    use crate::commands::{access, compare, demo, fit, render, status, worker};
     match command {
         Command::Demo(args) => demo::run(DemoSettings { log: Some(log), ..args.into_settings()? }),
         Command::Fit(args) => {
@@ -74,9 +76,7 @@ fn dispatch(Cli { log, command }: Cli) -> anyhow::Result<ExitCode> {
         Command::Access(args) => access::run(args.into_settings()),
         Command::Worker(args) => worker::run(args),
         Command::Batch(_) => later("lookalike batch", "run `lookalike fit` once per photo"),
-        Command::Status(_) => {
-            later("lookalike status", "a fit tells its progress on stderr, its result in OUT/fit.json")
-        }
+        Command::Status(args) => status::run(&args.into_settings()),
         Command::Check(_) => later("lookalike check", "`lookalike fit` refuses inputs that it cannot use"),
         Command::Export(_) => later("lookalike export", "the parameters are in OUT/fit.json"),
         Command::Study(_) => later("lookalike study", "run `lookalike fit` once per photo"),

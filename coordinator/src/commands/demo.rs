@@ -50,9 +50,11 @@ pub(crate) fn run(settings: DemoSettings) -> anyhow::Result<ExitCode> {
         out_name: out_name.clone(),
         max_cssim: None,
         also_render: SHOWN.to_vec(),
+        resume: false,
+        is_resumable: false,
         input_seconds: began.elapsed().as_secs_f64(),
     };
-    let finished = fitting::run(job)?;
+    let finished = fitting::run(job)?.context("a fit that nobody has made is finished: please report this")?;
     let picture = picture(&finished.outcome, &finished.pictures);
     out.write("strip.png", &png::write(&picture, &[]).context("strip.png")?)?;
     print_result(&format!(

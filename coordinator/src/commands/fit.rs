@@ -12,7 +12,7 @@ use std::{process::ExitCode, sync::Arc, time::Instant};
 pub(crate) fn run(settings: FitSettings) -> anyhow::Result<ExitCode> {
     let began = Instant::now();
     // Whatever can fail fails before any work is done.
-    let out = OutFolder::create(&settings.out)?;
+    let out = OutFolder::create(&settings.out, settings.resume)?;
     let loaded = load_capture(&(&settings).into())?;
     show_warnings(&loaded.warnings);
     let coverage = loaded.capture.scoring_coverage();
@@ -28,9 +28,11 @@ pub(crate) fn run(settings: FitSettings) -> anyhow::Result<ExitCode> {
         out_name: settings.out.display().to_string(),
         max_cssim: settings.max_cssim,
         also_render: Vec::new(),
+        resume: settings.resume,
+        is_resumable: true,
         input_seconds: began.elapsed().as_secs_f64(),
     };
-    Ok(fitting::run(job)?.code)
+    Ok(fitting::run(job)?.map_or(ExitCode::SUCCESS, |finished| finished.code))
 }
 
 fn inputs_json(loaded: &LoadedCapture, settings: &FitSettings) -> Value {

@@ -7,4 +7,5 @@ pub(crate) mod demo;
 pub(crate) mod fit;
 mod output;
 pub(crate) mod render;
+pub(crate) mod status;
 pub(crate) mod worker;

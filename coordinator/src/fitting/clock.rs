@@ -23,7 +23,7 @@ impl Clock {
     }
 
     pub(crate) fn note(&mut self, event: &RunEvent) {
-        if let RunEvent::NodeFinished { name, .. } = event
+        if let RunEvent::NodeFinished { name, .. } | RunEvent::NodeRecalled { name, .. } = event
             && let Some(stage) = LAST_KINDS.iter().position(|kind| *kind == name.kind)
         {
             self.ends[stage] = Some(self.total());

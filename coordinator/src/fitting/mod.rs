@@ -1,13 +1,16 @@
 //! One fit from a checked capture to a folder of results: plans the graph, runs it on workers, writes what came out.
 
 mod clock;
+mod identity;
 mod method;
 mod notes;
+mod resume;
 
 pub(crate) use method::method;
 
 use crate::{
     cli::Exit,
+    journal::{self, JOURNAL_FILE, JournalError, JournalOptions},
     outputs::{FitRecord, OutFolder, Pictures, Timing, candidates_csv, parameters_json, print_summary, write_pictures},
     progress::{Display, display},
     runner::{self, RunnerOptions},
@@ -40,6 +43,10 @@ pub(crate) struct FitJob {
     pub(crate) max_cssim: Option<f64>,
     /// Gammas whose candidates are rendered as well.
     pub(crate) also_render: Vec<f64>,
+    /// Go on with the run that is in the folder, if there is one.
+    pub(crate) resume: bool,
+    /// Whether somebody may want to go on with this run.
+    pub(crate) is_resumable: bool,
     /// Seconds spent on loading or making the inputs.
     pub(crate) input_seconds: f64,
 }
@@ -52,8 +59,12 @@ pub(crate) struct Finished {
     pub(crate) code: ExitCode,
 }
 
-/// Runs a fit and writes its results.
-pub(crate) fn run(job: FitJob) -> anyhow::Result<Finished> {
+/// Runs a fit and writes its results; `None` if that was done before.
+pub(crate) fn run(job: FitJob) -> anyhow::Result<Option<Finished>> {
+    if resume::is_done(&job)? {
+        eprintln!("the run in {} is finished, and its results are as it wrote them", job.out_name);
+        return Ok(None);
+    }
     let method = method(&job.settings)?;
     let planner = FitPlanner::new(Arc::clone(&job.capture), method.clone(), job.exposure)
         .context("the photo cannot be fitted")?
@@ -78,6 +89,8 @@ pub(crate) fn run(job: FitJob) -> anyhow::Result<Finished> {
         requeued: summary.requeued_nodes,
     };
     let pictures = write_results(&job, &method, &outcome, &notes, &timing)?;
+    let finished = journal::Finished { outputs: job.out.results()? };
+    journal::finish(&job.out.file(JOURNAL_FILE), &finished).map_err(journal_failed)?;
     let record = record(&job, &method, &outcome, &notes);
     print_summary(&record, &timing, &job.out_name).context("cannot write to stdout")?;
     let best = final_score(&method, &outcome);
@@ -86,7 +99,12 @@ pub(crate) fn run(job: FitJob) -> anyhow::Result<Finished> {
         eprintln!("the match has a score of {best:.4} (--judge {}), more than --max-cssim {limit}", judge(&method));
     }
     let code = if missed { Exit::MissedMaxCssim } else { Exit::Done };
-    Ok(Finished { outcome, pictures, code: code.into() })
+    Ok(Some(Finished { outcome, pictures, code: code.into() }))
+}
+
+fn journal_failed(error: JournalError) -> anyhow::Error {
+    let exit = if error.exit_code() == 2 { Exit::BadInput } else { Exit::ClusterFailed };
+    anyhow::Error::new(error).context(exit)
 }
 
 fn run_graph(
@@ -102,6 +120,13 @@ fn run_graph(
     options.log.clone_from(&job.cluster.log);
     options.policy = job.cluster.policy;
     options.policy.verify_seed = job.settings.seed;
+    options.journal = Some(JournalOptions {
+        path: job.out.file(JOURNAL_FILE),
+        identity: identity::identity(job)?,
+        resume: job.resume,
+        survivors: job.is_resumable,
+        best: Some(planner.best()),
+    });
     let runtime = tokio::runtime::Builder::new_multi_thread()
         .worker_threads(2)
         .enable_all()

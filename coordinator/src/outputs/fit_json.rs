@@ -173,7 +173,8 @@ fn uncertainty_json(model: &dyn Model, parameters: &[f64], uncertainty: &[Uncert
 }
 
 /// The name of a choice as it is typed on the command line.
-fn name_of(choice: &impl clap::ValueEnum) -> String {
+/// A choice as the command line calls it.
+pub(crate) fn name_of(choice: &impl clap::ValueEnum) -> String {
     choice.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned())
 }
 

@@ -1,8 +1,10 @@
 //! The folder of results: made, checked and written to with errors that name it.
 
+use crate::journal::{self, JOURNAL_FILE, RunLock, status::STATUS_FILE};
 use anyhow::{Context, bail};
+use lookalike::graph::BlobHash;
 use std::{
-    fs::{self, File, TryLockError},
+    fs,
     io::ErrorKind,
     path::{Path, PathBuf},
     sync::Arc,
@@ -13,12 +15,15 @@ use std::{
 pub(crate) struct OutFolder {
     path: PathBuf,
     /// Held while this lives.
-    _lock: Arc<File>,
+    _lock: Arc<RunLock>,
 }
 
-/// Everything that a fit or a demo writes, the mark of a finished fit first.
+/// The mark of a finished fit.
+const MARK: &str = "fit.json";
+
+/// Everything else that a fit or a demo writes.
 const RESULTS: [&str; 10] = [
-    "fit.json",
+    STATUS_FILE,
     "candidates.csv",
     "match.exr",
     "match.png",
@@ -31,31 +36,54 @@ const RESULTS: [&str; 10] = [
 ];
 
 impl OutFolder {
-    /// Makes the folder, or takes an existing one that holds no run.
-    pub(crate) fn create(path: &Path) -> anyhow::Result<Self> {
+    /// Makes the folder, or takes an existing one that holds no run, or one to be gone on with.
+    pub(crate) fn create(path: &Path, resume: bool) -> anyhow::Result<Self> {
         let folder = Self::open(path)?;
-        if folder.file("fit.json").exists() {
-            bail!(
-                "{} already holds a finished fit (fit.json): choose another --out, or remove it first",
-                path.display()
-            );
+        let shown = path.display();
+        match (folder.file(MARK).exists(), folder.file(JOURNAL_FILE).exists(), resume) {
+            (_, true, true) | (false, false, _) => Ok(folder),
+            (true, _, false) => {
+                bail!("{shown} already holds a finished fit ({MARK}): choose another --out, or remove it first")
+            }
+            (true, false, true) => bail!(
+                "{shown} holds a finished fit ({MARK}) without the journal of its run, so there is nothing to resume: choose \
+                 another --out, or remove it first"
+            ),
+            (false, true, false) => bail!(
+                "{shown} already holds a run that is not finished ({JOURNAL_FILE}): go on with it with --resume, choose another \
+                 --out, or remove it first"
+            ),
         }
+    }
+
+    /// Makes the folder, or takes an existing one and removes the run and the results in it, the mark of a finished fit first.
+    pub(crate) fn overwrite(path: &Path) -> anyhow::Result<Self> {
+        let folder = Self::open(path)?;
+        let cannot = |name: &str| format!("cannot remove the old {}", folder.file(name).display());
+        let remove = |name: &str| match fs::remove_file(folder.file(name)) {
+            Err(error) if error.kind() != ErrorKind::NotFound => Err(error).with_context(|| cannot(name)),
+            _ => Ok(()),
+        };
+        remove(MARK)?;
+        journal::remove(&folder.file(JOURNAL_FILE)).with_context(|| cannot(JOURNAL_FILE))?;
+        RESULTS.into_iter().try_for_each(remove)?;
         Ok(folder)
     }
 
-    /// Makes the folder, or takes an existing one and removes the results in it, the mark of a finished fit first.
-    pub(crate) fn overwrite(path: &Path) -> anyhow::Result<Self> {
-        let folder = Self::open(path)?;
-        for name in RESULTS {
-            match fs::remove_file(folder.file(name)) {
-                Err(error) if error.kind() != ErrorKind::NotFound => {
-                    return Err(error)
-                        .with_context(|| format!("cannot remove the old {}", folder.file(name).display()));
-                }
-                _ => {}
-            }
+    /// The results of a fit that are there, each with the BLAKE3 of its bytes.
+    pub(crate) fn results(&self) -> anyhow::Result<Vec<(String, String)>> {
+        let names = RESULTS.into_iter().chain([MARK]).filter(|name| *name != STATUS_FILE);
+        let there = names.filter_map(|name| Some((name.to_owned(), self.hash(name).transpose()?)));
+        there.map(|(name, hash)| Ok((name, hash?))).collect()
+    }
+
+    /// The BLAKE3 of a file's bytes; `None` if there is no such file.
+    pub(crate) fn hash(&self, name: &str) -> anyhow::Result<Option<String>> {
+        match fs::read(self.file(name)) {
+            Ok(bytes) => Ok(Some(BlobHash::of(&bytes).to_string())),
+            Err(error) if error.kind() == ErrorKind::NotFound => Ok(None),
+            Err(error) => Err(error).with_context(|| format!("cannot read {}", self.file(name).display())),
         }
-        Ok(folder)
     }
 
     /// Makes the folder or takes an existing one, and locks it for this process.
@@ -69,14 +97,7 @@ impl OutFolder {
         let probe = path.join(".lookalike-write-test");
         fs::write(&probe, b"").with_context(cannot)?;
         fs::remove_file(&probe).with_context(cannot)?;
-        let lock = File::create(path.join(".lookalike-lock")).with_context(cannot)?;
-        match lock.try_lock() {
-            Err(TryLockError::WouldBlock) => {
-                bail!("another run is writing to {}: wait for it, or choose another --out", path.display())
-            }
-            // A file system without locks: as before there were any.
-            Err(TryLockError::Error(_)) | Ok(()) => {}
-        }
+        let lock = RunLock::take(path)?;
         Ok(Self { path: path.to_owned(), _lock: Arc::new(lock) })
     }
 

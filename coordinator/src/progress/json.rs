@@ -29,6 +29,11 @@ impl Display for JsonLines {
 fn object(event: &RunEvent) -> Option<Value> {
     Some(match event {
         RunEvent::Listening { address } => json!({ "event": "listening", "address": address }),
+        RunEvent::Resumed { epoch, results } => json!({ "event": "resumed", "epoch": epoch, "results": results }),
+        RunEvent::LocalWorkerStarted { process } => json!({ "event": "local-worker-started", "process": process }),
+        RunEvent::NodeRecalled { name, bytes } => json!({
+            "event": "node-recalled", "node": name.node.0, "kind": name.kind, "label": name.label, "bytes": bytes,
+        }),
         RunEvent::WorkerJoined { worker, threads, process } => {
             json!({ "event": "worker-joined", "worker": worker.0, "threads": threads, "process": process })
         }

@@ -21,7 +21,7 @@ impl Display for Lines {
     fn event(&mut self, event: &RunEvent) {
         if let Some((stage, count)) = self.tally.note(event)
             && count.is_complete()
-            && matches!(event, RunEvent::NodeFinished { .. })
+            && matches!(event, RunEvent::NodeFinished { .. } | RunEvent::NodeRecalled { .. })
         {
             let best = self.best.get().filter(|_| stage >= Stage::Judging);
             let best = best.map(|score| format!(", best CSSIM so far {score:.4}")).unwrap_or_default();

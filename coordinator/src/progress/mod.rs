@@ -50,6 +50,9 @@ impl Display for Silent {
 /// What people should be told about a run beyond the counts; `None` for everything that goes as planned.
 fn remark(event: &RunEvent) -> Option<String> {
     match event {
+        RunEvent::Resumed { results, .. } => {
+            Some(format!("going on with the run that is there: {results} results need not be computed again"))
+        }
         RunEvent::WaitingForWorkers { waited, limit } => Some(format!(
             "waiting for workers: {} s of at most {} s; start one with `lookalike worker --access OUT/access.json`",
             waited.as_secs(),

@@ -76,7 +76,7 @@ impl Tally {
                 self.counts.entry(stage).or_default().planned += 1;
                 stage
             }
-            RunEvent::NodeFinished { name, .. } => {
+            RunEvent::NodeFinished { name, .. } | RunEvent::NodeRecalled { name, .. } => {
                 let stage = Stage::of(name)?;
                 let count = self.counts.entry(stage).or_default();
                 count.done += 1;

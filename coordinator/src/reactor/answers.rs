@@ -42,12 +42,32 @@ pub(super) fn finished(
     if matches!(site, Site::Worker(_)) {
         core.summary.output_bytes_received += output.len() as u64;
     }
+    take(core, node, Candidate { site, attempt, output, took }, now, outbox)
+}
+
+/// Take an output, or keep it until a second one has come.
+fn take(core: &mut Core, node: NodeId, result: Candidate, now: Duration, outbox: &mut Outbox) -> Result<(), RunError> {
     let is_open = core.graph.state(node) == Some(&NodeState::Ready);
-    let result = Candidate { site, attempt, output, took };
     if is_open && core.look(node).is_some_and(|record| record.is_verified) {
         return verify(core, node, result, now, outbox);
     }
     accept(core, node, result, now, outbox)
+}
+
+/// An output has come that an earlier coordinator of this run had asked for.
+pub(super) fn recovered(
+    core: &mut Core,
+    worker: WorkerId,
+    node: NodeId,
+    output: Blob,
+    now: Duration,
+    outbox: &mut Outbox,
+) -> Result<(), RunError> {
+    membership::renew(core, worker, now);
+    core.summary.output_bytes_received += output.len() as u64;
+    // No attempt of today has this number: a second computation is another one.
+    let result = Candidate { site: Site::Worker(worker), attempt: 0, output, took: Duration::ZERO };
+    take(core, node, result, now, outbox)
 }
 
 pub(super) fn failed(

@@ -25,6 +25,15 @@ pub(super) fn join(
     core.members.join(worker, threads, now + core.policy.lost_after, now);
     core.summary.workers_joined += 1;
     outbox.tell(RunEvent::WorkerJoined { worker, threads, process });
+    for (_, node) in core.continued.extract_if(.., |(continuing, _)| *continuing == worker).collect::<Vec<_>>() {
+        // Whoever has to run alone begins anew.
+        if core.look(node).is_some_and(|record| record.place == Place::Queue) {
+            schedule::assign(core, worker, node, now, outbox);
+            // It has begun: nobody else shall get it for having idle threads.
+            let attempt = core.look(node).map_or(0, |record| record.attempts);
+            answers::started(core, worker, node, attempt, now, outbox);
+        }
+    }
 }
 
 /// A worker was heard of.

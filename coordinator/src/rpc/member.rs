@@ -39,6 +39,8 @@ pub(super) async fn serve(greeted: Greeted, worker: WorkerId, peer: SocketAddr, 
     let pending_blobs = Arc::new(AtomicUsize::new(0));
     let mut reader = Reader {
         worker,
+        epoch: gate.epoch,
+        has_reported: gate.epoch == 1,
         incoming,
         output: None,
         unasked_bytes: 0,
@@ -98,6 +100,10 @@ fn departure_of(error: &WireError) -> Departure {
 /// The reading end of one worker's connection.
 struct Reader {
     worker: WorkerId,
+    /// That of this coordinator.
+    epoch: u64,
+    /// Whether it has told what it does for earlier ones.
+    has_reported: bool,
     incoming: Incoming<ReadHalf<Connection>>,
     /// The output that is being received.
     output: Option<(LeaseName, IncomingBlob)>,
@@ -120,15 +126,14 @@ impl Reader {
             match event {
                 // When nobody listens any more the run is over. Then we still read until the worker has closed its end:
                 // closing over unread bytes would destroy our last word to it.
-                Ok(event) => _ = self.inbound.send(Inbound::Event(event)).await,
+                Ok(event) => _ = self.inbound.send(event).await,
                 Err(error) => return departure_of(&error),
             }
         }
     }
 
-    async fn event(&mut self, received: Received<ToCoordinator>) -> Result<Event, WireError> {
+    async fn event(&mut self, received: Received<ToCoordinator>) -> Result<Inbound, WireError> {
         let worker = self.worker;
-        let site = Site::Worker(worker);
         let message = match received {
             Received::Message(message) => message,
             Received::Part(part) => {
@@ -139,14 +144,22 @@ impl Reader {
                 return self.output_or_life();
             }
         };
-        Ok(match message {
+        Ok(Inbound::Event(match message {
+            ToCoordinator::Heartbeat { executing } if !self.has_reported => {
+                self.has_reported = true;
+                let earlier = executing.iter().map(|node| node.lease).filter(|lease| lease.epoch < self.epoch);
+                return Ok(Inbound::Reported { worker, executing: earlier.collect() });
+            }
             ToCoordinator::Heartbeat { executing } => {
-                let executing = executing.iter().map(|node| (NodeId(node.lease.node), node.permille.min(1000)));
+                // What was begun for an earlier coordinator has another number there.
+                let executing = executing.iter().filter(|node| node.lease.epoch == self.epoch);
+                let executing = executing.map(|node| (NodeId(node.lease.node), node.permille.min(1000)));
                 Event::Heartbeat { worker, executing: executing.collect() }
             }
-            ToCoordinator::Started(lease) => {
+            ToCoordinator::Started(lease) if self.is_ours(lease)? => {
                 Event::Started { worker, node: NodeId(lease.node), attempt: lease.attempt }
             }
+            ToCoordinator::Started(_) => self.life(),
             ToCoordinator::Fetch { hash } => {
                 if self.pending_blobs.fetch_add(1, Ordering::Relaxed) >= self.max_pending_blobs {
                     return Err(unexpected("a worker that reads what it asked for", "still more requests for blobs"));
@@ -162,17 +175,27 @@ impl Reader {
                 return self.output_or_life();
             }
             ToCoordinator::Failed { lease, kind, message } => {
-                let message = bounded_text(&message);
-                let failure = match kind {
-                    FailureKind::Application => NodeFailure::Application { message },
-                    FailureKind::Panic => NodeFailure::Panicked { message },
-                    FailureKind::UnknownKind => NodeFailure::UnknownKind { message },
-                };
-                Event::Failed { site, node: NodeId(lease.node), attempt: lease.attempt, failure }
+                if !self.is_ours(lease)? {
+                    return Ok(Inbound::Late { worker, lease, output: None });
+                }
+                let failure = failure(kind, bounded_text(&message));
+                Event::Failed { site: Site::Worker(worker), node: NodeId(lease.node), attempt: lease.attempt, failure }
             }
             ToCoordinator::Draining => Event::WorkerDrains { worker },
             ToCoordinator::Hello(_) | ToCoordinator::Goodbye => return Err(unexpected("work", "a greeting")),
-        })
+        }))
+    }
+
+    /// Whether this coordinator gave out a lease; else an earlier one of the run did.
+    fn is_ours(&self, lease: LeaseName) -> Result<bool, WireError> {
+        if lease.epoch == 0 || lease.epoch > self.epoch {
+            return Err(unexpected("a lease of this run", &format!("one of epoch {}", lease.epoch)));
+        }
+        Ok(lease.epoch == self.epoch)
+    }
+
+    fn life(&self) -> Event {
+        Event::Heartbeat { worker: self.worker, executing: Vec::new() }
     }
 
     /// Before much is received, ask whether anybody wants it. The answer also tells that what came before has been taken: at most
@@ -183,6 +206,10 @@ impl Reader {
             return Ok(());
         }
         self.unasked_bytes = length;
+        // Of an earlier coordinator's leases nobody knows all.
+        if !self.is_ours(lease)? {
+            return Ok(());
+        }
         let (answer, answered) = oneshot::channel();
         let _ = self.inbound.send(Inbound::Ask { lease, answer }).await;
         match answered.await {
@@ -196,12 +223,24 @@ impl Reader {
     }
 
     /// The output, if it is complete; else a sign of life.
-    fn output_or_life(&mut self) -> Result<Event, WireError> {
+    fn output_or_life(&mut self) -> Result<Inbound, WireError> {
         let Some((lease, output)) = self.output.take_if(|(_, output)| output.is_complete()) else {
-            return Ok(Event::Heartbeat { worker: self.worker, executing: Vec::new() });
+            return Ok(Inbound::Event(self.life()));
         };
-        let (node, attempt) = (NodeId(lease.node), lease.attempt);
-        Ok(Event::Finished { site: Site::Worker(self.worker), node, attempt, output: output.finish()? })
+        let (worker, output) = (self.worker, output.finish()?);
+        if !self.is_ours(lease)? {
+            return Ok(Inbound::Late { worker, lease, output: Some(output) });
+        }
+        let (site, node, attempt) = (Site::Worker(worker), NodeId(lease.node), lease.attempt);
+        Ok(Inbound::Event(Event::Finished { site, node, attempt, output }))
+    }
+}
+
+fn failure(kind: FailureKind, message: String) -> NodeFailure {
+    match kind {
+        FailureKind::Application => NodeFailure::Application { message },
+        FailureKind::Panic => NodeFailure::Panicked { message },
+        FailureKind::UnknownKind => NodeFailure::UnknownKind { message },
     }
 }
 

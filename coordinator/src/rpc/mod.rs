@@ -50,6 +50,11 @@ pub(crate) enum Inbound {
     Ask { lease: LeaseName, answer: oneshot::Sender<bool> },
     /// Something happened.
     Event(Event),
+    /// A worker's first sign of life to a coordinator that has gone on with a run; it executes these for an earlier one. What it
+    /// had finished for that one has come before.
+    Reported { worker: WorkerId, executing: Vec<LeaseName> },
+    /// An answer to a lease of an earlier coordinator of this run: the output, whose hash was verified, or none.
+    Late { worker: WorkerId, lease: LeaseName, output: Option<Blob> },
     /// Something to tell the user that the reactor does not care about.
     Tell(RunEvent),
 }

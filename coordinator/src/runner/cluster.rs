@@ -1,6 +1,7 @@
 //! The cluster of a run: listener, connections, local worker processes. Started together, stopped together.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
+use std::io;
 use std::net::SocketAddr;
 use std::sync::Arc;
 use std::time::SystemTime;
@@ -8,93 +9,128 @@ use std::time::SystemTime;
 use lookalike::graph::WorkerId;
 use lookalike::protocol::{RunName, ToWorker};
 use tokio::net::TcpListener;
-use tokio::sync::mpsc::{Receiver, channel};
+use tokio::sync::mpsc::Sender;
+use tokio::sync::watch;
 use tokio::task::{JoinHandle, JoinSet};
 use tokio_rustls::TlsAcceptor;
 use tokio_util::sync::CancellationToken;
 
 use super::{RunError, RunnerOptions};
-use crate::access::Credentials;
+use crate::access::{Credentials, CredentialsError};
+use crate::journal::Past;
 use crate::rpc::{Gate, Inbound, Mailbox, Outgoing, serve_forever};
-use crate::spawn::{LocalWorkers, WorkerCommand, threads_per_worker};
+use crate::spawn::{LocalWorkers, WorkerCommand, is_worker_alive, threads_per_worker};
 use crate::tls::server_config;
-
-/// How many events may wait for the reactor before the connections have to.
-const INBOUND_CAPACITY: usize = 1024;
 
 /// Everything of a run that has to end with it.
 #[derive(Debug)]
 pub(crate) struct Cluster {
-    /// What workers and processes report.
-    pub(crate) inbound: Receiver<Inbound>,
     /// What the access file tells workers to connect to.
     pub(crate) address: String,
-    members: BTreeMap<WorkerId, Mailbox>,
+    /// Where the coordinator listens.
+    pub(crate) bound: SocketAddr,
+    members: BTreeMap<WorkerId, (u32, Mailbox)>,
+    /// The processes of the members.
+    present: watch::Sender<BTreeSet<u32>>,
+    /// Workers of an earlier coordinator that are not wanted any more.
+    surplus: BTreeSet<u32>,
     stop: CancellationToken,
     serving: JoinHandle<()>,
     local_workers: JoinSet<()>,
 }
 
+/// What a coordinator takes over from an earlier one of its run.
+#[derive(Debug)]
+pub(crate) struct Takeover {
+    /// Where that one listened.
+    listen: Option<SocketAddr>,
+    /// Its local workers that are still alive.
+    orphans: Vec<u32>,
+    /// The processes of its workers that may come back, from wherever.
+    pub(crate) survivors: Vec<u32>,
+    /// How many nodes have their results already.
+    pub(crate) results: usize,
+}
+
+impl Takeover {
+    /// What there is to be taken over.
+    pub(crate) fn of(past: &Past) -> Self {
+        let is_local = |process: &u32| past.local_workers.contains(process);
+        let orphans =
+            past.local_workers.iter().copied().filter(|process| is_worker_alive(*process)).collect::<Vec<_>>();
+        let survivors = past.workers.iter().copied().filter(|process| !is_local(process) || orphans.contains(process));
+        Self { listen: past.listen, survivors: survivors.collect(), orphans, results: past.results }
+    }
+}
+
 impl Cluster {
-    /// Listen, write the access file or take the one made beforehand, start the local workers.
-    pub(crate) async fn start(options: &RunnerOptions, epoch: u64) -> Result<Self, RunError> {
-        options.check()?;
-        let now = SystemTime::now();
-        let given = options.access.as_ref().map(|path| Credentials::read(path, now)).transpose()?;
-        let listen = options.listen_address(given.as_ref().map(|given| given.access.address.as_str()))?;
-        let listen_error = |source| RunError::Listen { listen, source };
-        let listener = TcpListener::bind(listen).await.map_err(listen_error)?;
-        let bound = listener.local_addr().map_err(listen_error)?;
-        let Credentials { access, identity } = match given {
-            Some(given) => given,
-            None => new_credentials(options, bound, now)?,
-        };
+    /// Listen, write the access file or take the one that is there, start the local workers that have not survived.
+    pub(crate) async fn start(
+        options: &RunnerOptions,
+        (run, epoch): (RunName, u64),
+        takeover: Option<Takeover>,
+        inbound: Sender<Inbound>,
+    ) -> Result<Self, RunError> {
+        let (listener, credentials) = listen(options, takeover.as_ref()).await?;
+        let (bound, Credentials { access, identity }) = credentials;
         let tls = server_config(&identity).map_err(RunError::Tls)?;
-        let (sender, inbound) = channel(INBOUND_CAPACITY);
         let stop = CancellationToken::new();
         let workers = local_workers(options, RunnerOptions::local_address(bound))?;
         // From here on the drop guard inside `Self` ends what was started.
-        let mut run = [0; 16];
-        getrandom::fill(&mut run).map_err(RunError::Randomness)?;
         let gate = Gate {
             tls: TlsAcceptor::from(Arc::new(tls)),
             secret: access.secret,
             limits: options.limits,
-            run: RunName(run),
+            run,
             epoch,
             policy: options.policy,
-            inbound: sender.clone(),
+            inbound: inbound.clone(),
         };
-        let local_workers = workers.start(&sender, &stop)?;
+        let mut orphans = takeover.map(|takeover| takeover.orphans).unwrap_or_default();
+        let surplus = orphans.split_off(orphans.len().min(options.workers)).into_iter().collect();
+        let present = watch::Sender::new(BTreeSet::new());
+        let local_workers = workers.start(&inbound, &stop, &orphans, &present)?;
         let serving = tokio::spawn(serve_forever(listener, gate, stop.clone()));
-        Ok(Self { inbound, address: access.address, members: BTreeMap::new(), stop, serving, local_workers })
+        let (address, members) = (access.address, BTreeMap::new());
+        Ok(Self { address, bound, members, present, surplus, stop, serving, local_workers })
     }
 
-    /// A worker can be sent to from now on.
-    pub(crate) fn admit(&mut self, worker: WorkerId, mailbox: Mailbox) {
-        self.members.insert(worker, mailbox);
+    /// A worker can be sent to from now on. Whether it is wanted: one that an earlier coordinator had started, and that is one too
+    /// many now, is told to end.
+    pub(crate) fn admit(&mut self, worker: WorkerId, process: u32, mailbox: Mailbox) -> bool {
+        if self.surplus.contains(&process) {
+            mailbox.send(Outgoing::Message(ToWorker::Stop { reason: "fewer workers are wanted now".into() }));
+            return false;
+        }
+        self.members.insert(worker, (process, mailbox));
+        self.present.send_modify(|present| _ = present.insert(process));
+        true
     }
 
     /// Send to a worker. One that has left meanwhile gets nothing: the reactor will hear of it.
     pub(crate) fn send(&self, worker: WorkerId, outgoing: Outgoing) {
-        if let Some(member) = self.members.get(&worker) {
+        if let Some((_, member)) = self.members.get(&worker) {
             member.send(outgoing);
         }
     }
 
     /// Send nothing more to a worker and close its connection, whether or not it has read what was sent before.
     pub(crate) fn dismiss(&mut self, worker: WorkerId) {
-        self.members.remove(&worker).into_iter().for_each(|member| member.close());
+        if let Some((process, member)) = self.members.remove(&worker) {
+            member.close();
+            let is_back = self.members.values().any(|(other, _)| *other == process);
+            if !is_back {
+                self.present.send_modify(|present| _ = present.remove(&process));
+            }
+        }
     }
 
     /// Tell all workers that the run is over, and wait until connections and local processes are gone.
     pub(crate) async fn stop(mut self, reason: &str) {
-        for member in std::mem::take(&mut self.members).into_values() {
+        for (_, member) in std::mem::take(&mut self.members).into_values() {
             member.send(Outgoing::Message(ToWorker::Stop { reason: reason.to_owned() }));
         }
         self.stop.cancel();
-        // A connection or keeper that waits for room would wait for ever.
-        self.inbound.close();
         let _ = (&mut self.serving).await;
         while self.local_workers.join_next().await.is_some() {}
     }
@@ -107,6 +143,58 @@ impl Drop for Cluster {
         self.stop.cancel();
         self.serving.abort();
     }
+}
+
+/// Listen, and have the credentials for it: those made beforehand, those of the earlier coordinator of this run, or new ones.
+async fn listen(
+    options: &RunnerOptions,
+    takeover: Option<&Takeover>,
+) -> Result<(TcpListener, (SocketAddr, Credentials)), RunError> {
+    let now = SystemTime::now();
+    let given = options.access.as_ref().map(|path| Credentials::read(path, now)).transpose()?;
+    let earlier = match (&given, takeover) {
+        (None, Some(_)) => earlier_credentials(options, now)?,
+        _ => None,
+    };
+    let listen = match (&given, takeover) {
+        (None, Some(takeover)) => options.listen_again(takeover.listen),
+        _ => options.listen_address(given.as_ref().map(|given| given.access.address.as_str()))?,
+    };
+    let is_again = takeover.is_some_and(|takeover| takeover.listen == Some(listen));
+    let listen_error = |source| match is_again {
+        true => RunError::PortTaken { listen, source },
+        false => RunError::Listen { listen, source },
+    };
+    let listener = TcpListener::bind(listen).await.map_err(listen_error)?;
+    let bound = listener.local_addr().map_err(listen_error)?;
+    let credentials = match (given, earlier) {
+        (Some(given), _) => given,
+        (None, Some(earlier)) => at_address(earlier, options, bound)?,
+        (None, None) => new_credentials(options, bound, now)?,
+    };
+    Ok((listener, (bound, credentials)))
+}
+
+/// The credentials that the earlier coordinator of this run made; `None` if they were removed.
+fn earlier_credentials(options: &RunnerOptions, now: SystemTime) -> Result<Option<Credentials>, RunError> {
+    match Credentials::read(&options.access_file, now) {
+        Err(CredentialsError::ReadAccess { source, .. } | CredentialsError::ReadKey { source, .. })
+            if source.kind() == io::ErrorKind::NotFound =>
+        {
+            Ok(None)
+        }
+        read => Ok(Some(read?)),
+    }
+}
+
+/// Credentials that tell workers the present address. As long as it is the same, so is the file, to the byte.
+fn at_address(mut earlier: Credentials, options: &RunnerOptions, bound: SocketAddr) -> Result<Credentials, RunError> {
+    let address = options.advertised(bound);
+    if earlier.access.address != address {
+        earlier.access.address = address;
+        earlier.write(&options.access_file)?;
+    }
+    Ok(earlier)
 }
 
 /// Make credentials for a listener that got this address, and write the access file.
@@ -127,5 +215,6 @@ fn local_workers(options: &RunnerOptions, address: String) -> Result<LocalWorker
         address,
         threads: options.threads_per_worker.unwrap_or_else(|| threads_per_worker(options.workers)),
         others_may_come: options.others_may_come(),
+        may_survive: options.journal.as_ref().is_some_and(|journal| journal.survivors),
     })
 }

@@ -11,6 +11,7 @@ use thiserror::Error;
 
 use crate::access::CredentialsError;
 use crate::comm::{NodeName, Site};
+use crate::journal::JournalError;
 use crate::policy::PolicyError;
 
 /// Why a run ended without its result.
@@ -39,6 +40,19 @@ pub enum RunError {
         /// What the system says.
         source: io::Error,
     },
+    /// The coordinator cannot listen where the workers of its run look for it.
+    #[error(
+        "cannot listen on {listen}, where the workers of this run look for their coordinator; end the process that has the port, or name another one with --listen IP:PORT, which workers elsewhere have to be told"
+    )]
+    PortTaken {
+        /// The address.
+        listen: SocketAddr,
+        /// What the system says.
+        source: io::Error,
+    },
+    /// The run cannot be written down, or not gone on with.
+    #[error(transparent)]
+    Journal(#[from] JournalError),
     /// There is no usable access file, or none can be written.
     #[error(transparent)]
     Credentials(#[from] CredentialsError),
@@ -149,9 +163,11 @@ impl RunError {
             | Self::NoWorkersPossible
             | Self::NothingToAdvertise { .. }
             | Self::Listen { .. }
+            | Self::PortTaken { .. }
             | Self::ListenWhere { .. }
             | Self::Tls(_) => 2,
             Self::Credentials(error) => error.exit_code(),
+            Self::Journal(error) => error.exit_code(),
             // What a node says of its inputs is about the user's; a panic or an unknown kind is our own mistake.
             Self::Plan(PlanError::NodeFailed {
                 reason: FailureReason::Node(NodeFailure::Application { .. }), ..

@@ -5,43 +5,59 @@
 //!   nodes run here --Event------------+--> reactor::handle --Outbox--> sockets, nodes run here, observer
 //!   the next deadline ----------------+
 //! ```
+//! Events that have come together are one group. With a journal, a group is written down as one transaction before anything of it
+//! is done: while one is being written, the next is handled.
+//!
 //! One task owns the state; everything else talks to it through channels. Stopping is a message to every worker and then
 //! waiting for what was started: when [`run`] returns, there is no process and no connection left.
 
 mod cluster;
 mod error;
+mod here;
 mod interrupt;
+mod memory;
 mod options;
+mod survivors;
 
-use std::collections::BTreeMap;
+use std::error::Error as _;
 use std::sync::Arc;
 use std::time::Duration;
 
-use lookalike::graph::{DecodedCache, NodeId, Planner, Registry, RunContext, WorkerId};
-use lookalike::protocol::{Assignment, LeaseName, ToWorker};
-use tokio::sync::mpsc::{UnboundedReceiver, UnboundedSender, unbounded_channel};
+use lookalike::graph::{Blob, NodeId, Planner, Registry, WorkerId};
+use lookalike::protocol::{Assignment, LeaseName, RunName, ToWorker};
+use tokio::sync::mpsc::{Receiver, UnboundedReceiver, channel, unbounded_channel};
 use tokio::time::{Instant, MissedTickBehavior, interval, sleep_until};
 use tokio_util::sync::CancellationToken;
 use tracing::{info, trace};
 
-use self::cluster::Cluster;
+use self::cluster::{Cluster, Takeover};
 pub use self::error::{NodeAnswer, RunError};
+use self::here::Here;
 use self::interrupt::Interrupt;
+use self::memory::{Group, Memory};
 pub use self::options::RunnerOptions;
-use crate::comm::{Action, Lease, Outbox, RunEvent, Site};
+use self::survivors::{Arrival, Survivors};
+use crate::comm::{Action, Lease, Outbox, RunEvent};
 use crate::core::{Core, RunSummary};
+use crate::journal::Journal;
 use crate::reactor::{self, Event};
 use crate::rpc::{Inbound, Outgoing};
 
 /// Counts the coordinator processes of a run; without a journal there is only one.
 const FIRST_EPOCH: u64 = 1;
 
-/// How many encoded bytes of inputs are kept decoded for the nodes that run here (128 MiB).
-const DECODED_BOUND_BYTES: usize = 128 << 20;
+/// How many events may wait for the reactor before the connections have to.
+const INBOUND_CAPACITY: usize = 1024;
+
+/// How many events are handled, and written down, as one group.
+const EVENTS_PER_GROUP: usize = 512;
 
 /// Run the planner's graph on workers, and its coordinator nodes on this process's rayon pool. Returns the planner, which
 /// has seen every output, when no node is open any more. `observer` is told what happens, as it happens; it should be
 /// quick, for the run waits for it.
+///
+/// With a [journal](RunnerOptions::journal) everything is written down before it is acknowledged, and a run that is there is gone
+/// on with, if the journal's options allow it. When nothing is left to run, nobody is listened for and no worker is started.
 ///
 /// Needs a tokio runtime with time and I/O; a multi-threaded one keeps connections alive while the planner is busy.
 ///
@@ -51,142 +67,287 @@ pub async fn run<P: Planner>(
     options: RunnerOptions,
     planner: P,
     registry: Arc<Registry>,
-    mut observer: impl FnMut(&RunEvent),
+    observer: impl FnMut(&RunEvent),
 ) -> Result<(P, RunSummary), RunError> {
     // Before anything is started: a signal in between must not leave it behind.
     let interrupt = options.handle_signals.then(Interrupt::watch).transpose().map_err(RunError::Signals)?;
     let interrupted = interrupt.as_ref().map_or_else(CancellationToken::new, Interrupt::token);
-    let cluster = Cluster::start(&options, FIRST_EPOCH).await?;
-    observer(&RunEvent::Listening { address: cluster.address.clone() });
+    options.check()?;
+    let mut name = [0; 16];
+    getrandom::fill(&mut name).map_err(RunError::Randomness)?;
+    let journal = options.journal.as_ref().map(|options| Journal::open(options, RunName(name))).transpose()?;
+    let (run, epoch) = journal.as_ref().map_or((RunName(name), FIRST_EPOCH), |journal| (journal.run, journal.epoch));
+    let takeover = journal.as_ref().filter(|_| epoch > FIRST_EPOCH).map(|journal| Takeover::of(&journal.past));
+    let core = Core::new(options.policy, epoch);
+    let core = match &journal {
+        Some(journal) => core.with_recall(journal.recall()),
+        None => core,
+    };
     let (results_sender, results) = unbounded_channel();
     let mut driver = Driver {
-        core: Core::new(options.policy, FIRST_EPOCH),
+        core,
         planner,
         outbox: Outbox::default(),
-        cluster,
+        cluster: None,
         observer,
-        here: Here {
-            registry,
-            decoded: Arc::new(DecodedCache::new(DECODED_BOUND_BYTES)),
-            contexts: BTreeMap::new(),
-            results: results_sender,
-        },
+        here: Here::new(registry, results_sender),
+        memory: Memory::new(journal),
+        survivors: None,
         began: Instant::now(),
     };
-    let outcome = driver.drive(results, interrupted).await;
+    let begin = Begin { options, run, takeover };
+    let outcome = driver.drive(begin, results, interrupted).await;
     info!(summary = ?driver.core.summary(), "the run is over");
-    driver.here.contexts.values().for_each(|(context, _)| context.cancel());
+    driver.here.cancel();
     let reason = if outcome.is_ok() { "the run is complete" } else { "the run has failed" };
-    driver.cluster.stop(reason).await;
-    outcome.map(|()| (driver.planner, driver.core.summary()))
+    if let Some(cluster) = driver.cluster.take() {
+        cluster.stop(reason).await;
+    }
+    let closed = driver.memory.close(outcome.as_ref().err().map(with_causes));
+    // What ended the run first is the one to tell.
+    outcome.and(closed).map(|()| (driver.planner, driver.core.summary()))
+}
+
+/// What the run begins with.
+struct Begin {
+    options: RunnerOptions,
+    run: RunName,
+    takeover: Option<Takeover>,
 }
 
 struct Driver<P, O> {
     core: Core,
     planner: P,
     outbox: Outbox,
-    cluster: Cluster,
+    /// There as soon as there is something to do for workers.
+    cluster: Option<Cluster>,
     observer: O,
     here: Here,
+    memory: Memory,
+    /// The workers of an earlier coordinator, as long as they are waited for.
+    survivors: Option<Survivors>,
     began: Instant,
 }
 
 impl<P: Planner, O: FnMut(&RunEvent)> Driver<P, O> {
     async fn drive(
         &mut self,
+        begin: Begin,
         mut results: UnboundedReceiver<Event>,
         interrupted: CancellationToken,
     ) -> Result<(), RunError> {
-        let now = self.now();
-        let outcome = reactor::start(&mut self.core, &mut self.planner, now, &mut self.outbox);
-        self.perform();
-        outcome?;
+        // Dropped when this returns: a connection that waits for room must not wait for ever.
+        let (sender, mut inbound) = channel(INBOUND_CAPACITY);
+        let mut failure = self.begin(begin, sender).await?;
         let mut glance = interval(GLANCE);
         glance.set_missed_tick_behavior(MissedTickBehavior::Delay);
-        while !self.core.is_finished() {
+        let mut events = Vec::new();
+        loop {
+            let is_over = failure.is_some() || self.core.is_finished();
+            if is_over && self.memory.is_written() {
+                return failure.map_or(Ok(()), Err);
+            }
+            let may_act = !is_over && self.memory.has_room();
             let deadline = self.core.next_deadline().map(|deadline| self.began + deadline);
-            let event = tokio::select! {
+            let return_time = self.survivors.as_ref().map(|survivors| survivors.until);
+            tokio::select! {
                 // What has come is looked at before the time is: a late look must not make a worker late.
                 biased;
                 () = interrupted.cancelled() => return Err(RunError::Interrupted),
-                Some(inbound) = self.cluster.inbound.recv() => self.event(inbound),
-                Some(result) = results.recv() => {
-                    self.here.forget(&result);
-                    Some(result)
+                written = self.memory.written() => {
+                    let group = written?;
+                    self.perform(group);
+                    continue;
                 }
-                _ = glance.tick(), if !self.here.contexts.is_empty() => {
-                    self.tell_progress();
-                    None
+                Some(result) = results.recv(), if may_act => events.push(Inbound::Event(result)),
+                _ = inbound.recv_many(&mut events, EVENTS_PER_GROUP), if may_act => {}
+                _ = glance.tick(), if !self.here.is_idle() => {
+                    self.here.tell_progress(&mut self.observer);
+                    continue;
                 }
-                () = sleep_or_wait(deadline) => Some(Event::DeadlinePassed),
-            };
-            let Some(event) = event else { continue };
-            trace!(?event);
-            let now = self.now();
-            let outcome = reactor::handle(&mut self.core, &mut self.planner, event, now, &mut self.outbox);
-            // Also after an error: what was said before it shall be heard.
-            self.perform();
-            outcome?;
+                () = sleep_or_wait(return_time), if may_act => {}
+                () = sleep_or_wait(deadline), if may_act => events.push(Inbound::Event(Event::DeadlinePassed)),
+            }
+            more(&mut inbound, &mut events);
+            failure = self.handle_all(&mut events).err();
         }
-        Ok(())
+    }
+
+    /// Let the planner begin, and everything follow that is known already; then, if something is left to do, listen and start
+    /// workers. What the planner cannot do is not an error of this function: what was said before shall be heard.
+    async fn begin(
+        &mut self,
+        Begin { options, run, takeover }: Begin,
+        inbound: tokio::sync::mpsc::Sender<Inbound>,
+    ) -> Result<Option<RunError>, RunError> {
+        let (mut group, now) = (Group::default(), self.now());
+        if let Some(takeover) = &takeover {
+            let (epoch, results) = (self.core.epoch, takeover.results);
+            self.outbox.tell(RunEvent::Resumed { epoch, results });
+        }
+        let started = reactor::start(&mut self.core, &mut self.planner, now, &mut self.outbox);
+        self.forget_if_wrong(started.as_ref().err(), &mut group);
+        self.collect(&mut group, None, now);
+        if started.is_ok() && !self.core.is_finished() {
+            let is_new = takeover.is_none();
+            let survivors = takeover.as_ref().map(|takeover| takeover.survivors.clone()).unwrap_or_default();
+            match Cluster::start(&options, (run, self.core.epoch), takeover, inbound).await {
+                Ok(cluster) => {
+                    (self.observer)(&RunEvent::Listening { address: cluster.address.clone() });
+                    group.batch.listens(cluster.bound.to_string());
+                    self.cluster = Some(cluster);
+                    self.survivors = Survivors::expect(survivors, Instant::now());
+                }
+                Err(error) => {
+                    if is_new {
+                        self.memory.discard();
+                    }
+                    return Err(error);
+                }
+            }
+        }
+        self.submit(group);
+        Ok(started.err())
     }
 
     fn now(&self) -> Duration {
         self.began.elapsed()
     }
 
-    /// How far the nodes are that run here, where that has changed. Those of workers come with their heartbeats.
-    fn tell_progress(&mut self) {
-        for (node, (context, told)) in &mut self.here.contexts {
-            let permille = u16::try_from(context.progress_permille()).unwrap_or(1000);
-            if std::mem::replace(told, permille) != permille {
-                (self.observer)(&RunEvent::NodeProgress { node: *node, permille });
+    /// Act upon events, as one group.
+    fn handle_all(&mut self, events: &mut Vec<Inbound>) -> Result<(), RunError> {
+        let mut group = Group::default();
+        let mut handle_all = || {
+            for inbound in events.drain(..) {
+                if let Some(event) = self.event(inbound, &mut group) {
+                    self.handle(event, &mut group)?;
+                }
             }
+            let back = self.survivors.take_if(|survivors| survivors.are_complete(Instant::now()));
+            let arrivals = back.map(Survivors::into_arrivals).unwrap_or_default();
+            arrivals.into_iter().try_for_each(|arrival| self.welcome(arrival, &mut group))
+        };
+        let outcome = handle_all();
+        // Also after an error: what was said before it shall be heard.
+        self.submit(group);
+        outcome
+    }
+
+    /// Let a worker in that had to wait for others.
+    fn welcome(&mut self, arrival: Arrival, group: &mut Group) -> Result<(), RunError> {
+        let Arrival { worker, threads, process, executing } = arrival;
+        for lease in executing.unwrap_or_default() {
+            if let Some(node) = self.memory.today(lease) {
+                self.handle(Event::Continues { worker, node }, group)?;
+            }
+        }
+        self.handle(Event::WorkerJoined { worker, threads, process }, group)
+    }
+
+    fn handle(&mut self, event: Event, group: &mut Group) -> Result<(), RunError> {
+        trace!(?event);
+        self.here.forget(&event);
+        let now = self.now();
+        let output = match &event {
+            Event::Finished { node, output, .. } | Event::Recovered { node, output, .. } => {
+                Some((*node, output.clone()))
+            }
+            _ => None,
+        };
+        let outcome = reactor::handle(&mut self.core, &mut self.planner, event, now, &mut self.outbox);
+        self.collect(group, output.as_ref(), now);
+        self.forget_if_wrong(outcome.as_ref().err(), group);
+        outcome
+    }
+
+    /// Move what the reactor has said into the group, and tell the journal.
+    fn collect(&mut self, group: &mut Group, output: Option<&(NodeId, Blob)>, now: Duration) {
+        let actions = self.outbox.take();
+        if self.memory.is_kept() {
+            actions.iter().for_each(|action| group.batch.note(action, &self.core, output, now));
+        }
+        group.actions.extend(actions);
+    }
+
+    /// A result that is wrong, or one of two that differ, must not be there when the run is gone on with.
+    fn forget_if_wrong(&self, error: Option<&RunError>, group: &mut Group) {
+        if let Some(RunError::WrongResult { name, .. } | RunError::ResultsDiffer { name, .. }) = error {
+            let index = usize::try_from(name.node.0).unwrap_or(usize::MAX);
+            let key = self.core.records.get(index).and_then(|record| record.key);
+            key.into_iter().for_each(|key| group.batch.forget(key));
         }
     }
 
-    fn event(&mut self, inbound: Inbound) -> Option<Event> {
+    fn submit(&mut self, group: Group) {
+        if let Some(group) = self.memory.submit(group) {
+            self.perform(group);
+        }
+    }
+
+    fn event(&mut self, inbound: Inbound, group: &mut Group) -> Option<Event> {
         match inbound {
             Inbound::Event(event) => {
                 if let Event::WorkerLeft { worker, .. } = &event {
-                    self.cluster.dismiss(*worker);
+                    self.cluster.iter_mut().for_each(|cluster| cluster.dismiss(*worker));
+                    self.survivors.iter_mut().for_each(|survivors| survivors.left(*worker));
                 }
                 Some(event)
             }
             Inbound::Joined { worker, hello, mailbox } => {
-                self.cluster.admit(worker, mailbox);
+                let (process, cluster) = (hello.process, self.cluster.as_mut()?);
                 let threads = usize::try_from(hello.threads).unwrap_or(usize::MAX).clamp(1, MAX_THREADS);
-                Some(Event::WorkerJoined { worker, threads, process: hello.process })
+                let is_wanted = cluster.admit(worker, process, mailbox);
+                match &mut self.survivors {
+                    Some(survivors) if is_wanted => survivors.joined(worker, threads, process),
+                    Some(survivors) => survivors.dismissed(process),
+                    None => return is_wanted.then_some(Event::WorkerJoined { worker, threads, process }),
+                }
+                None
             }
+            Inbound::Reported { worker, executing } => {
+                self.survivors.iter_mut().for_each(|survivors| survivors.reported(worker, executing.clone()));
+                Some(Event::Heartbeat { worker, executing: Vec::new() })
+            }
+            Inbound::Late { worker, lease, output } => Some(self.memory.late_answer(worker, lease, output, group)),
             Inbound::Ask { lease, answer } => {
                 // Whoever asked may be gone.
                 let _ = answer.send(self.core.was_given_out(NodeId(lease.node), lease.attempt));
                 None
             }
             Inbound::Tell(event) => {
-                (self.observer)(&event);
+                group.batch.note_event(&event, &self.core, None, self.now());
+                group.actions.push(Action::Tell(event));
                 None
             }
         }
     }
 
-    fn perform(&mut self) {
-        for action in self.outbox.take() {
+    /// Do what a group asks for.
+    fn perform(&mut self, group: Group) {
+        for (worker, lease) in group.late {
+            self.send(worker, ToWorker::Acknowledge(lease));
+        }
+        for action in group.actions {
             match action {
                 Action::Assign { worker, lease } => self.assign(worker, lease),
-                Action::Cancel { worker, lease } => {
-                    let name = LeaseName { node: lease.node.0, attempt: lease.attempt, epoch: lease.epoch };
-                    self.cluster.send(worker, Outgoing::Message(ToWorker::Cancel(name)));
+                Action::Cancel { worker, lease } => self.send(worker, ToWorker::Cancel(name_of(lease))),
+                Action::SendBlob { worker, blob } => {
+                    self.cluster.iter().for_each(|cluster| cluster.send(worker, Outgoing::Blob(blob.clone())));
                 }
-                Action::SendBlob { worker, blob } => self.cluster.send(worker, Outgoing::Blob(blob)),
                 Action::Acknowledge { worker, node, attempt } => {
-                    let name = LeaseName { node: node.0, attempt, epoch: FIRST_EPOCH };
-                    self.cluster.send(worker, Outgoing::Message(ToWorker::Acknowledge(name)));
+                    let name = LeaseName { node: node.0, attempt, epoch: self.core.epoch };
+                    self.send(worker, ToWorker::Acknowledge(name));
                 }
-                Action::Drop { worker } => self.cluster.dismiss(worker),
+                Action::Drop { worker } => self.cluster.iter_mut().for_each(|cluster| cluster.dismiss(worker)),
                 Action::RunHere { node, attempt } => self.run_here(node, attempt),
                 Action::Tell(event) => (self.observer)(&event),
             }
+        }
+    }
+
+    fn send(&self, worker: WorkerId, message: ToWorker) {
+        if let Some(cluster) = &self.cluster {
+            cluster.send(worker, Outgoing::Message(message));
         }
     }
 
@@ -195,32 +356,43 @@ impl<P: Planner, O: FnMut(&RunEvent)> Driver<P, O> {
         // A node is given out when it is ready, so both are there.
         let (Some(spec), Some(inputs)) = (graph.spec(lease.node), graph.input_blobs(lease.node)) else { return };
         let assignment = Assignment {
-            lease: LeaseName { node: lease.node.0, attempt: lease.attempt, epoch: lease.epoch },
+            lease: name_of(lease),
             kind: spec.kind.clone(),
             label: spec.label.clone(),
             parameters: spec.parameters.clone(),
             inputs: inputs.iter().map(|blob| blob.hash().0).collect(),
         };
-        self.cluster.send(worker, Outgoing::Message(ToWorker::Assign(assignment)));
+        self.send(worker, ToWorker::Assign(assignment));
     }
 
     fn run_here(&mut self, node: NodeId, attempt: u32) {
         let graph = self.core.graph();
         let (Some(spec), Some(inputs)) = (graph.spec(node).cloned(), graph.input_blobs(node)) else { return };
-        let context = self.here.new_context(node);
-        let (registry, results) = (Arc::clone(&self.here.registry), self.here.results.clone());
-        // On the rayon pool and not on a blocking thread of tokio: its parallel iterators run there anyway, and a runtime
-        // waits for blocking threads before it ends, but an interrupted run shall not wait for a node.
-        rayon::spawn(move || {
-            let site = Site::Coordinator;
-            let result = match registry.run(&spec.kind, &spec.parameters, &inputs, &context) {
-                Ok(output) => Event::Finished { site, node, attempt, output },
-                Err(failure) => Event::Failed { site, node, attempt, failure },
-            };
-            // When nobody listens any more the run is over.
-            let _ = results.send(result);
-        });
+        self.here.start(node, attempt, spec, inputs);
     }
+}
+
+fn name_of(lease: Lease) -> LeaseName {
+    LeaseName { node: lease.node.0, attempt: lease.attempt, epoch: lease.epoch }
+}
+
+/// Take what else has come, as far as there is room in the group.
+fn more(inbound: &mut Receiver<Inbound>, events: &mut Vec<Inbound>) {
+    while events.len() < EVENTS_PER_GROUP {
+        let Ok(event) = inbound.try_recv() else { return };
+        events.push(event);
+    }
+}
+
+/// An error with its causes, in one line.
+fn with_causes(error: &RunError) -> String {
+    let mut text = error.to_string();
+    let mut cause = error.source();
+    while let Some(error) = cause {
+        text = format!("{text}: {error}");
+        cause = error.source();
+    }
+    text
 }
 
 /// How often to look how far the nodes are that run here.
@@ -233,29 +405,5 @@ async fn sleep_or_wait(deadline: Option<Instant>) {
     match deadline {
         Some(deadline) => sleep_until(deadline).await,
         None => std::future::pending().await,
-    }
-}
-
-/// What nodes need that run in this process.
-struct Here {
-    registry: Arc<Registry>,
-    decoded: Arc<DecodedCache>,
-    /// Of every node that runs here, with the progress that was told last: to watch it, and to cancel it when the run ends.
-    contexts: BTreeMap<NodeId, (RunContext, u16)>,
-    results: UnboundedSender<Event>,
-}
-
-impl Here {
-    fn new_context(&mut self, node: NodeId) -> RunContext {
-        let context = RunContext::new(Arc::clone(&self.decoded));
-        self.contexts.insert(node, (context.clone(), 0));
-        context
-    }
-
-    /// Let the context of a node go that has ended.
-    fn forget(&mut self, ended: &Event) {
-        if let Event::Finished { node, .. } | Event::Failed { node, .. } = ended {
-            self.contexts.remove(node);
-        }
     }
 }

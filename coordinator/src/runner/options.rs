@@ -6,6 +6,7 @@ use std::path::PathBuf;
 
 use super::RunError;
 use crate::core::Policy;
+use crate::journal::JournalOptions;
 use crate::limits::Limits;
 use crate::spawn::WorkerCommand;
 
@@ -33,12 +34,14 @@ pub struct RunnerOptions {
     pub limits: Limits,
     /// How workers and nodes are treated.
     pub policy: Policy,
+    /// Where to write the run down, so that it can be gone on with; `None` forgets it when this process ends.
+    pub journal: Option<JournalOptions>,
     /// Whether Ctrl-C and SIGTERM stop the run in order, with [`RunError::Interrupted`].
     pub handle_signals: bool,
 }
 
 impl RunnerOptions {
-    /// `workers` local workers, the access file, and for the rest the defaults of design section 8.
+    /// `workers` local workers, the access file, no journal, and for the rest the defaults of design section 8.
     #[must_use]
     pub fn new(workers: usize, access_file: PathBuf) -> Self {
         Self {
@@ -52,6 +55,7 @@ impl RunnerOptions {
             access: None,
             limits: Limits::default(),
             policy: Policy::default(),
+            journal: None,
             handle_signals: true,
         }
     }
@@ -70,6 +74,17 @@ impl RunnerOptions {
                 let local = local.filter(|local| local.ip().is_loopback() && local.port() != 0);
                 local.ok_or_else(|| RunError::ListenWhere { address: address.to_owned() })
             }
+        }
+    }
+
+    /// The address to listen on for a run that an earlier coordinator listened for at `before`: the same one, so that its workers find
+    /// it, unless the user names another port.
+    pub(crate) fn listen_again(&self, before: Option<SocketAddr>) -> SocketAddr {
+        let anywhere = SocketAddr::from((Ipv4Addr::LOCALHOST, 0));
+        match (self.listen, before) {
+            (Some(listen), Some(before)) if listen.port() == 0 && listen.ip() == before.ip() => before,
+            (Some(listen), _) => listen,
+            (None, before) => before.unwrap_or(anywhere),
         }
     }
 
@@ -159,6 +174,17 @@ mod tests {
         assert!(options(0, Some("10.0.0.1:0"), None).listen_address(Some("node7:4100")).is_err());
         let beforehand = RunnerOptions { access: Some("a.json".into()), ..options(0, Some("0.0.0.0:4100"), None) };
         assert!(beforehand.check().is_ok());
+    }
+
+    #[test]
+    fn resumed_run_listens_where_it_did_unless_another_port_is_named() {
+        let before: SocketAddr = "127.0.0.1:4100".parse().unwrap();
+        let again = |listen| options(1, listen, None).listen_again(Some(before)).to_string();
+        assert_eq!(again(None), "127.0.0.1:4100");
+        assert_eq!(again(Some("127.0.0.1:0")), "127.0.0.1:4100");
+        assert_eq!(again(Some("127.0.0.1:4200")), "127.0.0.1:4200");
+        assert_eq!(again(Some("10.0.0.1:0")), "10.0.0.1:0");
+        assert_eq!(options(1, None, None).listen_again(None).to_string(), "127.0.0.1:0");
     }
 
     #[test]

@@ -27,6 +27,8 @@ pub struct FitSettings {
     pub max_cssim: Option<f64>,
     /// The folder of results.
     pub out: PathBuf,
+    /// Go on with the run that is in the folder, if there is one.
+    pub resume: bool,
     /// Who computes.
     pub cluster: ClusterSettings,
     /// How progress is shown.

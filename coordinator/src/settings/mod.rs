@@ -20,6 +20,7 @@ mod model;
 mod render;
 mod samples;
 mod scene;
+mod status;
 
 pub use access::AccessSettings;
 pub use camera::CameraSpec;
@@ -35,3 +36,4 @@ pub use model::{ModelName, ModelParams};
 pub use render::{Material, RenderSettings};
 pub use samples::Samples;
 pub use scene::{EnvironmentSettings, ViewSettings};
+pub use status::StatusSettings;

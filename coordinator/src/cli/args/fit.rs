@@ -1,7 +1,6 @@
 //! `lookalike fit`.
 
 use super::{
-    super::NotThereYet,
     cluster::ClusterArgs,
     method::MethodArgs,
     scene::{EnvironmentArgs, PhotoArgs, SphereArgs, ViewArgs},
@@ -35,13 +34,14 @@ pub(crate) struct FitArgs {
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Output")]
 struct OutputArgs {
-    /// Folder of results; must not hold a run
+    /// Folder of results; must not hold a run, unless --resume goes on with it
     #[arg(long, short, value_name = "DIR")]
     out: PathBuf,
     /// Exit with code 1 if the final CSSIM lies above this
     #[arg(long, value_name = "X", value_parser = score, allow_negative_numbers = true)]
     max_cssim: Option<f64>,
-    /// Go on with the run that is in the folder (not there yet)
+    /// Go on with the run that is in the folder: what was acknowledged is not computed again. Begins one if there is none, and is
+    /// done at once if it is finished
     #[arg(long)]
     resume: bool,
 }
@@ -56,9 +56,6 @@ pub(crate) struct DiagnosticsArgs {
 
 impl FitArgs {
     pub(crate) fn into_settings(self) -> anyhow::Result<FitSettings> {
-        if self.output.resume {
-            return Err(NotThereYet { what: "--resume", instead: "start again with another --out" }.into());
-        }
         self.photo.check_gain()?;
         self.sphere.check(&self.view)?;
         Ok(FitSettings {
@@ -71,6 +68,7 @@ impl FitArgs {
             method: self.method.into_settings(),
             max_cssim: self.output.max_cssim,
             out: self.output.out,
+            resume: self.output.resume,
             cluster: self.cluster.into_settings()?,
             progress: self.diagnostics.progress,
         })
@@ -91,6 +89,7 @@ Examples:
   lookalike fit ball.exr --env garden.hdr --sphere 128,128,100 --camera perspective:30 --out run
   lookalike fit ball.exr --env grace_cross.hdr --preset paper --out run
   lookalike fit ball.exr --env garden.hdr --out run --workers 0 --listen 10.0.0.1:4100
+  lookalike fit ball.exr --env garden.hdr --out run --resume
   lookalike fit fit.toml --seed 3
 
 where fit.toml is, for instance (its relative paths are relative to the file):

@@ -57,17 +57,6 @@ enum StageTwo {
 
 #[derive(Debug, Args)]
 #[command(args_override_self = true)]
-pub(crate) struct StatusArgs {
-    /// Folder of the run
-    #[arg(value_name = "DIR")]
-    run: PathBuf,
-    /// Print JSON
-    #[arg(long, help_heading = "Output")]
-    json: bool,
-}
-
-#[derive(Debug, Args)]
-#[command(args_override_self = true)]
 pub(crate) struct CheckArgs {
     #[command(flatten)]
     photo: PhotoArgs,

@@ -12,6 +12,7 @@ mod method;
 mod policy;
 mod render;
 mod scene;
+mod status;
 
 pub(crate) use fit::FitArgs;
 
@@ -40,8 +41,8 @@ pub(crate) enum Command {
     Fit(Box<FitArgs>),
     /// Fit many photos as one run (not there yet)
     Batch(Box<later::BatchArgs>),
-    /// Show the state of a running or finished run (not there yet)
-    Status(later::StatusArgs),
+    /// Show the state of a run: going on, stopped or finished
+    Status(status::StatusArgs),
     /// Render a sphere, or a map of normals, of one material under one light
     Render(render::RenderArgs),
     /// Measure how different two images look

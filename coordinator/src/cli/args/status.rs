@@ -1,0 +1,29 @@
+//! `lookalike status`.
+
+use crate::settings::StatusSettings;
+use clap::Args;
+use std::path::PathBuf;
+
+#[derive(Debug, Args)]
+#[command(args_override_self = true, after_long_help = EXAMPLES)]
+pub(crate) struct StatusArgs {
+    /// Folder of the run: what was given to it with --out
+    #[arg(value_name = "DIR")]
+    run: PathBuf,
+    /// Print JSON, as docs/journal.md describes it
+    #[arg(long, help_heading = "Output")]
+    json: bool,
+}
+
+impl StatusArgs {
+    pub(crate) fn into_settings(self) -> StatusSettings {
+        StatusSettings { run: self.run, json: self.json }
+    }
+}
+
+const EXAMPLES: &str = "\
+The exit code is 0 whatever the state of the run, and 2 where there is no run.
+
+Examples:
+  lookalike status run
+  lookalike status run --json";

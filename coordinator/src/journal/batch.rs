@@ -1,0 +1,220 @@
+//! What a group of events has changed: the rows of one transaction.
+
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+use lookalike::graph::{Blob, FailureReason, NodeId, NodeKey, NodeState, WorkerId};
+
+use crate::comm::{Action, RunEvent, Site};
+use crate::core::{Core, Deaths, Record};
+
+/// The worker's number of what runs in the coordinator itself. Workers count from 1.
+const HERE: u64 = 0;
+
+/// Where a node is; the numbers are those of the table.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum State {
+    Waiting = 0,
+    Ready = 1,
+    Running = 2,
+    Completed = 3,
+    Recalled = 4,
+    Failed = 5,
+}
+
+/// How an attempt ended; the numbers are those of the table.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Outcome {
+    Finished = 0,
+    Failed = 1,
+    Lost = 2,
+    Cancelled = 3,
+}
+
+/// A node that was added or has changed.
+#[derive(Debug)]
+pub(super) struct NodeRow {
+    /// Kind and label, of a new one.
+    pub(super) added: Option<(String, String)>,
+    pub(super) state: State,
+    pub(super) attempts: u32,
+    pub(super) deaths: Deaths,
+    pub(super) key: Option<NodeKey>,
+    pub(super) error: Option<String>,
+}
+
+/// An attempt that begins.
+#[derive(Debug)]
+pub(super) struct AttemptRow {
+    pub(super) node: u64,
+    pub(super) attempt: u32,
+    pub(super) worker: u64,
+    pub(super) at: Duration,
+}
+
+/// The open attempts of a node, all or those of one worker, have ended.
+#[derive(Debug)]
+pub(super) struct EndRow {
+    pub(super) node: u64,
+    pub(super) worker: Option<u64>,
+    pub(super) outcome: Outcome,
+    pub(super) at: Duration,
+}
+
+/// A worker that has joined.
+#[derive(Debug)]
+pub(super) struct WorkerRow {
+    pub(super) worker: u64,
+    pub(super) process: u32,
+    pub(super) threads: usize,
+    pub(super) at: Duration,
+}
+
+/// A worker that has left, and why.
+#[derive(Debug)]
+pub(super) struct LeftRow {
+    pub(super) worker: u64,
+    pub(super) why: String,
+    pub(super) at: Duration,
+}
+
+/// What a group of events has changed.
+#[derive(Debug, Default)]
+pub(crate) struct Batch {
+    /// By number.
+    pub(super) nodes: BTreeMap<u64, NodeRow>,
+    pub(super) attempts: Vec<AttemptRow>,
+    pub(super) ends: Vec<EndRow>,
+    pub(super) workers: Vec<WorkerRow>,
+    pub(super) left: Vec<LeftRow>,
+    pub(super) local_workers: Vec<u32>,
+    pub(super) results: Vec<(NodeKey, Blob)>,
+    /// Results that turned out to be wrong.
+    pub(super) forgotten: Vec<NodeKey>,
+    /// Results whose bytes nobody needs any more.
+    pub(super) released: Vec<NodeKey>,
+    pub(super) listen: Option<String>,
+}
+
+impl Batch {
+    /// Take note of what the reactor has said. `output` is what the event brought, if it brought an output; the graph may
+    /// have let it go by now.
+    pub(crate) fn note(&mut self, action: &Action, core: &Core, output: Option<&(NodeId, Blob)>, now: Duration) {
+        match action {
+            Action::Assign { worker, lease } => self.begin(lease.node, lease.attempt, worker.0, now),
+            Action::RunHere { node, attempt } => self.begin(*node, *attempt, HERE, now),
+            Action::Cancel { worker, lease } => self.end(lease.node, Some(worker.0), Outcome::Cancelled, now),
+            Action::Tell(event) => self.note_event(event, core, output, now),
+            Action::Acknowledge { worker, node, .. } => {
+                let has_failed = matches!(core.graph.state(*node), Some(NodeState::Failed(_)));
+                let outcome = if has_failed { Outcome::Failed } else { Outcome::Finished };
+                self.end(*node, Some(worker.0), outcome, now);
+            }
+            Action::SendBlob { .. } | Action::Drop { .. } => {}
+        }
+    }
+
+    /// Take note of something that was told without the reactor.
+    pub(crate) fn note_event(&mut self, event: &RunEvent, core: &Core, output: Option<&(NodeId, Blob)>, now: Duration) {
+        match event {
+            RunEvent::NodeAdded { name } => {
+                self.touch(name.node, core).added = Some((name.kind.clone(), name.label.clone()));
+            }
+            RunEvent::NodeReady { node } => _ = self.touch(*node, core),
+            RunEvent::NodeStarted { name, .. } => _ = self.touch(name.node, core),
+            RunEvent::NodeRecalled { name, .. } => self.touch(name.node, core).state = State::Recalled,
+            RunEvent::NodeFinished { name, site, .. } => {
+                let key = self.touch(name.node, core).key;
+                if *site == Site::Coordinator {
+                    self.end(name.node, Some(HERE), Outcome::Finished, now);
+                }
+                let brought = output.filter(|(node, _)| *node == name.node).map(|(_, output)| output);
+                self.results.extend(key.zip(brought.or_else(|| core.graph.output(name.node)).cloned()));
+            }
+            RunEvent::NodeFailed { name, reason } => {
+                self.touch(name.node, core).error = Some(reason.to_string());
+                let is_own = matches!(reason, FailureReason::Node(_));
+                self.end(name.node, None, if is_own { Outcome::Failed } else { Outcome::Lost }, now);
+            }
+            RunEvent::NodeSuspected { name, .. } => _ = self.touch(name.node, core),
+            RunEvent::NodeRequeued { name, worker, .. } => {
+                self.touch(name.node, core);
+                self.end(name.node, Some(worker.0), Outcome::Lost, now);
+            }
+            RunEvent::NodeReleased { name } => {
+                let key = self.touch(name.node, core).key;
+                self.released.extend(key);
+            }
+            RunEvent::WorkerJoined { worker, threads, process } => {
+                self.workers.push(WorkerRow { worker: worker.0, process: *process, threads: *threads, at: now });
+            }
+            RunEvent::WorkerLeft { worker, departure } => {
+                self.left.push(LeftRow { worker: worker.0, why: departure.to_string(), at: now });
+            }
+            RunEvent::LocalWorkerStarted { process } => self.local_workers.push(*process),
+            _ => {}
+        }
+    }
+
+    /// Keep a result of a node that has no number today.
+    pub(crate) fn keep(&mut self, key: NodeKey, output: Blob) {
+        self.results.push((key, output));
+    }
+
+    /// Forget the result of a node: it is wrong, or may be.
+    pub(crate) fn forget(&mut self, key: NodeKey) {
+        self.results.retain(|(kept, _)| *kept != key);
+        self.forgotten.push(key);
+    }
+
+    /// Where the coordinator listens.
+    pub(crate) fn listens(&mut self, address: String) {
+        self.listen = Some(address);
+    }
+
+    /// The nodes that were touched and whose key is known.
+    pub(crate) fn keys(&self) -> impl Iterator<Item = (NodeKey, NodeId)> {
+        self.nodes.iter().filter_map(|(node, row)| Some((row.key?, NodeId(*node))))
+    }
+
+    /// Whether there is nothing to write.
+    pub(crate) fn is_empty(&self) -> bool {
+        let Self { nodes, attempts, ends, workers, left, local_workers, results, forgotten, released, listen } = self;
+        let rows = nodes.len() + attempts.len() + ends.len() + workers.len() + left.len() + local_workers.len();
+        rows + results.len() + forgotten.len() + released.len() == 0 && listen.is_none()
+    }
+
+    fn begin(&mut self, node: NodeId, attempt: u32, worker: u64, at: Duration) {
+        self.attempts.push(AttemptRow { node: node.0, attempt, worker, at });
+    }
+
+    fn end(&mut self, node: NodeId, worker: Option<u64>, outcome: Outcome, at: Duration) {
+        self.ends.push(EndRow { node: node.0, worker, outcome, at });
+    }
+
+    /// The row of a node, as the node is now.
+    fn touch(&mut self, node: NodeId, core: &Core) -> &mut NodeRow {
+        let unknown = Record::default();
+        let index = usize::try_from(node.0).unwrap_or(usize::MAX);
+        let record = core.records.get(index).unwrap_or(&unknown);
+        let (attempts, deaths, key) = (record.attempts, record.deaths, record.key);
+        let is_executing = |worker: &WorkerId| {
+            let held = core.members.get(*worker).and_then(|member| member.leases.get(&node));
+            held.is_some_and(|held| held.started_at.is_some())
+        };
+        let is_running = || record.here_since.is_some() || record.holders.iter().any(is_executing);
+        let state = match core.graph.state(node) {
+            Some(NodeState::Completed(_)) => State::Completed,
+            Some(NodeState::Failed(_)) => State::Failed,
+            Some(NodeState::Ready) if is_running() => State::Running,
+            Some(NodeState::Ready) => State::Ready,
+            Some(NodeState::Waiting) | None => State::Waiting,
+        };
+        let new = || NodeRow { added: None, state, attempts, deaths, key, error: None };
+        let row = self.nodes.entry(node.0).or_insert_with(new);
+        // What an earlier coordinator completed stays recalled.
+        let state = if row.state == State::Recalled { State::Recalled } else { state };
+        (row.state, row.attempts, row.deaths, row.key) = (state, attempts, deaths, key);
+        row
+    }
+}

@@ -1,0 +1,129 @@
+//! What can be wrong with a journal.
+
+use std::io;
+use std::path::{Path, PathBuf};
+
+use rusqlite::ErrorCode;
+use thiserror::Error;
+
+use super::identity::Difference;
+
+/// What can be wrong with a journal.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum JournalError {
+    /// There is a run already, and nobody asked to go on with it.
+    #[error("{} already holds a run; go on with it with --resume, choose another --out, or remove it first", path.display())]
+    Exists {
+        /// The journal.
+        path: PathBuf,
+    },
+    /// The file is something else.
+    #[error("{} is not the journal of a run; choose another --out, or move that file away", path.display())]
+    NotAJournal {
+        /// The file.
+        path: PathBuf,
+    },
+    /// Another version of this program wrote it in another form.
+    #[error(
+        "{} has journal format {found}, expected {expected}; go on with the version of lookalike that began the run, or choose another --out",
+        path.display()
+    )]
+    Version {
+        /// The journal.
+        path: PathBuf,
+        /// The format that this program writes.
+        expected: i64,
+        /// The format of the file.
+        found: i64,
+    },
+    /// The run in the journal has other inputs or settings.
+    #[error(
+        "{} is the journal of a run with other inputs or settings: {}; resume with those of that run, or choose another --out",
+        path.display(), listed(differences)
+    )]
+    AnotherRun {
+        /// The journal.
+        path: PathBuf,
+        /// What differs.
+        differences: Vec<Difference>,
+    },
+    /// Another process uses the journal.
+    #[error("another process is using the journal {}; wait for it to end, then try again", path.display())]
+    Busy {
+        /// The journal.
+        path: PathBuf,
+    },
+    /// There is no room for more.
+    #[error(
+        "cannot write the journal {}: the disk is full; free some space there and go on with --resume: nothing that was acknowledged is lost",
+        path.display()
+    )]
+    DiskFull {
+        /// The journal.
+        path: PathBuf,
+    },
+    /// The journal cannot be written.
+    #[error(
+        "cannot write the journal {}; mend that and go on with --resume: nothing that was acknowledged is lost",
+        path.display()
+    )]
+    Write {
+        /// The journal.
+        path: PathBuf,
+        /// What SQLite says.
+        source: rusqlite::Error,
+    },
+    /// The journal cannot be opened or read.
+    #[error("cannot use the journal {}", path.display())]
+    Open {
+        /// The journal.
+        path: PathBuf,
+        /// What SQLite says.
+        source: rusqlite::Error,
+    },
+    /// The journal's file cannot be made.
+    #[error("cannot make the journal {}", path.display())]
+    Create {
+        /// The journal.
+        path: PathBuf,
+        /// What the system says.
+        source: io::Error,
+    },
+}
+
+impl JournalError {
+    /// The exit code of the program: 2 for a journal that does not fit, 3 when the system fails us.
+    #[must_use]
+    pub fn exit_code(&self) -> u8 {
+        match self {
+            Self::Busy { .. } | Self::DiskFull { .. } | Self::Write { .. } => 3,
+            _ => 2,
+        }
+    }
+
+    /// An error while reading.
+    pub(super) fn reading(path: &Path, source: rusqlite::Error) -> Self {
+        let path = path.to_owned();
+        match source.sqlite_error_code() {
+            Some(ErrorCode::NotADatabase) => Self::NotAJournal { path },
+            Some(ErrorCode::DatabaseBusy | ErrorCode::DatabaseLocked) => Self::Busy { path },
+            Some(ErrorCode::DiskFull) => Self::DiskFull { path },
+            _ => Self::Open { path, source },
+        }
+    }
+
+    /// An error while writing.
+    pub(super) fn writing(path: &Path, source: rusqlite::Error) -> Self {
+        let path = path.to_owned();
+        match source.sqlite_error_code() {
+            Some(ErrorCode::DatabaseBusy | ErrorCode::DatabaseLocked) => Self::Busy { path },
+            Some(ErrorCode::DiskFull) => Self::DiskFull { path },
+            _ => Self::Write { path, source },
+        }
+    }
+}
+
+fn listed(differences: &[Difference]) -> String {
+    differences.iter().map(ToString::to_string).collect::<Vec<_>>().join("; ")
+}

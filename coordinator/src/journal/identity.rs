@@ -1,0 +1,86 @@
+//! What a run is a run of: a run that is taken up again must have the same inputs and settings.
+
+use std::fmt;
+
+use serde_json::{Map, Value};
+
+/// The inputs (by content) and the settings that shape the result of a run, by name. What does not shape it, such as the number
+/// of workers, is no part of it.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct RunIdentity {
+    parts: Vec<(String, String)>,
+}
+
+/// Something that is not as it was when the run began.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Difference {
+    /// What it is: a flag, or an input.
+    pub name: String,
+    /// Its value in the run that is there; `None` if there was none.
+    pub there: Option<String>,
+    /// Its value now; `None` if there is none.
+    pub here: Option<String>,
+}
+
+impl RunIdentity {
+    /// This identity with one more part.
+    #[must_use]
+    pub fn with(mut self, name: impl Into<String>, value: impl Into<String>) -> Self {
+        self.parts.push((name.into(), value.into()));
+        self
+    }
+
+    /// What differs from the identity of the run that is there, in the order of this one.
+    #[must_use]
+    pub fn differences(&self, there: &Self) -> Vec<Difference> {
+        let value = |of: &Self, name: &str| of.parts.iter().find(|(n, _)| n == name).map(|(_, value)| value.clone());
+        let only_there = there.parts.iter().filter(|(name, _)| value(self, name).is_none());
+        let names = self.parts.iter().chain(only_there).map(|(name, _)| name);
+        let difference = |name: &String| {
+            let (there, here) = (value(there, name), value(self, name));
+            (there != here).then(|| Difference { name: name.clone(), there, here })
+        };
+        names.filter_map(difference).collect()
+    }
+
+    /// As it is stored.
+    pub(super) fn to_json(&self) -> String {
+        let parts = self.parts.iter().map(|(name, value)| (name.clone(), Value::from(value.as_str())));
+        Value::Object(parts.collect::<Map<_, _>>()).to_string()
+    }
+
+    /// As it was stored; `None` for anything else.
+    pub(super) fn from_json(text: &str) -> Option<Self> {
+        let Ok(Value::Object(parts)) = serde_json::from_str(text) else { return None };
+        let part = |(name, value): (String, Value)| Some((name, value.as_str()?.to_owned()));
+        Some(Self { parts: parts.into_iter().map(part).collect::<Option<_>>()? })
+    }
+}
+
+impl fmt::Display for Difference {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let or_none = |value: &Option<String>| value.clone().unwrap_or_else(|| "none".into());
+        write!(formatter, "{} is {} there and {} here", self.name, or_none(&self.there), or_none(&self.here))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_differs_is_named_with_both_values() {
+        let there = RunIdentity::default().with("photo", "12ab").with("--mask", "77").with("--seed", "0");
+        let here = RunIdentity::default().with("photo", "34cd").with("--seed", "0").with("--normals", "99");
+        let told: Vec<_> = here.differences(&there).iter().map(ToString::to_string).collect();
+        let expected = [
+            "photo is 12ab there and 34cd here",
+            "--normals is none there and 99 here",
+            "--mask is 77 there and none here",
+        ];
+        assert_eq!(told, expected);
+        assert_eq!(here.differences(&here.clone()), []);
+        assert_eq!(RunIdentity::from_json(&here.to_json()), Some(here));
+        assert_eq!(RunIdentity::from_json("[]"), None);
+    }
+}

@@ -1,0 +1,113 @@
+//! One coordinator per folder of results: a lock that ends with its process, however that ends.
+
+use std::fs::{File, OpenOptions, TryLockError};
+use std::io::{self, Read, Write};
+use std::path::{Path, PathBuf};
+use std::thread;
+use std::time::Duration;
+
+use thiserror::Error;
+
+/// The lock's file in a folder of results.
+pub const LOCK_FILE: &str = "run.lock";
+
+/// How often to ask, and how long to wait in between: `lookalike status` holds the lock for an instant when it looks whether
+/// somebody else does.
+const TRIES: u32 = 10;
+const PAUSE: Duration = Duration::from_millis(20);
+
+/// A folder of results that belongs to this process as long as this lives.
+#[derive(Debug)]
+pub struct RunLock {
+    _file: File,
+}
+
+/// The folder cannot be had.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum LockError {
+    /// Somebody else has it.
+    #[error("another coordinator is at work in {} ({holder}): wait for it to end, or choose another --out", folder.display())]
+    Held {
+        /// The folder.
+        folder: PathBuf,
+        /// Who, in its own words.
+        holder: String,
+    },
+    /// The lock's file cannot be written.
+    #[error("cannot write {}", path.display())]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// What the system says.
+        source: io::Error,
+    },
+}
+
+impl RunLock {
+    /// Take the lock of a folder.
+    ///
+    /// # Errors
+    /// When another process has it, or its file cannot be written. On a file system that has no locks nobody can tell, and
+    /// everybody gets it.
+    pub fn take(folder: &Path) -> Result<Self, LockError> {
+        let path = folder.join(LOCK_FILE);
+        let file_error = |source| LockError::File { path: path.clone(), source };
+        let mut file =
+            OpenOptions::new().read(true).write(true).create(true).truncate(false).open(&path).map_err(file_error)?;
+        for tries_left in (0..TRIES).rev() {
+            match file.try_lock() {
+                Ok(()) | Err(TryLockError::Error(_)) => break,
+                Err(TryLockError::WouldBlock) if tries_left == 0 => {
+                    return Err(LockError::Held { folder: folder.to_owned(), holder: words_of(&mut file) });
+                }
+                Err(TryLockError::WouldBlock) => thread::sleep(PAUSE),
+            }
+        }
+        let words = format!("process {} on {}", std::process::id(), host());
+        file.set_len(0).and_then(|()| file.write_all(words.as_bytes())).map_err(file_error)?;
+        Ok(Self { _file: file })
+    }
+
+    /// Whether some process has the lock of a folder; `None` where nobody can tell.
+    #[must_use]
+    pub fn is_held(folder: &Path) -> Option<bool> {
+        let file = File::open(folder.join(LOCK_FILE)).ok()?;
+        match file.try_lock_shared() {
+            Ok(()) => Some(false),
+            Err(TryLockError::WouldBlock) => Some(true),
+            Err(TryLockError::Error(_)) => None,
+        }
+    }
+}
+
+/// The name of this machine.
+pub(crate) fn host() -> String {
+    nix::unistd::gethostname().map_or_else(|_| "an unknown host".into(), |name| name.to_string_lossy().into_owned())
+}
+
+fn words_of(file: &mut File) -> String {
+    let mut words = String::new();
+    // Nobody has to have written anything.
+    let _ = file.take(256).read_to_string(&mut words);
+    if words.is_empty() { "it does not say which".into() } else { words }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lock_names_its_holder_and_ends_with_it() {
+        let folder = tempfile::tempdir().unwrap();
+        assert_eq!(RunLock::is_held(folder.path()), None);
+        let first = RunLock::take(folder.path()).unwrap();
+        assert_eq!(RunLock::is_held(folder.path()), Some(true));
+        let refused = RunLock::take(folder.path()).unwrap_err().to_string();
+        assert!(refused.contains(&format!("(process {} on {})", std::process::id(), host())), "{refused}");
+        drop(first);
+        assert_eq!(RunLock::is_held(folder.path()), Some(false));
+        assert!(RunLock::take(folder.path()).is_ok());
+        assert!(matches!(RunLock::take(&folder.path().join("missing")), Err(LockError::File { .. })));
+    }
+}

@@ -1,0 +1,212 @@
+//! The journal of a run: what was added, given out, answered, in SQLite at `OUT/run.sqlite`.
+//!
+//! ```text
+//!   reactor --actions of a group of events--> Batch --one transaction--> thread "journal" --committed--> the actions are done
+//! ```
+//! A worker's answer is acknowledged, and the next node given out, only after the transaction that says so: whatever ends the
+//! coordinator, nothing is lost that anybody was told of. Each process that coordinates a run is an *epoch* of it, and the first
+//! one has the number 1. Planners are pure, so a later epoch plans anew from the same inputs; nodes whose [`NodeKey`] has a result are completed
+//! from here, whatever their numbers were, and those alone run that have none.
+//!
+//! The tables are in `schema.rs`, and explained in `docs/journal.md`:
+//!
+//! | table | one row per |
+//! |---|---|
+//! | `run` | the run: name, inputs and settings, when it began, what it wrote when it was finished |
+//! | `epochs` | coordinator process: host, when it began and was last seen, how it ended, where it listened |
+//! | `nodes` | node of an epoch: kind, label, state, attempts, deaths of workers, key, error |
+//! | `attempts` | lease that was given out: worker, when, how it ended |
+//! | `workers`, `local_workers` | connection of a worker; process of this machine that was started as one |
+//! | `results` | node key: the hash and the bytes of its output |
+//!
+//! Keys and hashes have no index: they are random, and an index would write one page for each. A coordinator that goes on reads all
+//! keys once. The secret of the access file is never here; the file is readable by its owner alone all the same.
+//!
+//! On a network file system the journal is locked for this process alone, and others read `status.json`.
+
+mod batch;
+mod error;
+mod finish;
+mod identity;
+mod lock;
+mod past;
+mod place;
+mod schema;
+pub mod status;
+mod writer;
+
+use std::collections::{HashMap, HashSet};
+use std::path::PathBuf;
+use std::sync::mpsc::{Sender, channel, sync_channel};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread::{self, JoinHandle};
+use std::time::{Instant, SystemTime};
+
+use lookalike::fit::BestScore;
+use lookalike::graph::NodeKey;
+use lookalike::protocol::RunName;
+use tokio::sync::mpsc::{UnboundedReceiver, unbounded_channel};
+
+pub(crate) use self::batch::Batch;
+pub use self::error::JournalError;
+pub(crate) use self::finish::{Finished, finish, finished};
+pub use self::identity::{Difference, RunIdentity};
+pub use self::lock::{LOCK_FILE, LockError, RunLock};
+pub(crate) use self::past::Past;
+pub(crate) use self::schema::remove;
+use self::writer::{Command, Writer};
+use crate::core::Deaths;
+use crate::recall::{Memory, Recall};
+
+/// The journal's file in a folder of results.
+pub const JOURNAL_FILE: &str = "run.sqlite";
+
+/// Where a run is written down, and what it is a run of.
+#[derive(Clone, Debug)]
+pub struct JournalOptions {
+    /// The file; its folder has to exist. Only one process may use it at a time: see [`RunLock`].
+    pub path: PathBuf,
+    /// What shapes the result.
+    pub identity: RunIdentity,
+    /// Whether to go on with a run that is there. Without one, a new run begins either way.
+    pub resume: bool,
+    /// Whether local workers live on for a while when this process dies, for the next one to take them over.
+    pub survivors: bool,
+    /// The best score so far, for people who look at the run.
+    pub best: Option<Arc<BestScore>>,
+}
+
+impl JournalOptions {
+    /// A new run, which cannot be gone on with by surviving workers.
+    #[must_use]
+    pub fn new(path: PathBuf, identity: RunIdentity) -> Self {
+        Self { path, identity, resume: false, survivors: false, best: None }
+    }
+}
+
+/// The journal of a run that this process coordinates.
+#[derive(Debug)]
+pub(crate) struct Journal {
+    path: PathBuf,
+    /// The name of the run: the same for all its epochs.
+    pub(crate) run: RunName,
+    /// This process's number among those of the run, from 1.
+    pub(crate) epoch: u64,
+    /// What earlier epochs have left.
+    pub(crate) past: Past,
+    known: Known,
+    commands: Sender<Command>,
+    committed: UnboundedReceiver<Result<(), JournalError>>,
+    thread: Option<JoinHandle<Result<(), JournalError>>>,
+}
+
+/// The keys that have a result in the journal, but for those of this epoch.
+type Known = Arc<Mutex<HashSet<NodeKey>>>;
+
+impl Journal {
+    /// Begin a run, or go on with the one that is there.
+    pub(crate) fn open(options: &JournalOptions, name: RunName) -> Result<Self, JournalError> {
+        let path = options.path.clone();
+        if path.exists() && !options.resume {
+            return Err(JournalError::Exists { path });
+        }
+        let (connection, loaded) = if path.exists() {
+            past::load(&path, &options.identity)?
+        } else {
+            past::begin(&path, &options.identity, name)?
+        };
+        let (commands, asked) = channel();
+        let (sender, committed) = unbounded_channel();
+        let known: Known = Arc::new(Mutex::new(loaded.results.keys().copied().collect()));
+        let writer = Writer {
+            connection,
+            options: options.clone(),
+            epoch: loaded.epoch,
+            results: loaded.results,
+            commands: asked,
+            committed: sender,
+            next_status: Instant::now(),
+            is_news: true,
+        };
+        let thread = thread::Builder::new().name("journal".into()).spawn(move || writer.run());
+        let thread = thread.map_err(|source| JournalError::Create { path: path.clone(), source })?;
+        let Loaded { run, epoch, past, .. } = loaded;
+        Ok(Self { path, run, epoch, past, known, commands, committed, thread: Some(thread) })
+    }
+
+    /// What the reactor asks for the outputs of earlier epochs.
+    pub(crate) fn recall(&self) -> Box<dyn Recall> {
+        let deaths = self.past.deaths.clone();
+        Box::new(Recollection { known: Arc::clone(&self.known), deaths, commands: self.commands.clone() })
+    }
+
+    /// Write a batch, after those before. [`Self::committed`] tells when it is written.
+    pub(crate) fn commit(&mut self, batch: Batch) {
+        // A thread that has ended is noticed by `committed`.
+        let _ = self.commands.send(Command::Commit(batch));
+    }
+
+    /// Wait until the earliest batch that was not told of is written.
+    pub(crate) async fn committed(&mut self) -> Result<(), JournalError> {
+        let gone = || JournalError::Busy { path: self.path.clone() };
+        self.committed.recv().await.unwrap_or_else(|| Err(gone()))
+    }
+
+    /// A result was kept whose node is not there today: should it become ready, it is completed from here.
+    pub(crate) fn learn(&self, key: NodeKey) {
+        self.known.lock().unwrap_or_else(PoisonError::into_inner).insert(key);
+    }
+
+    /// Write how this epoch ended, after all batches; `None` when every node is closed as the planner wants it.
+    pub(crate) fn close(mut self, ended: Option<String>) -> Result<(), JournalError> {
+        let _ = self.commands.send(Command::Close(ended));
+        let thread = self.thread.take().map(JoinHandle::join);
+        thread.and_then(Result::ok).unwrap_or(Ok(()))
+    }
+
+    /// Undo the beginning of a run that could not begin.
+    pub(crate) fn discard(self) {
+        let path = self.path.clone();
+        let _ = self.close(None);
+        // The next attempt will say that there is a run already.
+        let _ = remove(&path);
+    }
+}
+
+/// Answers the reactor from the journal.
+#[derive(Debug)]
+struct Recollection {
+    known: Known,
+    deaths: HashMap<NodeKey, Deaths>,
+    commands: Sender<Command>,
+}
+
+impl Recall for Recollection {
+    fn recall(&mut self, key: NodeKey) -> Memory {
+        let deaths = self.deaths.get(&key).copied().unwrap_or_default();
+        let is_known = self.known.lock().unwrap_or_else(PoisonError::into_inner).contains(&key);
+        let read = || {
+            let (sender, answer) = sync_channel(1);
+            self.commands.send(Command::Read(key, sender)).ok()?;
+            answer.recv().ok()?
+        };
+        Memory { output: if is_known { read() } else { None }, deaths }
+    }
+}
+
+/// What a journal says when it is opened.
+struct Loaded {
+    run: RunName,
+    epoch: u64,
+    results: HashMap<NodeKey, i64>,
+    past: Past,
+}
+
+/// Milliseconds since 1970.
+fn unix_ms() -> i64 {
+    let since = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
+    i64::try_from(since.as_millis()).unwrap_or(i64::MAX)
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,57 @@
+//! On what kind of file system a journal lies. Over a network SQLite cannot share memory between processes, and its locks
+//! cannot be relied upon to be seen by all: there the coordinator keeps the journal to itself.
+
+use std::path::Path;
+
+/// Whether a folder lies on a file system that other machines may write to.
+#[cfg(target_os = "linux")]
+pub(super) fn is_shared(folder: &Path) -> bool {
+    nix::sys::statfs::statfs(folder).is_ok_and(|system| is_network(i128::from(system.filesystem_type().0)))
+}
+
+/// Whether a folder lies on a file system that other machines may write to: not known here.
+#[cfg(not(target_os = "linux"))]
+pub(super) fn is_shared(_folder: &Path) -> bool {
+    false
+}
+
+/// The magic numbers of network file systems, as statfs(2) and the kernel's headers have them.
+#[cfg(target_os = "linux")]
+const NETWORK: [(&str, u32); 14] = [
+    ("9p", 0x0102_1997),
+    ("afs", 0x5346_414F),
+    ("beegfs", 0x1983_0326),
+    ("ceph", 0x00C3_6400),
+    ("cifs", 0xFF53_4D42),
+    ("coda", 0x7375_7245),
+    // sshfs, gluster, s3fs and many more; a local one only loses the live look of other processes.
+    ("fuse", 0x6573_5546),
+    ("gpfs", 0x4750_4653),
+    ("lustre", 0x0BD0_0BD0),
+    ("nfs", 0x0000_6969),
+    ("ocfs2", 0x7461_636F),
+    ("panfs", 0xAAD7_AAEA),
+    ("smb", 0x0000_517B),
+    ("smb2", 0xFE53_4D42),
+];
+
+#[cfg(target_os = "linux")]
+fn is_network(kind: i128) -> bool {
+    // The kernel's type is signed on some machines: only the low 32 bits count.
+    NETWORK.iter().any(|(_, magic)| kind & 0xFFFF_FFFF == i128::from(*magic))
+}
+
+#[cfg(all(test, target_os = "linux"))]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn network_file_systems_are_known_by_their_numbers() {
+        assert!(is_network(0x6969) && is_network(0xFE53_4D42));
+        // As a signed 32-bit number.
+        assert!(is_network(i128::from(0xFF53_4D42_u32.cast_signed())));
+        // ext4, tmpfs, xfs.
+        assert!(![0xEF53, 0x0102_1994, 0x5846_5342].into_iter().any(is_network));
+        assert!(!is_shared(Path::new("/proc")));
+    }
+}

@@ -1,0 +1,191 @@
+//! The tables, and how a journal is opened.
+
+use std::fs::OpenOptions;
+use std::io;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use rusqlite::{Connection, OpenFlags};
+
+use super::error::JournalError;
+use super::place;
+
+/// The format of the tables: `PRAGMA user_version`. A change of any kind is a new number.
+pub(super) const FORMAT: i64 = 1;
+
+/// Marks the file as a journal of this program: `PRAGMA application_id`, the letters `Look`.
+pub(super) const APPLICATION: i64 = 0x4c6f_6f6b;
+
+/// docs/journal.md explains them.
+const TABLES: &str = "
+CREATE TABLE run (
+    id          INTEGER PRIMARY KEY CHECK (id = 1),
+    name        BLOB NOT NULL,
+    identity    TEXT NOT NULL,
+    started_ms  INTEGER NOT NULL,
+    finished_ms INTEGER,
+    outputs     TEXT
+);
+CREATE TABLE epochs (
+    epoch       INTEGER PRIMARY KEY,
+    process     INTEGER NOT NULL,
+    host        TEXT NOT NULL,
+    program     TEXT NOT NULL,
+    started_ms  INTEGER NOT NULL,
+    seen_ms     INTEGER NOT NULL,
+    ended_ms    INTEGER,
+    ended       TEXT,
+    listen      TEXT,
+    best_cssim  REAL
+);
+CREATE TABLE nodes (
+    epoch       INTEGER NOT NULL,
+    node        INTEGER NOT NULL,
+    kind        TEXT NOT NULL,
+    label       TEXT NOT NULL,
+    state       INTEGER NOT NULL,
+    attempts    INTEGER NOT NULL,
+    deaths      INTEGER NOT NULL,
+    deaths_alone    INTEGER NOT NULL,
+    deaths_excused  INTEGER NOT NULL,
+    key         BLOB,
+    error       TEXT,
+    PRIMARY KEY (epoch, node)
+) WITHOUT ROWID;
+CREATE TABLE attempts (
+    epoch       INTEGER NOT NULL,
+    node        INTEGER NOT NULL,
+    attempt     INTEGER NOT NULL,
+    worker      INTEGER NOT NULL,
+    begun_ms    INTEGER NOT NULL,
+    ended_ms    INTEGER,
+    outcome     INTEGER,
+    PRIMARY KEY (epoch, node, attempt)
+) WITHOUT ROWID;
+CREATE TABLE workers (
+    epoch       INTEGER NOT NULL,
+    worker      INTEGER NOT NULL,
+    process     INTEGER NOT NULL,
+    threads     INTEGER NOT NULL,
+    joined_ms   INTEGER NOT NULL,
+    left_ms     INTEGER,
+    why         TEXT,
+    PRIMARY KEY (epoch, worker)
+) WITHOUT ROWID;
+CREATE TABLE local_workers (
+    epoch       INTEGER NOT NULL,
+    process     INTEGER NOT NULL,
+    PRIMARY KEY (epoch, process)
+) WITHOUT ROWID;
+CREATE TABLE results (
+    id          INTEGER PRIMARY KEY,
+    key         BLOB NOT NULL,
+    hash        BLOB NOT NULL,
+    bytes       BLOB
+);
+CREATE VIEW node_list AS
+    SELECT epoch, node, kind, label,
+           CASE state WHEN 0 THEN 'waiting' WHEN 1 THEN 'ready' WHEN 2 THEN 'running' WHEN 3 THEN 'completed'
+                      WHEN 4 THEN 'recalled' ELSE 'failed' END AS state,
+           attempts, deaths + deaths_alone + deaths_excused AS deaths, lower(hex(key)) AS key, error
+    FROM nodes;
+CREATE VIEW attempt_list AS
+    SELECT epoch, node, attempt, worker, begun_ms, ended_ms,
+           CASE outcome WHEN 0 THEN 'finished' WHEN 1 THEN 'failed' WHEN 2 THEN 'lost' WHEN 3 THEN 'cancelled' END AS outcome
+    FROM attempts;
+";
+
+/// How much of the journal is copied from its log at a time: 32 MiB. Each copy waits for the disk.
+const PAGES_PER_CHECKPOINT: i64 = 8192;
+
+/// The cache of the connection, in KiB.
+const CACHE_KIB: i64 = 16 << 10;
+
+/// How long to wait for a reader that is in the way; there should be none.
+const BUSY_TIME: Duration = Duration::from_secs(5);
+
+/// The files of a journal: itself, its log, their index, and the log of the older kind.
+pub(crate) fn files(path: &Path) -> [PathBuf; 4] {
+    ["", "-wal", "-shm", "-journal"].map(|suffix| {
+        let mut name = path.as_os_str().to_owned();
+        name.push(suffix);
+        name.into()
+    })
+}
+
+/// Remove a journal, if there is one. Itself last: a log without its journal is worth nothing, and harmless.
+///
+/// # Errors
+/// When the system does not let us.
+pub(crate) fn remove(path: &Path) -> io::Result<()> {
+    for file in files(path).iter().rev() {
+        match std::fs::remove_file(file) {
+            Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(error),
+            _ => {}
+        }
+    }
+    Ok(())
+}
+
+/// Make a journal where none is, readable by its owner alone, and open it.
+pub(super) fn create(path: &Path) -> Result<Connection, JournalError> {
+    let mut options = OpenOptions::new();
+    options.write(true).create_new(true);
+    #[cfg(unix)]
+    std::os::unix::fs::OpenOptionsExt::mode(&mut options, 0o600);
+    options.open(path).map_err(|source| match source.kind() {
+        io::ErrorKind::AlreadyExists => JournalError::Exists { path: path.to_owned() },
+        _ => JournalError::Create { path: path.to_owned(), source },
+    })?;
+    let writing = |source| JournalError::writing(path, source);
+    let connection = connect(path)?;
+    connection
+        .execute_batch(&format!(
+            "BEGIN; {TABLES} PRAGMA application_id = {APPLICATION}; PRAGMA user_version = {FORMAT}; COMMIT;"
+        ))
+        .map_err(writing)?;
+    Ok(connection)
+}
+
+/// Open a journal that is there, to go on with it.
+pub(super) fn open(path: &Path) -> Result<Connection, JournalError> {
+    // Before anything else: it must not become a journal by being looked at.
+    let looking = Connection::open_with_flags(path, OpenFlags::SQLITE_OPEN_READ_WRITE)
+        .map_err(|source| JournalError::reading(path, source))?;
+    check_format(path, &looking)?;
+    drop(looking);
+    connect(path)
+}
+
+/// That a file is a journal of this format.
+pub(super) fn check_format(path: &Path, connection: &Connection) -> Result<(), JournalError> {
+    let pragma = |name: &str| -> Result<i64, JournalError> {
+        let value = connection.pragma_query_value(None, name, |row| row.get(0));
+        value.map_err(|source| JournalError::reading(path, source))
+    };
+    if pragma("application_id")? != APPLICATION {
+        return Err(JournalError::NotAJournal { path: path.to_owned() });
+    }
+    match pragma("user_version")? {
+        FORMAT => Ok(()),
+        found => Err(JournalError::Version { path: path.to_owned(), expected: FORMAT, found }),
+    }
+}
+
+fn connect(path: &Path) -> Result<Connection, JournalError> {
+    let connect = || {
+        let connection = Connection::open_with_flags(path, OpenFlags::SQLITE_OPEN_READ_WRITE)?;
+        connection.busy_timeout(BUSY_TIME)?;
+        connection.set_prepared_statement_cache_capacity(32);
+        if path.parent().is_some_and(place::is_shared) {
+            // Before the first use of the log: then it needs no shared memory.
+            connection.pragma_update(None, "locking_mode", "EXCLUSIVE")?;
+        }
+        connection.pragma_update(None, "journal_mode", "WAL")?;
+        connection.pragma_update(None, "synchronous", "NORMAL")?;
+        connection.pragma_update(None, "wal_autocheckpoint", PAGES_PER_CHECKPOINT)?;
+        connection.pragma_update(None, "cache_size", -CACHE_KIB)?;
+        Ok(connection)
+    };
+    connect().map_err(|source| JournalError::writing(path, source))
+}

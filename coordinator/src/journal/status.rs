@@ -1,0 +1,363 @@
+//! The state of a run, as `lookalike status` shows it and `OUT/status.json` holds it. docs/journal.md documents its JSON.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::io;
+use std::path::Path;
+use std::time::{Duration, SystemTime};
+
+use rusqlite::{Connection, OpenFlags, OptionalExtension};
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+use super::error::JournalError;
+use super::lock::RunLock;
+use super::{JOURNAL_FILE, place, schema};
+
+/// The status of a run beside its journal, for where the journal cannot be read by others.
+pub const STATUS_FILE: &str = "status.json";
+
+/// The schema of the JSON.
+const SCHEMA: &str = "lookalike.status/1";
+
+/// The most failures that are listed.
+const MOST_FAILURES: usize = 100;
+
+/// How long to wait for a writer that is in the way.
+const BUSY_TIME: Duration = Duration::from_secs(1);
+
+/// Whether a run goes on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum RunState {
+    /// A coordinator is at work.
+    Running,
+    /// No coordinator is at work, and the run is not finished: `--resume` goes on with it.
+    Stopped,
+    /// All results are written.
+    Finished,
+}
+
+/// The state of a run.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Status {
+    /// Always `lookalike.status/1`.
+    pub schema: String,
+    /// Whether the run goes on.
+    pub state: RunState,
+    /// Why it does not, if it should.
+    pub error: Option<String>,
+    /// The name of the run, 32 hexadecimal digits.
+    pub run: String,
+    /// The number of its coordinator processes so far.
+    pub epoch: u64,
+    /// The process id of the last one.
+    pub process: u32,
+    /// Its machine.
+    pub host: String,
+    /// When the run began.
+    pub started_at: String,
+    /// When the last coordinator was last seen to write.
+    pub updated_at: String,
+    /// When the results were written.
+    pub finished_at: Option<String>,
+    /// The seconds that its coordinators were at work, together.
+    pub elapsed_s: f64,
+    /// Nodes of all kinds.
+    pub nodes: Counts,
+    /// Nodes by kind, in the order in which the kinds were planned.
+    pub kinds: Vec<KindCounts>,
+    /// The workers that are connected, by number.
+    pub workers: Vec<WorkerStatus>,
+    /// How many leases all epochs have given out, and how often nodes ran in a coordinator.
+    pub attempts: u64,
+    /// How many attempts were lost with their workers.
+    pub requeued: u64,
+    /// The lowest CSSIM so far.
+    pub best_cssim: Option<f64>,
+    /// The nodes that failed, at most 100.
+    pub failures: Vec<NodeError>,
+}
+
+/// How many nodes are where.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Counts {
+    /// All.
+    pub total: u64,
+    /// Their inputs are not there yet.
+    pub waiting: u64,
+    /// They may run.
+    pub ready: u64,
+    /// They run.
+    pub running: u64,
+    /// They have an output, whoever made it.
+    pub completed: u64,
+    /// Those of them whose output an earlier epoch made.
+    pub recalled: u64,
+    /// They failed.
+    pub failed: u64,
+}
+
+/// The nodes of one kind.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct KindCounts {
+    /// The kind.
+    pub kind: String,
+    /// Its nodes.
+    #[serde(flatten)]
+    pub counts: Counts,
+}
+
+/// A worker that is connected.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct WorkerStatus {
+    /// Its number in this epoch.
+    pub worker: u64,
+    /// Its process id on its machine.
+    pub process: u32,
+    /// How many nodes it executes at a time.
+    pub threads: u64,
+    /// How many it was given and has not answered.
+    pub leases: u64,
+    /// How many it has finished.
+    pub finished: u64,
+}
+
+/// A node that failed.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct NodeError {
+    /// Its kind.
+    pub kind: String,
+    /// Its label.
+    pub label: String,
+    /// Why.
+    pub error: String,
+}
+
+/// There is no status.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum StatusError {
+    /// There is no run.
+    #[error("expected a run in {folder}, found no {JOURNAL_FILE}; give the folder of a run's results (its --out)")]
+    NoRun {
+        /// The folder.
+        folder: String,
+    },
+    /// The journal cannot be read.
+    #[error(transparent)]
+    Journal(#[from] JournalError),
+    /// The status file cannot be read.
+    #[error("cannot read {path}")]
+    File {
+        /// The file.
+        path: String,
+        /// What the system says.
+        source: io::Error,
+    },
+    /// The status file is none.
+    #[error("{path} is not a status of a run")]
+    Content {
+        /// The file.
+        path: String,
+        /// What is wrong with it.
+        source: serde_json::Error,
+    },
+}
+
+impl Status {
+    /// The status of the run in a folder, from its journal, or from its status file where the journal is not for others to read.
+    ///
+    /// # Errors
+    /// When there is no run, or its files cannot be read.
+    pub fn of(folder: &Path) -> Result<Self, StatusError> {
+        let journal = folder.join(JOURNAL_FILE);
+        let file = folder.join(STATUS_FILE);
+        let is_running = RunLock::is_held(folder);
+        let mut status = if !journal.exists() {
+            return Err(StatusError::NoRun { folder: folder.display().to_string() });
+        } else if place::is_shared(folder) && file.exists() {
+            read_file(&file)?
+        } else {
+            match read_journal(&journal) {
+                // Locked, or in a folder that cannot be written to.
+                Err(JournalError::Busy { .. } | JournalError::Open { .. }) if file.exists() => read_file(&file)?,
+                read => read?,
+            }
+        };
+        status.settle(is_running);
+        Ok(status)
+    }
+
+    /// What the writer of the status cannot know: whether it is still there.
+    fn settle(&mut self, is_running: Option<bool>) {
+        if self.state == RunState::Finished {
+            return;
+        }
+        // Where nobody can tell it is as it was.
+        match is_running {
+            Some(true) => {
+                self.state = RunState::Running;
+                let seen = humantime::parse_rfc3339(&self.updated_at).ok();
+                let since = seen.and_then(|seen| SystemTime::now().duration_since(seen).ok());
+                self.elapsed_s += since.unwrap_or_default().as_secs_f64();
+                self.error = None;
+            }
+            Some(false) => {
+                self.state = RunState::Stopped;
+                self.error.get_or_insert_with(|| {
+                    "its coordinator ended without a word: it was killed, or the machine stopped".into()
+                });
+                self.workers.clear();
+            }
+            None => {}
+        }
+    }
+}
+
+fn read_file(path: &Path) -> Result<Status, StatusError> {
+    let shown = || path.display().to_string();
+    let text = fs::read(path).map_err(|source| StatusError::File { path: shown(), source })?;
+    serde_json::from_slice(&text).map_err(|source| StatusError::Content { path: shown(), source })
+}
+
+fn read_journal(path: &Path) -> Result<Status, JournalError> {
+    let reading = |source| JournalError::reading(path, source);
+    let connection = Connection::open_with_flags(path, OpenFlags::SQLITE_OPEN_READ_ONLY).map_err(reading)?;
+    connection.busy_timeout(BUSY_TIME).map_err(reading)?;
+    schema::check_format(path, &connection)?;
+    // One moment for all tables.
+    let read = || -> rusqlite::Result<Status> {
+        let transaction = connection.unchecked_transaction()?;
+        read(&transaction)
+    };
+    read().map_err(reading)
+}
+
+/// Write the status file of a journal, so that whoever reads it sees all of it.
+pub(super) fn write(connection: &Connection, journal: &Path) -> anyhow::Result<()> {
+    let mut text = serde_json::to_string_pretty(&read(connection)?)?;
+    text.push('\n');
+    let (path, draft) = (journal.with_file_name(STATUS_FILE), journal.with_file_name("status.json.partial"));
+    fs::write(&draft, text)?;
+    Ok(fs::rename(&draft, &path)?)
+}
+
+/// The status that a journal tells.
+fn read(connection: &Connection) -> rusqlite::Result<Status> {
+    let sql = "SELECT lower(hex(name)), started_ms, finished_ms FROM run";
+    let (run, started, finished): (String, i64, Option<i64>) =
+        connection.query_row(sql, [], |row| Ok((row.get(0)?, row.get(1)?, row.get(2)?)))?;
+    let sql = "SELECT epoch, process, host, seen_ms, ended, ended_ms FROM epochs ORDER BY epoch DESC LIMIT 1";
+    let (epoch, process, host, seen, ended, ended_ms) = connection.query_row(sql, [], |row| {
+        let ended: (Option<String>, Option<i64>) = (row.get(4)?, row.get(5)?);
+        Ok((row.get(0)?, row.get(1)?, row.get(2)?, row.get(3)?, ended.0, ended.1))
+    })?;
+    let elapsed: f64 =
+        connection.query_row("SELECT sum(seen_ms - started_ms) / 1000.0 FROM epochs", [], |r| r.get(0))?;
+    let sql = "SELECT best_cssim FROM epochs WHERE best_cssim IS NOT NULL ORDER BY epoch DESC LIMIT 1";
+    let best_cssim = connection.query_row(sql, [], |row| row.get(0)).optional()?;
+    let sql = "SELECT count(*), count(*) FILTER (WHERE outcome = 2) FROM attempts";
+    let (attempts, requeued) = connection.query_row(sql, [], |row| Ok((row.get(0)?, row.get(1)?)))?;
+    let kinds = kinds(connection, epoch)?;
+    let mut nodes = Counts::default();
+    kinds.iter().for_each(|kind| nodes.add(kind.counts));
+    Ok(Status {
+        schema: SCHEMA.to_owned(),
+        state: match (finished, ended_ms) {
+            (Some(_), _) => RunState::Finished,
+            (None, Some(_)) if ended.is_some() => RunState::Stopped,
+            _ => RunState::Running,
+        },
+        error: ended,
+        run,
+        epoch,
+        process,
+        host,
+        started_at: rfc3339(started),
+        updated_at: rfc3339(seen),
+        finished_at: finished.map(rfc3339),
+        elapsed_s: elapsed,
+        nodes,
+        kinds,
+        workers: workers(connection, epoch)?,
+        attempts,
+        requeued,
+        best_cssim,
+        failures: failures(connection, epoch)?,
+    })
+}
+
+fn kinds(connection: &Connection, epoch: u64) -> rusqlite::Result<Vec<KindCounts>> {
+    let sql =
+        "SELECT kind, state, count(*), min(node) FROM nodes WHERE epoch = ?1 GROUP BY kind, state ORDER BY min(node)";
+    let mut kinds: Vec<KindCounts> = Vec::new();
+    let mut statement = connection.prepare_cached(sql)?;
+    let mut rows = statement.query([epoch])?;
+    while let Some(row) = rows.next()? {
+        let (kind, state, count): (String, u8, u64) = (row.get(0)?, row.get(1)?, row.get(2)?);
+        let place = kinds.iter().position(|known| known.kind == kind).unwrap_or_else(|| {
+            kinds.push(KindCounts { kind, counts: Counts::default() });
+            kinds.len() - 1
+        });
+        kinds[place].counts.add(Counts::of(state, count));
+    }
+    Ok(kinds)
+}
+
+fn workers(connection: &Connection, epoch: u64) -> rusqlite::Result<Vec<WorkerStatus>> {
+    let sql = "SELECT worker, count(*) FILTER (WHERE outcome IS NULL), count(*) FILTER (WHERE outcome = 0)
+               FROM attempts WHERE epoch = ?1 GROUP BY worker";
+    let mut statement = connection.prepare_cached(sql)?;
+    let counts = statement.query_map([epoch], |row| Ok((row.get(0)?, (row.get(1)?, row.get(2)?))))?;
+    let counts = counts.collect::<rusqlite::Result<BTreeMap<u64, (u64, u64)>>>()?;
+    let sql = "SELECT worker, process, threads FROM workers WHERE epoch = ?1 AND left_ms IS NULL ORDER BY worker";
+    let mut statement = connection.prepare_cached(sql)?;
+    let rows = statement.query_map([epoch], |row| {
+        let worker = row.get(0)?;
+        let (leases, finished) = counts.get(&worker).copied().unwrap_or_default();
+        Ok(WorkerStatus { worker, process: row.get(1)?, threads: row.get(2)?, leases, finished })
+    })?;
+    rows.collect()
+}
+
+fn failures(connection: &Connection, epoch: u64) -> rusqlite::Result<Vec<NodeError>> {
+    let sql = format!(
+        "SELECT kind, label, ifnull(error, '') FROM nodes WHERE epoch = ?1 AND state = 5 ORDER BY node LIMIT {MOST_FAILURES}"
+    );
+    let mut statement = connection.prepare_cached(&sql)?;
+    let rows = statement
+        .query_map([epoch], |row| Ok(NodeError { kind: row.get(0)?, label: row.get(1)?, error: row.get(2)? }))?;
+    rows.collect()
+}
+
+impl Counts {
+    /// So many nodes in the state of this number in the table.
+    fn of(state: u8, count: u64) -> Self {
+        let mut counts = Self { total: count, ..Self::default() };
+        match state {
+            0 => counts.waiting = count,
+            1 => counts.ready = count,
+            2 => counts.running = count,
+            3 => counts.completed = count,
+            4 => (counts.completed, counts.recalled) = (count, count),
+            _ => counts.failed = count,
+        }
+        counts
+    }
+
+    fn add(&mut self, other: Self) {
+        self.total += other.total;
+        self.waiting += other.waiting;
+        self.ready += other.ready;
+        self.running += other.running;
+        self.completed += other.completed;
+        self.recalled += other.recalled;
+        self.failed += other.failed;
+    }
+}
+
+fn rfc3339(unix_ms: i64) -> String {
+    let since = Duration::from_millis(u64::try_from(unix_ms).unwrap_or(0));
+    humantime::format_rfc3339_millis(SystemTime::UNIX_EPOCH + since).to_string()
+}

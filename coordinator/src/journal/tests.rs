@@ -1,0 +1,267 @@
+//! What is written is there again, whatever happened to the process or to the file in between.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use lookalike::graph::{Blob, NodeKey};
+use lookalike::protocol::RunName;
+use rusqlite::Connection;
+use tempfile::TempDir;
+
+use super::batch::{NodeRow, State, WorkerRow};
+use super::status::{RunState, Status};
+use super::*;
+
+const NAME: RunName = RunName([7; 16]);
+const DEATHS: Deaths = Deaths { in_company: 2, alone: 1, excused: 3 };
+
+fn identity() -> RunIdentity {
+    RunIdentity::default().with("--seed", "0")
+}
+
+fn options(folder: &TempDir) -> JournalOptions {
+    JournalOptions { resume: true, ..JournalOptions::new(folder.path().join(JOURNAL_FILE), identity()) }
+}
+
+fn key(byte: u8) -> NodeKey {
+    NodeKey([byte; 32])
+}
+
+fn output(byte: u8) -> Blob {
+    Blob::new(vec![byte; 1000])
+}
+
+/// A node that is completed, with its output.
+fn completed(node: u8) -> Batch {
+    let mut batch = Batch::default();
+    let added = Some(("search".to_owned(), format!("search {node}")));
+    let row = NodeRow {
+        added,
+        state: State::Completed,
+        attempts: 1,
+        deaths: Deaths::default(),
+        key: Some(key(node)),
+        error: None,
+    };
+    batch.nodes.insert(u64::from(node), row);
+    batch.keep(key(node), output(node));
+    batch
+}
+
+/// Write batches and wait until they are.
+fn write(journal: &mut Journal, batches: impl IntoIterator<Item = Batch>) {
+    let runtime = tokio::runtime::Builder::new_current_thread().build().unwrap();
+    for batch in batches {
+        journal.commit(batch);
+        runtime.block_on(journal.committed()).unwrap();
+    }
+}
+
+fn begun(folder: &TempDir) -> Journal {
+    Journal::open(&options(folder), NAME).unwrap()
+}
+
+fn sql(folder: &TempDir, statement: &str) {
+    Connection::open(folder.path().join(JOURNAL_FILE)).unwrap().execute_batch(statement).unwrap();
+}
+
+#[test]
+fn next_epoch_finds_results_deaths_and_the_address() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut journal = begun(&folder);
+    assert_eq!((journal.run, journal.epoch), (NAME, 1));
+    let mut batch = completed(1);
+    let suspect = NodeRow { state: State::Ready, deaths: DEATHS, ..completed(2).nodes.remove(&2).unwrap() };
+    batch.nodes.insert(2, suspect);
+    batch.listens("127.0.0.1:4100".into());
+    batch.local_workers = vec![4711, 4712];
+    write(&mut journal, [batch]);
+    // Killed: nothing is closed. (A process that is killed writes nothing more; a thread cannot be.)
+    let copy = copied(&folder);
+    drop(journal);
+    let again = Journal::open(&options(&copy), RunName([8; 16])).unwrap();
+    assert_eq!((again.run, again.epoch, again.past.results), (NAME, 2, 1));
+    assert_eq!(again.past.listen, "127.0.0.1:4100".parse().ok());
+    assert_eq!(again.past.local_workers, [4711, 4712]);
+    assert_eq!(again.past.keys.get(&(1, 2)), Some(&key(2)));
+    let mut recall = again.recall();
+    assert_eq!(recall.recall(key(1)), Memory { output: Some(output(1)), ..Memory::default() });
+    assert_eq!(recall.recall(key(2)), Memory { output: None, deaths: DEATHS });
+    assert_eq!(recall.recall(key(3)), Memory::default());
+}
+
+/// The files of the journal as they are at this moment, in a folder of their own.
+fn copied(folder: &TempDir) -> TempDir {
+    let copy = tempfile::tempdir().unwrap();
+    for name in ["run.sqlite", "run.sqlite-wal"] {
+        fs::copy(folder.path().join(name), copy.path().join(name)).unwrap();
+    }
+    copy
+}
+
+#[test]
+fn torn_write_costs_only_the_group_that_was_being_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut journal = begun(&folder);
+    write(&mut journal, [completed(1)]);
+    let log = folder.path().join("run.sqlite-wal");
+    let before = fs::metadata(&log).unwrap().len();
+    write(&mut journal, [completed(2)]);
+    let after = fs::metadata(&log).unwrap().len();
+    for length in [before + 1, (before + after) / 2, after - 1] {
+        let copy = copied(&folder);
+        let torn = fs::OpenOptions::new().write(true).open(copy.path().join("run.sqlite-wal")).unwrap();
+        torn.set_len(length).unwrap();
+        let again = Journal::open(&options(&copy), NAME).unwrap();
+        let mut recall = again.recall();
+        assert_eq!(recall.recall(key(1)).output, Some(output(1)), "{length}");
+        assert_eq!(recall.recall(key(2)).output, None, "{length}");
+    }
+}
+
+#[test]
+fn damaged_output_is_dropped_and_the_others_stay() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut journal = begun(&folder);
+    write(&mut journal, [completed(1), completed(2)]);
+    journal.close(None).unwrap();
+    sql(&folder, "UPDATE results SET bytes = zeroblob(1000) WHERE key = (SELECT key FROM nodes WHERE node = 1)");
+    let again = begun(&folder);
+    let mut recall = again.recall();
+    assert_eq!(recall.recall(key(1)).output, None);
+    assert_eq!(recall.recall(key(2)).output, Some(output(2)));
+    again.close(None).unwrap();
+    assert_eq!(begun(&folder).past.results, 1);
+}
+
+#[test]
+fn wrong_results_are_forgotten_and_released_ones_keep_their_hash() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut journal = begun(&folder);
+    let mut wrong = completed(1);
+    wrong.forget(key(1));
+    let mut later = Batch::default();
+    later.forget(key(2));
+    later.released.push(key(3));
+    write(&mut journal, [wrong, completed(2), completed(3), later]);
+    journal.close(None).unwrap();
+    let connection = Connection::open(folder.path().join(JOURNAL_FILE)).unwrap();
+    let rows: Vec<(Vec<u8>, Option<Vec<u8>>)> = connection
+        .prepare("SELECT hash, bytes FROM results")
+        .unwrap()
+        .query_map([], |row| Ok((row.get(0)?, row.get(1)?)))
+        .unwrap()
+        .collect::<Result<_, _>>()
+        .unwrap();
+    assert_eq!(rows, [(output(3).hash().0.to_vec(), None)]);
+}
+
+#[test]
+fn result_that_is_kept_late_is_recalled() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut journal = begun(&folder);
+    let mut recall = journal.recall();
+    let mut batch = Batch::default();
+    batch.keep(key(9), output(9));
+    journal.learn(key(9));
+    write(&mut journal, [batch]);
+    assert_eq!(recall.recall(key(9)).output, Some(output(9)));
+}
+
+#[test]
+fn file_that_does_not_fit_is_refused_by_name() {
+    let folder = tempfile::tempdir().unwrap();
+    let refused = |expected: &str| {
+        let error = Journal::open(&options(&folder), NAME).unwrap_err();
+        assert!(error.to_string().contains(expected), "{error}");
+        assert_eq!(error.exit_code(), 2);
+    };
+    let path = folder.path().join(JOURNAL_FILE);
+    fs::write(&path, "a letter to the editor, long enough to be a header of a database of some kind ".repeat(20))
+        .unwrap();
+    refused("is not the journal of a run");
+    fs::remove_file(&path).unwrap();
+    sql(&folder, "CREATE TABLE songs (title TEXT)");
+    refused("is not the journal of a run");
+    fs::remove_file(&path).unwrap();
+    begun(&folder).close(None).unwrap();
+    let fresh = JournalOptions { resume: false, ..options(&folder) };
+    let error = Journal::open(&fresh, NAME).unwrap_err().to_string();
+    assert!(error.contains("already holds a run; go on with it with --resume"), "{error}");
+    let other = JournalOptions { identity: RunIdentity::default().with("--seed", "3"), ..options(&folder) };
+    let error = Journal::open(&other, NAME).unwrap_err().to_string();
+    assert!(error.contains("--seed is 0 there and 3 here"), "{error}");
+    sql(&folder, "PRAGMA user_version = 99");
+    refused("has journal format 99, expected 1");
+    sql(&folder, "PRAGMA user_version = 1; DELETE FROM run");
+    refused("is not the journal of a run");
+}
+
+#[test]
+fn finished_run_knows_its_files_and_needs_no_outputs_any_more() {
+    let folder = tempfile::tempdir().unwrap();
+    let path: PathBuf = folder.path().join(JOURNAL_FILE);
+    let mut journal = begun(&folder);
+    let large = Blob::new((0..3_000_000_u32).map(|index| index.to_le_bytes()[1]).collect());
+    let mut batch = completed(1);
+    batch.keep(key(2), large);
+    write(&mut journal, [batch]);
+    journal.close(None).unwrap();
+    assert_eq!(finished(&path, &identity()).unwrap(), None);
+    let outputs = Finished { outputs: vec![("fit.json".into(), "12ab".into())] };
+    finish(&path, &outputs).unwrap();
+    assert_eq!(finished(&path, &identity()).unwrap(), Some(outputs));
+    assert!(matches!(finished(&path, &RunIdentity::default()), Err(JournalError::AnotherRun { .. })));
+    assert!(fs::metadata(&path).unwrap().len() < 100_000);
+    let others = schema::files(&path)[1..].iter().filter(|file| file.exists()).count();
+    assert_eq!(others, 0, "a finished journal is one file");
+    // Somebody asks for more: it is a run again.
+    let again = begun(&folder);
+    assert_eq!((again.epoch, again.past.results), (2, 0));
+    again.close(None).unwrap();
+    assert_eq!(finished(&path, &identity()).unwrap(), None);
+}
+
+#[test]
+fn status_tells_counts_workers_and_whether_somebody_is_at_work() {
+    let folder = tempfile::tempdir().unwrap();
+    assert!(Status::of(folder.path()).unwrap_err().to_string().contains("found no run.sqlite"));
+    let lock = RunLock::take(folder.path()).unwrap();
+    let mut journal = begun(&folder);
+    let mut batch = completed(1);
+    let failed =
+        NodeRow { state: State::Failed, error: Some("black".into()), ..completed(2).nodes.remove(&2).unwrap() };
+    batch.nodes.insert(2, failed);
+    batch.workers.push(WorkerRow { worker: 1, process: 99, threads: 4, at: Duration::ZERO });
+    write(&mut journal, [batch]);
+    let running = Status::of(folder.path()).unwrap();
+    assert_eq!((running.state, running.epoch, running.error), (RunState::Running, 1, None));
+    assert_eq!((running.nodes.total, running.nodes.completed, running.nodes.failed), (2, 1, 1));
+    assert_eq!((running.kinds[0].kind.as_str(), running.workers[0].process), ("search", 99));
+    assert_eq!(running.failures[0].error, "black");
+    drop(lock);
+    let killed = Status::of(folder.path()).unwrap();
+    assert!(killed.state == RunState::Stopped && killed.error.unwrap().contains("without a word"));
+    journal.close(Some("the disk is full".into())).unwrap();
+    let stopped = Status::of(folder.path()).unwrap();
+    assert_eq!((stopped.state, stopped.error.as_deref()), (RunState::Stopped, Some("the disk is full")));
+    // Where the journal itself cannot be read, its status file is.
+    let file: Status = serde_json::from_slice(&fs::read(folder.path().join("status.json")).unwrap()).unwrap();
+    assert_eq!((file.run, file.nodes), (stopped.run, stopped.nodes));
+    finish(&folder.path().join(JOURNAL_FILE), &Finished { outputs: Vec::new() }).unwrap();
+    assert_eq!(Status::of(folder.path()).unwrap().state, RunState::Finished);
+}
+
+#[cfg(unix)]
+#[test]
+fn journal_is_readable_by_its_owner_alone() {
+    use std::os::unix::fs::PermissionsExt;
+    let folder = tempfile::tempdir().unwrap();
+    let mut journal = begun(&folder);
+    write(&mut journal, [completed(1)]);
+    let mode = |path: &Path| fs::metadata(path).unwrap().permissions().mode() & 0o777;
+    for name in ["run.sqlite", "run.sqlite-wal"] {
+        assert_eq!(mode(&folder.path().join(name)), 0o600, "{name}");
+    }
+}

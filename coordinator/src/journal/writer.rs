@@ -1,0 +1,246 @@
+//! The thread that writes: one transaction per batch, in the order in which they come.
+
+use std::collections::HashMap;
+use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender};
+use std::time::{Duration, Instant};
+
+use lookalike::graph::{Blob, BlobHash, NodeKey};
+use rusqlite::{Connection, Transaction, params};
+use tokio::sync::mpsc::UnboundedSender;
+use tracing::warn;
+
+use super::JournalOptions;
+use super::batch::{Batch, NodeRow};
+use super::error::JournalError;
+use super::status;
+use super::unix_ms;
+use crate::core::Deaths;
+
+/// How often `status.json` is written at most.
+const STATUS_INTERVAL: Duration = Duration::from_secs(1);
+
+/// How often it is written when nothing happens.
+const QUIET_INTERVAL: Duration = Duration::from_secs(20);
+
+/// Looking at all nodes may take at most one part in so many of the thread's time.
+const STATUS_SHARE: u32 = 20;
+
+/// What the thread is asked to do.
+#[derive(Debug)]
+pub(super) enum Command {
+    /// Write a batch, then say so.
+    Commit(Batch),
+    /// Read the output of a node.
+    Read(NodeKey, SyncSender<Option<Blob>>),
+    /// Write how this coordinator's part ended, and end.
+    Close(Option<String>),
+}
+
+pub(super) struct Writer {
+    pub(super) connection: Connection,
+    pub(super) options: JournalOptions,
+    pub(super) epoch: u64,
+    /// The rows of results, by key.
+    pub(super) results: HashMap<NodeKey, i64>,
+    pub(super) commands: Receiver<Command>,
+    pub(super) committed: UnboundedSender<Result<(), JournalError>>,
+    /// When `status.json` may be written next.
+    pub(super) next_status: Instant,
+    /// Whether something has happened since it was written.
+    pub(super) is_news: bool,
+}
+
+impl Writer {
+    /// Do what is asked for until the end, or until nobody asks any more.
+    pub(super) fn run(mut self) -> Result<(), JournalError> {
+        loop {
+            let soon = self.next_status.saturating_duration_since(Instant::now());
+            match self.commands.recv_timeout(if self.is_news { soon } else { QUIET_INTERVAL }) {
+                Ok(Command::Commit(batch)) => {
+                    let outcome = self.commit(&batch);
+                    self.is_news = true;
+                    // When nobody listens any more the run is over.
+                    let _ = self.committed.send(outcome);
+                }
+                Ok(Command::Read(key, answer)) => _ = answer.send(self.read(key)),
+                Ok(Command::Close(ended)) => return self.close(ended.as_deref()),
+                // The coordinator's future was dropped.
+                Err(RecvTimeoutError::Disconnected) => return self.close(Some("it was dropped")),
+                // Somebody is still here.
+                Err(RecvTimeoutError::Timeout) => self.is_news = true,
+            }
+            if self.is_news && Instant::now() >= self.next_status {
+                self.tell_status();
+            }
+        }
+    }
+
+    fn commit(&mut self, batch: &Batch) -> Result<(), JournalError> {
+        let path = self.options.path.clone();
+        let mut new = Vec::new();
+        let outcome = self.connection.transaction().and_then(|transaction| {
+            new = write(&transaction, self.epoch, batch, &self.results)?;
+            transaction.commit()
+        });
+        outcome.map_err(|source| JournalError::writing(&path, source))?;
+        self.results.extend(new);
+        for key in &batch.forgotten {
+            self.results.remove(key);
+        }
+        Ok(())
+    }
+
+    /// The output of a node. A damaged one is dropped, and the node runs again.
+    fn read(&mut self, key: NodeKey) -> Option<Blob> {
+        let id = *self.results.get(&key)?;
+        let read = || -> rusqlite::Result<(BlobHash, Option<Vec<u8>>)> {
+            let mut statement = self.connection.prepare_cached("SELECT hash, bytes FROM results WHERE id = ?1")?;
+            statement.query_row([id], |row| Ok((BlobHash(row.get(0)?), row.get(1)?)))
+        };
+        let fault = match read() {
+            Ok((_, None)) => return None,
+            Ok((hash, Some(bytes))) => match Blob::verified(hash, bytes) {
+                Ok(blob) => return Some(blob),
+                Err(fault) => fault.to_string(),
+            },
+            Err(error) => error.to_string(),
+        };
+        warn!(journal = %self.options.path.display(), ?key, fault, "a result in the journal is damaged: its node runs again");
+        self.results.remove(&key);
+        // If it cannot be removed it will be found damaged again.
+        let _ = self.connection.execute("DELETE FROM results WHERE id = ?1", [id]);
+        None
+    }
+
+    fn close(mut self, ended: Option<&str>) -> Result<(), JournalError> {
+        let write = || -> rusqlite::Result<()> {
+            self.connection.execute(
+                "UPDATE epochs SET ended_ms = ?2, seen_ms = ?2, ended = ?3 WHERE epoch = ?1",
+                params![self.epoch, unix_ms(), ended],
+            )?;
+            Ok(())
+        };
+        let written = write().map_err(|source| JournalError::writing(&self.options.path, source));
+        self.tell_status();
+        // As one file, which can be read from anywhere; a reader that is in the way right now does no harm.
+        let _ = self.connection.pragma_update(None, "journal_mode", "DELETE");
+        written
+    }
+
+    /// Write `status.json`. A disk that is full will stop the run elsewhere.
+    fn tell_status(&mut self) {
+        let began = Instant::now();
+        let best = self.options.best.as_ref().and_then(|best| best.get());
+        let seen = self.connection.execute(
+            "UPDATE epochs SET seen_ms = ?2, best_cssim = ?3 WHERE epoch = ?1",
+            params![self.epoch, unix_ms(), best],
+        );
+        if let Err(error) = seen {
+            warn!(%error, "cannot note the time in the journal");
+        }
+        if let Err(error) = status::write(&self.connection, &self.options.path) {
+            warn!(%error, "cannot write the status of the run");
+        }
+        self.is_news = false;
+        self.next_status = Instant::now() + STATUS_INTERVAL.max(began.elapsed() * STATUS_SHARE);
+    }
+}
+
+/// Write the rows of a batch. The new results, with their rows.
+fn write(
+    transaction: &Transaction<'_>,
+    epoch: u64,
+    batch: &Batch,
+    known: &HashMap<NodeKey, i64>,
+) -> rusqlite::Result<Vec<(NodeKey, i64)>> {
+    for (node, row) in &batch.nodes {
+        write_node(transaction, epoch, *node, row)?;
+    }
+    write_attempts(transaction, epoch, batch)?;
+    let mut new = Vec::new();
+    let mut insert = transaction.prepare_cached("INSERT INTO results (key, hash, bytes) VALUES (?1, ?2, ?3)")?;
+    for (key, output) in &batch.results {
+        if !known.contains_key(key) {
+            new.push((*key, insert.insert(params![key.0, output.hash().0, &output[..]])?));
+        }
+    }
+    let row_of = |key: &NodeKey| new.iter().rev().find(|(other, _)| other == key).map(|(_, id)| *id);
+    for (sql, keys) in [
+        ("UPDATE results SET bytes = NULL WHERE id = ?1", &batch.released),
+        ("DELETE FROM results WHERE id = ?1", &batch.forgotten),
+    ] {
+        for id in keys.iter().filter_map(|key| known.get(key).copied().or_else(|| row_of(key))) {
+            transaction.prepare_cached(sql)?.execute([id])?;
+        }
+    }
+    write_workers(transaction, epoch, batch)?;
+    Ok(new)
+}
+
+fn write_node(transaction: &Transaction<'_>, epoch: u64, node: u64, row: &NodeRow) -> rusqlite::Result<()> {
+    let NodeRow { added, state, attempts, deaths, key, error } = row;
+    let Deaths { in_company, alone, excused } = deaths;
+    let (state, key) = (*state as u8, key.as_ref().map(|key| key.0));
+    match added {
+        Some((kind, label)) => transaction
+            .prepare_cached(
+                "INSERT INTO nodes
+                     (epoch, node, kind, label, state, attempts, deaths, deaths_alone, deaths_excused, key, error)
+                 VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11)",
+            )?
+            .execute(params![epoch, node, kind, label, state, attempts, in_company, alone, excused, key, error])?,
+        None => transaction
+            .prepare_cached(
+                "UPDATE nodes SET state = ?3, attempts = ?4, deaths = ?5, deaths_alone = ?6, deaths_excused = ?7, key = ?8,
+                     error = ?9
+                 WHERE epoch = ?1 AND node = ?2",
+            )?
+            .execute(params![epoch, node, state, attempts, in_company, alone, excused, key, error])?,
+    };
+    Ok(())
+}
+
+fn write_attempts(transaction: &Transaction<'_>, epoch: u64, batch: &Batch) -> rusqlite::Result<()> {
+    let mut begin = transaction
+        .prepare_cached("INSERT INTO attempts (epoch, node, attempt, worker, begun_ms) VALUES (?1, ?2, ?3, ?4, ?5)")?;
+    for row in &batch.attempts {
+        begin.execute(params![epoch, row.node, row.attempt, row.worker, ms(row.at)])?;
+    }
+    let mut end = transaction.prepare_cached(
+        "UPDATE attempts SET outcome = ?4, ended_ms = ?5
+         WHERE epoch = ?1 AND node = ?2 AND worker = ifnull(?3, worker) AND outcome IS NULL",
+    )?;
+    for row in &batch.ends {
+        end.execute(params![epoch, row.node, row.worker, row.outcome as u8, ms(row.at)])?;
+    }
+    Ok(())
+}
+
+fn write_workers(transaction: &Transaction<'_>, epoch: u64, batch: &Batch) -> rusqlite::Result<()> {
+    for row in &batch.workers {
+        transaction
+            .prepare_cached(
+                "INSERT INTO workers (epoch, worker, process, threads, joined_ms) VALUES (?1, ?2, ?3, ?4, ?5)",
+            )?
+            .execute(params![epoch, row.worker, row.process, row.threads, ms(row.at)])?;
+    }
+    for row in &batch.left {
+        transaction
+            .prepare_cached("UPDATE workers SET left_ms = ?3, why = ?4 WHERE epoch = ?1 AND worker = ?2")?
+            .execute(params![epoch, row.worker, ms(row.at), row.why])?;
+    }
+    for process in &batch.local_workers {
+        transaction
+            .prepare_cached("INSERT OR IGNORE INTO local_workers (epoch, process) VALUES (?1, ?2)")?
+            .execute(params![epoch, process])?;
+    }
+    if let Some(listen) = &batch.listen {
+        transaction.execute("UPDATE epochs SET listen = ?2 WHERE epoch = ?1", params![epoch, listen])?;
+    }
+    Ok(())
+}
+
+/// Milliseconds since this coordinator began.
+fn ms(at: Duration) -> i64 {
+    i64::try_from(at.as_millis()).unwrap_or(i64::MAX)
+}

@@ -1,0 +1,157 @@
+//! A run that is gone on with: what is remembered does not run, and what survivors hold is not run twice.
+
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+use lookalike::graph::{Blob, Graph, Input, NodeId, NodeKey, NodeSpec, Placement, WorkerId};
+
+use super::tests::{Script, node};
+use super::{Event, handle, start};
+use crate::comm::{Action, Departure, Outbox, RunEvent};
+use crate::core::{Core, Deaths, Policy};
+use crate::recall::{Memory, Recall};
+use crate::runner::RunError;
+
+const A: WorkerId = WorkerId(1);
+const B: WorkerId = WorkerId(2);
+
+#[derive(Debug, Default)]
+struct Notebook(BTreeMap<NodeKey, Memory>);
+
+impl Recall for Notebook {
+    fn recall(&mut self, key: NodeKey) -> Memory {
+        self.0.get(&key).cloned().unwrap_or_default()
+    }
+}
+
+fn leaf(name: &str, placement: Placement) -> NodeSpec {
+    NodeSpec { parameters: name.into(), ..node(name, vec![], placement) }
+}
+
+fn key_of(spec: NodeSpec) -> NodeKey {
+    let mut graph = Graph::new();
+    let node = graph.add_node(spec).unwrap();
+    graph.key(node).unwrap()
+}
+
+/// A run of two leaves on workers, one here, and the join of them all, with what is remembered of some.
+struct Bench {
+    core: Core,
+    planner: Script,
+    outbox: Outbox,
+}
+
+impl Bench {
+    fn new(remembered: &[(&str, Placement, Memory)]) -> Self {
+        let mut notebook = Notebook::default();
+        for (name, placement, memory) in remembered {
+            notebook.0.insert(key_of(leaf(name, *placement)), memory.clone());
+        }
+        let all = vec![Input::OutputOf(NodeId(0)), Input::OutputOf(NodeId(1)), Input::OutputOf(NodeId(2))];
+        let nodes = vec![
+            leaf("x", Placement::Worker),
+            leaf("y", Placement::Worker),
+            leaf("z", Placement::Coordinator),
+            node("join", all, Placement::Worker),
+        ];
+        let planner = Script { nodes, blob: vec![1], ..Script::default() };
+        let core = Core::new(Policy::default(), 2).with_recall(Box::new(notebook));
+        let mut bench = Self { core, planner, outbox: Outbox::default() };
+        start(&mut bench.core, &mut bench.planner, Duration::ZERO, &mut bench.outbox).unwrap();
+        bench
+    }
+
+    fn handle(&mut self, event: Event) -> Result<Vec<String>, RunError> {
+        handle(&mut self.core, &mut self.planner, event, Duration::ZERO, &mut self.outbox)?;
+        Ok(self.said())
+    }
+
+    fn join(&mut self, worker: WorkerId) -> Vec<String> {
+        self.handle(Event::WorkerJoined { worker, threads: 1, process: 0 }).unwrap()
+    }
+
+    fn said(&mut self) -> Vec<String> {
+        let line = |action: &Action| match action {
+            Action::Assign { worker, lease } => Some(format!("{worker} gets {}.{}", lease.node.0, lease.attempt)),
+            Action::Cancel { worker, lease } => Some(format!("{worker} drops {}.{}", lease.node.0, lease.attempt)),
+            Action::RunHere { node, .. } => Some(format!("run {} here", node.0)),
+            Action::Tell(RunEvent::NodeRecalled { name, .. }) => Some(format!("{} recalled", name.label)),
+            Action::Tell(RunEvent::NodeRequeued { name, crashes, .. }) => {
+                Some(format!("{} requeued, {crashes}", name.label))
+            }
+            _ => None,
+        };
+        self.outbox.take().iter().filter_map(line).collect()
+    }
+}
+
+fn output(byte: u8) -> Memory {
+    Memory { output: Some(Blob::new(vec![byte])), ..Memory::default() }
+}
+
+#[test]
+fn remembered_nodes_complete_without_running_wherever_they_belong() {
+    let mut bench = Bench::new(&[("x", Placement::Worker, output(1)), ("z", Placement::Coordinator, output(3))]);
+    assert_eq!(bench.said(), ["x recalled", "z recalled"]);
+    assert_eq!(bench.planner.completed, [NodeId(0), NodeId(2)]);
+    assert_eq!(bench.join(A), ["worker 1 gets 1.1"]);
+    let summary = bench.core.summary();
+    assert_eq!((summary.recalled_nodes, summary.completed_nodes, summary.attempts), (2, 2, 1));
+}
+
+#[test]
+fn run_whose_nodes_are_all_remembered_is_finished_at_once() {
+    let bytes = [("x", 1), ("y", 2)].map(|(name, byte)| (name, Placement::Worker, output(byte)));
+    let mut bench = Bench::new(&[bytes[0].clone(), bytes[1].clone(), ("z", Placement::Coordinator, output(3))]);
+    assert!(!bench.core.is_finished(), "the join is not remembered");
+    assert_eq!(bench.said(), ["x recalled", "y recalled", "z recalled"]);
+    assert_eq!(bench.join(A), ["worker 1 gets 3.1"]);
+}
+
+#[test]
+fn deaths_are_remembered() {
+    let mut bench = Bench::new(&[(
+        "x",
+        Placement::Worker,
+        Memory { output: None, deaths: Deaths { in_company: 1, ..Deaths::default() } },
+    )]);
+    bench.join(A);
+    bench.handle(Event::Started { worker: A, node: NodeId(0), attempt: 1 }).unwrap();
+    let said = bench.handle(Event::WorkerLeft { worker: A, departure: Departure::Lost }).unwrap();
+    assert!(said.contains(&"x requeued, 2".to_owned()), "{said:?}");
+}
+
+#[test]
+fn what_a_survivor_had_finished_is_taken_from_it_and_nobody_else_runs_it() {
+    let mut bench = Bench::new(&[]);
+    assert_eq!(bench.said(), ["run 2 here"]);
+    // The one that has the output is not even a member yet.
+    let recovered = |byte| Event::Recovered { worker: B, node: NodeId(0), output: Blob::new(vec![byte]) };
+    assert_eq!(bench.handle(recovered(7)).unwrap(), [""; 0]);
+    assert_eq!(bench.planner.completed, [NodeId(0)]);
+    assert_eq!(bench.join(A), ["worker 1 gets 1.1"]);
+    // Once more is fine, another output is not.
+    assert_eq!(bench.handle(recovered(7)).unwrap(), [""; 0]);
+    assert!(matches!(bench.handle(recovered(8)), Err(RunError::ResultsDiffer { .. })));
+}
+
+#[test]
+fn output_of_a_survivor_ends_the_lease_of_another_worker() {
+    let mut bench = Bench::new(&[]);
+    bench.join(A);
+    let recovered = Event::Recovered { worker: B, node: NodeId(1), output: Blob::new(vec![7]) };
+    let said = bench.handle(recovered).unwrap();
+    assert!(said.contains(&"worker 1 drops 1.1".to_owned()), "{said:?}");
+}
+
+#[test]
+fn survivor_gets_what_it_has_in_hand_before_others_get_anything() {
+    let mut bench = Bench::new(&[]);
+    bench.said();
+    bench.handle(Event::Continues { worker: B, node: NodeId(0) }).unwrap();
+    // A node that is done, or of another time, is nobody's.
+    bench.handle(Event::Continues { worker: B, node: NodeId(77) }).unwrap();
+    assert_eq!(bench.join(B), ["worker 2 gets 0.1", "worker 2 gets 1.1"]);
+    // An idle worker is given what merely waits there, and not what was begun.
+    assert_eq!(bench.join(A), ["worker 2 drops 1.1", "worker 1 gets 1.2"]);
+}

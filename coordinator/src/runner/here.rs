@@ -1,0 +1,75 @@
+//! The nodes that run in the coordinator's own process.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use lookalike::graph::{Blob, DecodedCache, NodeId, NodeSpec, Registry, RunContext};
+use tokio::sync::mpsc::UnboundedSender;
+
+use crate::comm::{RunEvent, Site};
+use crate::reactor::Event;
+
+/// How many encoded bytes of inputs are kept decoded for them (128 MiB).
+const DECODED_BOUND_BYTES: usize = 128 << 20;
+
+/// What nodes need that run in this process.
+pub(super) struct Here {
+    registry: Arc<Registry>,
+    decoded: Arc<DecodedCache>,
+    /// Of every node that runs here, with the progress that was told last: to watch it, and to cancel it when the run ends.
+    contexts: BTreeMap<NodeId, (RunContext, u16)>,
+    results: UnboundedSender<Event>,
+}
+
+impl Here {
+    /// A place for nodes whose outputs go to `results`.
+    pub(super) fn new(registry: Arc<Registry>, results: UnboundedSender<Event>) -> Self {
+        let decoded = Arc::new(DecodedCache::new(DECODED_BOUND_BYTES));
+        Self { registry, decoded, contexts: BTreeMap::new(), results }
+    }
+
+    /// Run a node.
+    pub(super) fn start(&mut self, node: NodeId, attempt: u32, spec: NodeSpec, inputs: Vec<Blob>) {
+        let context = RunContext::new(Arc::clone(&self.decoded));
+        self.contexts.insert(node, (context.clone(), 0));
+        let (registry, results) = (Arc::clone(&self.registry), self.results.clone());
+        // On the rayon pool and not on a blocking thread of tokio: its parallel iterators run there anyway, and a runtime
+        // waits for blocking threads before it ends, but an interrupted run shall not wait for a node.
+        rayon::spawn(move || {
+            let site = Site::Coordinator;
+            let result = match registry.run(&spec.kind, &spec.parameters, &inputs, &context) {
+                Ok(output) => Event::Finished { site, node, attempt, output },
+                Err(failure) => Event::Failed { site, node, attempt, failure },
+            };
+            // When nobody listens any more the run is over.
+            let _ = results.send(result);
+        });
+    }
+
+    /// Whether none runs.
+    pub(super) fn is_idle(&self) -> bool {
+        self.contexts.is_empty()
+    }
+
+    /// How far the nodes are, where that has changed. Those of workers come with their heartbeats.
+    pub(super) fn tell_progress(&mut self, mut observer: impl FnMut(&RunEvent)) {
+        for (node, (context, told)) in &mut self.contexts {
+            let permille = u16::try_from(context.progress_permille()).unwrap_or(1000);
+            if std::mem::replace(told, permille) != permille {
+                observer(&RunEvent::NodeProgress { node: *node, permille });
+            }
+        }
+    }
+
+    /// Let the context of a node go that has ended.
+    pub(super) fn forget(&mut self, ended: &Event) {
+        if let Event::Finished { node, .. } | Event::Failed { node, .. } = ended {
+            self.contexts.remove(node);
+        }
+    }
+
+    /// Ask all nodes to stop.
+    pub(super) fn cancel(&self) {
+        self.contexts.values().for_each(|(context, _)| context.cancel());
+    }
+}

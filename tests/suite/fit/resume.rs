@@ -1,0 +1,205 @@
+//! A fit whose coordinator is killed, wherever, and that is gone on with: the same bits, and nothing done twice.
+
+use super::scene::{QUICK, fit, folder, without_timing};
+use crate::program::Answer;
+use lookalike_coordinator::journal::RunLock;
+use lookalike_tests::{journal::JournalView, process::Process};
+use serde_json::Value;
+use std::{fs, path::Path, process::Command};
+
+/// Four shards, six searches, one full table, judging, polish, pictures: at least 14 nodes.
+const FLAGS: &str = "--samples 128 --gammas 1:2:0.2 --seed 5 --workers 2";
+
+/// Starts a fit and kills it with SIGKILL as soon as so many nodes are told to be finished; 0 is when the first worker joins.
+fn kill_after(folder: &Path, out: &str, finished: usize) {
+    let line = format!("fit photo.exr --env map.exr --out {out} {FLAGS} --progress json --resume");
+    let mut command = Command::new(env!("CARGO_BIN_EXE_lookalike-under-test"));
+    let command = command.args(line.split_whitespace()).current_dir(folder).env_remove("RUST_LOG");
+    let mut process = Process::start(command);
+    let mut count = 0;
+    let moment = process.stderr_until(|event| {
+        count += usize::from(event["event"] == "node-finished");
+        let is_moment = if finished == 0 { event["event"] == "worker-joined" } else { count == finished };
+        is_moment.then_some(())
+    });
+    moment.unwrap_or_else(|| panic!("the fit ended after {count} nodes"));
+    process.kill();
+}
+
+fn resume(folder: &Path, out: &str) -> Answer {
+    fit(folder, out, &format!("{FLAGS} --progress none --resume"))
+}
+
+fn status(folder: &Path, out: &str) -> Value {
+    let answer = crate::program::lookalike(folder, &format!("status {out} --json")).done();
+    serde_json::from_str(&answer.stdout).unwrap()
+}
+
+#[test]
+fn killed_anywhere_and_resumed_a_fit_gives_the_same_bits_and_does_nothing_twice() {
+    let folder = folder();
+    let out = |name: &str| folder.path().join(name);
+    fit(folder.path(), "whole", &format!("{FLAGS} --progress none")).done();
+    for finished in [0, 1, 4, 7, 11, 13] {
+        let name = finished.to_string();
+        kill_after(folder.path(), &name, finished);
+        let stopped = status(folder.path(), &name);
+        assert_eq!((&stopped["state"], &stopped["epoch"]), (&"stopped".into(), &1.into()), "{stopped}");
+        assert!(stopped["nodes"]["completed"].as_u64().unwrap() >= finished as u64, "{stopped}");
+        let access = fs::read(out(&name).join("access.json")).unwrap();
+        resume(folder.path(), &name).done();
+        let journal = JournalView::of(&out(&name));
+        assert_eq!(journal.run_twice(), 0, "after {finished}");
+        let recalled = journal.number("SELECT count(*) FROM nodes WHERE epoch = 2 AND state = 4");
+        assert!(recalled >= finished as u64, "{recalled} after {finished}");
+        assert!(fs::read(out(&name).join("access.json")).unwrap() == access, "workers elsewhere have this file");
+        assert_eq!(without_timing(&out("whole")), without_timing(&out(&name)), "after {finished}");
+        for file in ["match.exr", "match.png", "reference.png", "difference.png", "candidates.csv"] {
+            let [whole, resumed] = ["whole", &name].map(|name| fs::read(out(name).join(file)).unwrap());
+            assert!(whole == resumed, "{file} after {finished}");
+        }
+        let done = status(folder.path(), &name);
+        assert_eq!((&done["state"], &done["epoch"]), (&"finished".into(), &2.into()), "{done}");
+    }
+}
+
+#[test]
+fn fit_that_is_killed_time_and_again_still_ends() {
+    let folder = folder();
+    fit(folder.path(), "whole", &format!("{FLAGS} --progress none")).done();
+    for _ in 0..3 {
+        kill_after(folder.path(), "out", 2);
+    }
+    resume(folder.path(), "out").done();
+    let out = folder.path().join("out");
+    assert_eq!(without_timing(&folder.path().join("whole")), without_timing(&out));
+    let journal = JournalView::of(&out);
+    assert_eq!((journal.run_twice(), journal.number("SELECT max(epoch) FROM epochs")), (0, 4));
+    // The workers of the first coordinator have served all four.
+    assert_eq!(journal.column::<u64>("SELECT DISTINCT epoch FROM local_workers"), [1]);
+}
+
+#[test]
+fn finished_fit_is_verified_and_not_done_again() {
+    let folder = folder();
+    let out = folder.path().join("out");
+    // Without a run in the folder, --resume begins one.
+    fit(folder.path(), "out", &format!("{QUICK} --resume")).done();
+    let before = fs::read(out.join("fit.json")).unwrap();
+    let again = fit(folder.path(), "out", &format!("{QUICK} --resume --workers 2")).done();
+    assert!(
+        again.stderr.contains("the run in out is finished, and its results are as it wrote them"),
+        "{}",
+        again.stderr
+    );
+    assert!(fs::read(out.join("fit.json")).unwrap() == before);
+    // A changed file is somebody's; a missing one can be made again.
+    fs::write(out.join("candidates.csv"), "mine").unwrap();
+    fit(folder.path(), "out", &format!("{QUICK} --resume"))
+        .refused(&["candidates.csv is not what the finished run in out wrote", "--resume makes it again"]);
+    let bits = without_timing(&out);
+    fs::remove_file(out.join("candidates.csv")).unwrap();
+    let mended = fit(folder.path(), "out", &format!("{QUICK} --resume")).done();
+    assert!(mended.stderr.contains("candidates.csv is missing: fitting again"), "{}", mended.stderr);
+    assert!(out.join("candidates.csv").exists() && without_timing(&out) == bits);
+}
+
+#[test]
+fn run_with_other_inputs_or_settings_is_refused_with_what_differs() {
+    let folder = folder();
+    let refused =
+        |flags: &str, phrases: &[&str]| fit(folder.path(), "out", &format!("{QUICK} {flags}")).refused(phrases);
+    kill_after(folder.path(), "killed", 2);
+    fit(folder.path(), "killed", QUICK)
+        .refused(&["killed already holds a run that is not finished", "go on with it with --resume"]);
+    resume(folder.path(), "killed").done();
+    fit(folder.path(), "out", QUICK).done();
+    refused("", &["out already holds a finished fit", "choose another --out"]);
+    refused("--resume --seed 3", &["--seed is 0 there and 3 here", "resume with those of that run"]);
+    refused("--resume --gammas 1:2:0.25", &["--gammas is 1:2:0.5 there and 1:2:0.25 here"]);
+    refused("--resume --env-rotation 90", &["--env-rotation is 0.0 there and 90.0 here"]);
+    fs::copy(folder.path().join("map.exr"), folder.path().join("copy.exr")).unwrap();
+    // The same content under another name is the same input; what workers there are does not matter.
+    let line = format!("fit photo.exr --env copy.exr --out out {QUICK} --resume --workers 2 --grace 5s");
+    crate::program::lookalike(folder.path(), &line).done();
+    let line = format!("fit photo.exr --env photo.exr --env-mapping mirror-ball --out out {QUICK} --resume");
+    let other = crate::program::lookalike(folder.path(), &line);
+    assert_eq!(other.code, Some(2), "{}", other.stderr);
+    for phrase in ["other inputs or settings: --env is ", "--env-mapping is latlong there and mirror-ball here"] {
+        assert!(other.stderr.contains(phrase), "{}", other.stderr);
+    }
+}
+
+#[test]
+fn second_coordinator_in_one_folder_is_refused_and_told_who_is_there() {
+    let folder = folder();
+    let out = folder.path().join("out");
+    fs::create_dir(&out).unwrap();
+    let lock = RunLock::take(&out).unwrap();
+    let who = format!("process {} on ", std::process::id());
+    for flags in [QUICK.to_owned(), format!("{QUICK} --resume")] {
+        fit(folder.path(), "out", &flags).refused(&["another coordinator is at work in out", &who]);
+    }
+    drop(lock);
+    fit(folder.path(), "out", QUICK).done();
+}
+
+#[test]
+fn file_that_is_no_journal_is_refused() {
+    let folder = folder();
+    fs::create_dir(folder.path().join("out")).unwrap();
+    fs::write(folder.path().join("out/run.sqlite"), "a letter to somebody".repeat(100)).unwrap();
+    fit(folder.path(), "out", &format!("{QUICK} --resume")).refused(&["run.sqlite is not the journal of a run"]);
+    let status = crate::program::lookalike(folder.path(), "status out");
+    status.refused(&["run.sqlite is not the journal of a run"]);
+    crate::program::lookalike(folder.path(), "status nowhere").refused(&["expected a run in nowhere"]);
+}
+
+/// A small file system of its own, gone when dropped.
+struct SmallDisk<'a>(&'a Path);
+
+impl<'a> SmallDisk<'a> {
+    /// `None` where it cannot be made.
+    fn mount(folder: &'a Path, size: &str) -> Option<Self> {
+        fs::create_dir_all(folder).unwrap();
+        let options = format!("size={size}");
+        let mut command = Command::new("mount");
+        let mounted = command.args(["-t", "tmpfs", "-o", &options, "none"]).arg(folder).output();
+        mounted.is_ok_and(|output| output.status.success()).then_some(Self(folder))
+    }
+
+    fn grow(&self, size: &str) {
+        let options = format!("remount,size={size}");
+        assert!(Command::new("mount").args(["-o", &options]).arg(self.0).status().unwrap().success());
+    }
+}
+
+impl Drop for SmallDisk<'_> {
+    fn drop(&mut self) {
+        // Nothing that holds it open outlives the test; if it does, the folder's removal will say so.
+        let _ = Command::new("umount").arg(self.0).status();
+    }
+}
+
+#[test]
+fn full_disk_ends_the_run_by_name_and_costs_nothing_that_was_acknowledged() {
+    let folder = folder();
+    let small = folder.path().join("small");
+    let Some(disk) = SmallDisk::mount(&small, "400k") else {
+        println!("skipped: cannot mount a small file system here (needs root)");
+        return;
+    };
+    fit(folder.path(), "whole", &format!("{FLAGS} --progress none")).done();
+    let full = resume(folder.path(), "small/out");
+    assert_eq!(full.code, Some(3), "{}", full.stderr);
+    for phrase in ["cannot write the journal small/out/run.sqlite: the disk is full", "go on with --resume"] {
+        assert!(full.stderr.contains(phrase), "{}", full.stderr);
+    }
+    disk.grow("64m");
+    resume(folder.path(), "small/out").done();
+    let out = small.join("out");
+    let journal = JournalView::of(&out);
+    assert_eq!(journal.run_twice(), 0);
+    assert_eq!(without_timing(&folder.path().join("whole")), without_timing(&out));
+    drop(journal);
+}
