@@ -44,7 +44,10 @@ fn list(value: &Value) -> &[Value] {
 }
 
 fn arguments(container: &Value) -> Vec<String> {
-    list(&container["args"]).iter().map(|argument| argument.as_str().expect("text, in quotes if need be").into()).collect()
+    list(&container["args"])
+        .iter()
+        .map(|argument| argument.as_str().expect("text, in quotes if need be").into())
+        .collect()
 }
 
 /// The value of a flag, `--flag=value`.
@@ -65,8 +68,11 @@ fn containers_give_the_program_flags_that_it_has() {
     for job in JOBS {
         let arguments = arguments(&container(&pod(job)));
         let help = help(&arguments[0]);
-        let flags: Vec<&str> =
-            arguments.iter().filter(|word| word.starts_with("--")).map(|word| word.split('=').next().unwrap()).collect();
+        let flags: Vec<&str> = arguments
+            .iter()
+            .filter(|word| word.starts_with("--"))
+            .map(|word| word.split('=').next().unwrap())
+            .collect();
         assert!(flags.len() >= 2, "{arguments:?}");
         for flag in flags {
             let known = help.split_whitespace().any(|word| word.trim_end_matches(',') == flag);
@@ -152,5 +158,8 @@ fn ends_that_trying_again_would_not_change_fail_the_job_at_once() {
     assert_eq!(final_codes, serde_json::json!([1, 2, 4]));
     assert!(arguments(&container(&pod(JOBS[0]))).contains(&"--resume".to_owned()));
     // What the API demands of a Job with such a policy.
-    assert_eq!((&spec["podReplacementPolicy"], &spec["template"]["spec"]["restartPolicy"]), (&"Failed".into(), &"Never".into()));
+    assert_eq!(
+        (&spec["podReplacementPolicy"], &spec["template"]["spec"]["restartPolicy"]),
+        (&"Failed".into(), &"Never".into())
+    );
 }

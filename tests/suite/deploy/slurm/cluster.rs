@@ -108,7 +108,10 @@ impl Cluster {
             let Ok(bytes) = fs::read(entry.path().join("environ")) else { continue };
             let variables = bytes.split(|byte| *byte == 0).map(|bytes| String::from_utf8_lossy(bytes).into_owned());
             let environment: BTreeSet<String> = variables.collect();
-            if environment.contains(&ours) && environment.iter().any(|v| v.starts_with("SLURMD_NODENAME=")) && wanted(&environment) {
+            if environment.contains(&ours)
+                && environment.iter().any(|v| v.starts_with("SLURMD_NODENAME="))
+                && wanted(&environment)
+            {
                 found.insert(process);
                 found.extend(keeper(process));
             }
@@ -207,7 +210,13 @@ fn start_munged(folder: &Path) -> Child {
         at("--log-file", "munged.log"),
         at("--seed-file", "munge.seed"),
     ];
-    Command::new("munged").args(arguments).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap()
+    Command::new("munged")
+        .args(arguments)
+        .stdin(Stdio::null())
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap()
 }
 
 /// The configuration of a cluster without cgroups and accounts, whose nodes are dead after five seconds of silence.
@@ -233,7 +242,11 @@ fn configuration(folder: &Path, nodes: usize) -> String {
     );
     for (index, port) in ports[1..].iter().enumerate() {
         let name = index + 1;
-        writeln!(text, "NodeName=node{name} NodeHostname={host} NodeAddr=127.0.0.1 Port={port} CPUs={CPUS} RealMemory=2000").unwrap();
+        writeln!(
+            text,
+            "NodeName=node{name} NodeHostname={host} NodeAddr=127.0.0.1 Port={port} CPUs={CPUS} RealMemory=2000"
+        )
+        .unwrap();
     }
     text + "PartitionName=main Nodes=ALL Default=YES MaxTime=INFINITE State=UP\n"
 }
