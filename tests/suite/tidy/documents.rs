@@ -80,7 +80,18 @@ fn links_and_paths_in_documents_resolve() {
 #[test]
 fn commands_and_flags_in_documents_exist() {
     const COMMANDS: [&str; 8] = ["access new", "batch", "demo", "fit", "render", "compare", "status", "worker"];
-    const OF_CARGO: [&str; 7] = ["--bin", "--features", "--lib", "--locked", "--path", "--release", "--test"];
+    const OF_CARGO: [&str; 10] = [
+        "--bench",
+        "--bin",
+        "--example",
+        "--features",
+        "--lib",
+        "--locked",
+        "--nocapture",
+        "--path",
+        "--release",
+        "--test",
+    ];
     // Of sbatch, podman, kubectl and a validator.
     const OF_CLUSTERS: [&str; 14] = [
         "--array",
