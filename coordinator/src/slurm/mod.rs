@@ -99,5 +99,6 @@ fn not_started(error: &io::Error, sbatch: &str, script: &Path) -> anyhow::Error 
 /// The name of the job script in the folder of results.
 const SCRIPT_FILE: &str = "lookalike.sbatch";
 
-#[cfg(all(test, unix))]
+#[cfg(test)]
+#[cfg(unix)]
 mod tests;
