@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use thiserror::Error;
 
-/// How the coordinator treats workers and nodes. Every field has a flag of the same name.
+/// How the coordinator treats workers and nodes. What a user may want to change has a flag of the same name.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Policy {
     /// How often a worker shall tell that it lives (default 1 s). It does so from a thread of its own, so a node that keeps

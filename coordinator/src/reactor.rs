@@ -75,7 +75,8 @@ pub enum Event {
         /// The output.
         output: Blob,
     },
-    /// A worker that is about to join executes a node already: an earlier coordinator of this run gave it.
+    /// A worker executes a node already: an earlier coordinator of this run gave it. Has to be followed by the
+    /// [`WorkerJoined`](Self::WorkerJoined) of that worker.
     Continues {
         /// The worker.
         worker: WorkerId,
@@ -157,7 +158,7 @@ pub fn handle(
         Event::Finished { site, node, attempt, output } => {
             answers::finished(core, (site, node, attempt), output, now, outbox)?;
         }
-        Event::Continues { worker, node } => core.continued.push((worker, node)),
+        Event::Continues { worker, node } => membership::reserve(core, worker, node),
         Event::Recovered { worker, node, output } => answers::recovered(core, worker, node, output, now, outbox)?,
         Event::Failed { site, node, attempt, failure } => {
             answers::failed(core, (site, node, attempt), failure, now, outbox)?;
@@ -231,6 +232,10 @@ fn recall(core: &mut Core, node: NodeId, outbox: &mut Outbox) -> bool {
 }
 
 fn make_ready(core: &mut Core, planner: &impl Planner, node: NodeId, now: Duration, outbox: &mut Outbox) {
+    // It may have been given up meanwhile.
+    if !core.graph.is_open(node) {
+        return;
+    }
     if core.recall.is_some() {
         if recall(core, node, outbox) {
             return;

@@ -6,6 +6,7 @@
 //! a Ctrl-C at the terminal reaches the coordinator alone, which ends its workers in order.
 
 mod orphan;
+mod worked;
 
 use std::collections::BTreeSet;
 use std::ffi::OsString;
@@ -26,12 +27,14 @@ use tracing::{debug, warn};
 
 use self::orphan::Orphan;
 pub(crate) use self::orphan::is_worker_alive;
+pub(crate) use self::worked::Worked;
 use crate::comm::RunEvent;
 use crate::reactor::Event;
 use crate::rpc::Inbound;
 use crate::runner::RunError;
 
-/// A worker that lived for this long was well; its death starts the count again.
+/// A worker that lived for this long was well; its death starts the count again, and so does that of one that has executed
+/// something: it may have died of a node, and then the node fails in the end.
 const HEALTHY_LIFE: Duration = Duration::from_secs(10);
 /// After this many deaths in a row, each soon after the start, a worker is not started again.
 const MAX_QUICK_DEATHS: u32 = 8;
@@ -80,6 +83,7 @@ pub(crate) struct LocalWorkers {
     pub(crate) threads: NonZeroUsize,
     /// Whether other workers may come when all local ones are given up.
     pub(crate) others_may_come: bool,
+    pub(crate) worked: Worked,
     /// Whether they live on for a while when the coordinator is killed.
     pub(crate) may_survive: bool,
 }
@@ -148,7 +152,15 @@ impl LocalWorkers {
                 }
                 Err(error) => (0, format!("an error at its start: {error}"), false),
             };
-            quick_deaths = if begin.elapsed() < HEALTHY_LIFE { quick_deaths + 1 } else { 1 };
+            if !is_hopeless {
+                // Its last words may still be on their way.
+                tokio::select! {
+                    () = sleep(FIRST_PAUSE) => {}
+                    () = stop.cancelled() => return None,
+                }
+            }
+            let was_well = begin.elapsed() >= HEALTHY_LIFE || self.worked.take(process);
+            quick_deaths = if was_well { 1 } else { quick_deaths + 1 };
             let give_up = is_hopeless || quick_deaths >= MAX_QUICK_DEATHS;
             let pause = (FIRST_PAUSE * 2_u32.pow(quick_deaths - 1)).min(LONGEST_PAUSE);
             let restart_after = (!give_up).then_some(pause);
@@ -161,7 +173,7 @@ impl LocalWorkers {
                 return Some(status);
             }
             tokio::select! {
-                () = sleep(pause) => next = self.spawn(),
+                () = sleep(pause - FIRST_PAUSE) => next = self.spawn(),
                 () = stop.cancelled() => return None,
             }
         }

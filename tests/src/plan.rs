@@ -2,7 +2,7 @@
 //! when the digest is there. The result depends on every output.
 
 use lookalike::graph::{
-    Blob, Execution, GraphEdit, Input, NodeId, NodeSpec, Placement, PlanError, Planner, run_in_process,
+    Blob, Execution, FailureReason, GraphEdit, Input, NodeId, NodeSpec, Placement, PlanError, Planner, run_in_process,
 };
 
 use crate::nodes::registry;
@@ -33,6 +33,11 @@ pub enum Leaves {
     Abort {
         /// The file.
         marker: String,
+    },
+    /// So many nodes that abort whatever process they run in, and a planner that does without them; then a digest of nothing.
+    Killers {
+        /// How many.
+        count: usize,
     },
     /// One node that waits at a gate in the coordinator's own process.
     GateHere {
@@ -91,6 +96,7 @@ impl Planner for TestPlanner {
                 ("gate", (0..*count).map(|leaf| format!("{address}#{leaf}").into_bytes()).collect(), 0)
             }
             Leaves::Abort { marker } => ("abort", vec![marker.clone().into_bytes()], 0),
+            Leaves::Killers { count } => ("abort", vec![Vec::new(); *count], 0),
             Leaves::GateHere { address } => ("gate", vec![address.clone().into_bytes()], 0),
             Leaves::Panic => ("panic", vec![Vec::new()], 0),
             Leaves::Unknown => ("nonsense", vec![Vec::new()], 0),
@@ -109,16 +115,32 @@ impl Planner for TestPlanner {
 
     fn completed(&mut self, node_id: NodeId, output: &Blob, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
         if self.nodes.contains(&node_id) {
-            self.open_leaves -= 1;
-            if self.open_leaves == 0 {
-                let inputs = self.nodes.iter().map(|leaf| Input::OutputOf(*leaf)).collect();
-                let digest = node("digest", "of all leaves", vec![], inputs);
-                self.digest = Some(graph.add_node(NodeSpec { placement: Placement::Coordinator, ..digest })?);
-            }
+            self.leaf_is_done(self.nodes.clone(), graph)?;
         } else if self.digest == Some(node_id) {
             graph.add_node(node("digest", "last", b"last".to_vec(), vec![Input::OutputOf(node_id)]))?;
         } else {
             self.result = Some(output.to_vec());
+        }
+        Ok(())
+    }
+
+    fn failed(&mut self, node: NodeId, reason: &FailureReason, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
+        if matches!(self.leaves, Leaves::Killers { .. }) {
+            return self.leaf_is_done(Vec::new(), graph);
+        }
+        let (kind, label) = graph.spec(node).map(|spec| (spec.kind.clone(), spec.label.clone())).unwrap_or_default();
+        Err(PlanError::NodeFailed { kind, label, reason: reason.clone() })
+    }
+}
+
+impl TestPlanner {
+    /// Once all leaves are done, digest the outputs of these.
+    fn leaf_is_done(&mut self, leaves: Vec<NodeId>, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
+        self.open_leaves -= 1;
+        if self.open_leaves == 0 {
+            let inputs = leaves.into_iter().map(Input::OutputOf).collect();
+            let digest = node("digest", "of all leaves", vec![], inputs);
+            self.digest = Some(graph.add_node(NodeSpec { placement: Placement::Coordinator, ..digest })?);
         }
         Ok(())
     }

@@ -4,6 +4,7 @@
 use std::process::Command;
 use std::time::Duration;
 
+use lookalike::graph::FailureReason;
 use lookalike_coordinator::comm::{Departure, RunEvent};
 use lookalike_coordinator::core::Policy;
 use lookalike_coordinator::runner::{RunError, RunnerOptions};
@@ -148,6 +149,25 @@ fn worker_that_is_killed_while_it_drains_is_not_held_against_its_node() {
     assert_eq!(deaths_when_requeued(&cluster), 0);
     gate.next().release();
     assert_eq!(cluster.finish().0, reference());
+}
+
+#[test]
+fn nodes_that_kill_their_workers_fail_one_by_one_and_local_workers_go_on() {
+    // Fifteen deaths at least, more than a local worker that dies of itself is granted.
+    let cluster = Cluster::start(Leaves::Killers { count: 3 }, options(PROGRAM, 1));
+    let (events, outcome) = cluster.outcome();
+    let (result, summary) = outcome.unwrap();
+    assert!(result.is_some());
+    let failed: Vec<_> = events
+        .iter()
+        .filter_map(|event| match event {
+            RunEvent::NodeFailed { name, reason } => Some((name.label.as_str(), reason.clone())),
+            _ => None,
+        })
+        .collect();
+    assert_eq!((failed.len(), summary.failed_nodes, summary.suspected_nodes), (3, 3, 3));
+    assert!(failed.iter().all(|(_, reason)| *reason == FailureReason::Crashed { crashes: 3 }), "{failed:?}");
+    assert!(summary.workers_joined >= 16, "{summary:?}");
 }
 
 #[test]

@@ -139,8 +139,8 @@ impl Tasks {
             };
         }
         if self.is_draining {
-            // It crossed our word that we begin with nothing more, so it is given to another one.
-            return Vec::new();
+            // It crossed our word that we begin with nothing more, or that was not heard: it shall go to another one.
+            return vec![Action::Send(ToCoordinator::Draining)];
         }
         let inputs: Vec<_> = assignment.inputs.iter().map(|hash| self.cache.get(BlobHash(*hash))).collect();
         let mut actions = Vec::new();

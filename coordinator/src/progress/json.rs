@@ -64,6 +64,13 @@ fn object(event: &RunEvent) -> Option<Value> {
             "event": "node-failed", "node": name.node.0, "kind": name.kind, "label": name.label,
             "reason": reason.to_string(),
         }),
+        RunEvent::WorkerDraining { worker } => json!({ "event": "worker-draining", "worker": worker.0 }),
+        RunEvent::NodeSuspected { name, deaths } => {
+            json!({ "event": "node-suspected", "node": name.node.0, "label": name.label, "deaths": deaths })
+        }
+        RunEvent::NodeSpeculated { name, worker } => {
+            json!({ "event": "node-speculated", "node": name.node.0, "label": name.label, "worker": worker.0 })
+        }
         RunEvent::NodeRequeued { name, worker, crashes } => json!({
             "event": "node-requeued", "node": name.node.0, "label": name.label, "worker": worker.0, "crashes": crashes,
         }),

@@ -62,6 +62,16 @@ fn remark(event: &RunEvent) -> Option<String> {
             let next = restart_after.map_or("it is not started again", |_| "another one takes its place");
             Some(format!("warning: local worker {process} ended ({status}); {next}"))
         }
+        RunEvent::WorkerDraining { worker } => {
+            Some(format!("{worker} was asked to end: it finishes what it computes and gets nothing more"))
+        }
+        RunEvent::NodeSuspected { name, deaths } => Some(format!(
+            "warning: {deaths} workers have died while they computed {}: from now on it runs alone",
+            name.label
+        )),
+        RunEvent::NodeSpeculated { name, worker } => {
+            Some(format!("{} is slow: {worker} computes it too, and the first answer counts", name.label))
+        }
         RunEvent::NodeRequeued { name, .. } => Some(format!("{} runs again on another worker", name.label)),
         RunEvent::NodeFailed { name, reason } => Some(format!("error: {} failed: {reason}", name.label)),
         _ => None,

@@ -14,6 +14,14 @@ const FIRST_DELAY: Duration = Duration::from_millis(100);
 /// The longest of these pauses.
 const LONGEST_DELAY: Duration = Duration::from_secs(5);
 
+/// Keep a node for the worker that executes it and is about to join. Whoever has to run alone begins anew.
+pub(super) fn reserve(core: &mut Core, worker: WorkerId, node: NodeId) {
+    if core.look(node).is_some_and(|record| record.place == Place::Queue) {
+        core.put(node, Place::Nowhere);
+        core.continued.push((worker, node));
+    }
+}
+
 pub(super) fn join(
     core: &mut Core,
     worker: WorkerId,
@@ -26,8 +34,8 @@ pub(super) fn join(
     core.summary.workers_joined += 1;
     outbox.tell(RunEvent::WorkerJoined { worker, threads, process });
     for (_, node) in core.continued.extract_if(.., |(continuing, _)| *continuing == worker).collect::<Vec<_>>() {
-        // Whoever has to run alone begins anew.
-        if core.look(node).is_some_and(|record| record.place == Place::Queue) {
+        // Its output may have come meanwhile.
+        if core.graph.is_open(node) {
             schedule::assign(core, worker, node, now, outbox);
             // It has begun: nobody else shall get it for having idle threads.
             let attempt = core.look(node).map_or(0, |record| record.attempts);
@@ -65,12 +73,14 @@ pub(super) fn leave(core: &mut Core, worker: WorkerId, departure: &Departure, no
 pub(super) fn drain(core: &mut Core, worker: WorkerId, now: Duration, outbox: &mut Outbox) {
     renew(core, worker, now);
     core.clearing = core.clearing.filter(|clearing| *clearing != worker);
-    let unbegun = core.members.change(worker, |member| {
-        let is_news = !std::mem::replace(&mut member.is_draining, true);
-        is_news.then(|| member.waiting.clone())
+    let drained = core.members.change(worker, |member| {
+        let was_draining = std::mem::replace(&mut member.is_draining, true);
+        (was_draining, member.waiting.clone())
     });
-    let Some(Some(unbegun)) = unbegun else { return };
-    outbox.tell(RunEvent::WorkerDraining { worker });
+    let Some((was_draining, unbegun)) = drained else { return };
+    if !was_draining {
+        outbox.tell(RunEvent::WorkerDraining { worker });
+    }
     for node in unbegun {
         core.end_lease(worker, node, now);
         requeue(core, node, worker, now, outbox);

@@ -186,6 +186,18 @@ fn node_that_merely_waits_moves_to_an_idle_worker() {
 }
 
 #[test]
+fn worker_is_not_given_more_bytes_than_it_may_leave_unread() {
+    let large = NodeSpec { parameters: vec![0; 1 << 20], ..node("n", vec![], Placement::Worker) };
+    let mut bench = Bench::new(Script { nodes: vec![large; 40], ..Script::default() });
+    // It has threads for all of them, but eight are 8 MiB.
+    assert_eq!(bench.join(A, 64).len(), 8);
+    // What it begins with it has read.
+    assert_eq!(bench.start(A, 0, 1), ["worker 1 gets 8.1"]);
+    assert_eq!(bench.finish(A, 1, 1, 0), ["worker 1 is thanked for 1.1", "worker 1 gets 9.1"]);
+    assert_eq!(bench.core.members.get(A).unwrap().waiting.len(), 8);
+}
+
+#[test]
 fn nodes_of_a_lost_worker_are_requeued_once() {
     let mut bench = Bench::new(independent(2));
     bench.join(A, 2);

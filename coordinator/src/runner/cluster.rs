@@ -19,7 +19,7 @@ use super::{RunError, RunnerOptions};
 use crate::access::{Credentials, CredentialsError};
 use crate::journal::Past;
 use crate::rpc::{Gate, Inbound, Mailbox, Outgoing, serve_forever};
-use crate::spawn::{LocalWorkers, WorkerCommand, is_worker_alive, threads_per_worker};
+use crate::spawn::{LocalWorkers, Worked, WorkerCommand, is_worker_alive, threads_per_worker};
 use crate::tls::server_config;
 
 /// Everything of a run that has to end with it.
@@ -29,7 +29,9 @@ pub(crate) struct Cluster {
     pub(crate) address: String,
     /// Where the coordinator listens.
     pub(crate) bound: SocketAddr,
+    /// The processes and mailboxes of the members.
     members: BTreeMap<WorkerId, (u32, Mailbox)>,
+    worked: Worked,
     /// The processes of the members.
     present: watch::Sender<BTreeSet<u32>>,
     /// Workers of an earlier coordinator that are not wanted any more.
@@ -76,6 +78,7 @@ impl Cluster {
         let tls = server_config(&identity).map_err(RunError::Tls)?;
         let stop = CancellationToken::new();
         let workers = local_workers(options, RunnerOptions::local_address(bound))?;
+        let worked = workers.worked.clone();
         // From here on the drop guard inside `Self` ends what was started.
         let gate = Gate {
             tls: TlsAcceptor::from(Arc::new(tls)),
@@ -92,7 +95,7 @@ impl Cluster {
         let local_workers = workers.start(&inbound, &stop, &orphans, &present)?;
         let serving = tokio::spawn(serve_forever(listener, gate, stop.clone()));
         let (address, members) = (access.address, BTreeMap::new());
-        Ok(Self { address, bound, members, present, surplus, stop, serving, local_workers })
+        Ok(Self { address, bound, members, worked, present, surplus, stop, serving, local_workers })
     }
 
     /// A worker can be sent to from now on. Whether it is wanted: one that an earlier coordinator had started, and that is one too
@@ -105,6 +108,13 @@ impl Cluster {
         self.members.insert(worker, (process, mailbox));
         self.present.send_modify(|present| _ = present.insert(process));
         true
+    }
+
+    /// A worker executes a node.
+    pub(crate) fn note_work(&self, worker: WorkerId) {
+        if let Some((process, _)) = self.members.get(&worker) {
+            self.worked.note(*process);
+        }
     }
 
     /// Send to a worker. One that has left meanwhile gets nothing: the reactor will hear of it.
@@ -215,6 +225,7 @@ fn local_workers(options: &RunnerOptions, address: String) -> Result<LocalWorker
         address,
         threads: options.threads_per_worker.unwrap_or_else(|| threads_per_worker(options.workers)),
         others_may_come: options.others_may_come(),
+        worked: Worked::default(),
         may_survive: options.journal.as_ref().is_some_and(|journal| journal.survivors),
     })
 }

@@ -37,7 +37,7 @@ use self::interrupt::Interrupt;
 use self::memory::{Group, Memory};
 pub use self::options::RunnerOptions;
 use self::survivors::{Arrival, Survivors};
-use crate::comm::{Action, Lease, Outbox, RunEvent};
+use crate::comm::{Action, Lease, Outbox, RunEvent, Site};
 use crate::core::{Core, RunSummary};
 use crate::journal::Journal;
 use crate::reactor::{self, Event};
@@ -225,7 +225,7 @@ impl<P: Planner, O: FnMut(&RunEvent)> Driver<P, O> {
             }
             let back = self.survivors.take_if(|survivors| survivors.are_complete(Instant::now()));
             let arrivals = back.map(Survivors::into_arrivals).unwrap_or_default();
-            arrivals.into_iter().try_for_each(|arrival| self.welcome(arrival, &mut group))
+            self.welcome(arrivals, &mut group)
         };
         let outcome = handle_all();
         // Also after an error: what was said before it shall be heard.
@@ -233,15 +233,18 @@ impl<P: Planner, O: FnMut(&RunEvent)> Driver<P, O> {
         outcome
     }
 
-    /// Let a worker in that had to wait for others.
-    fn welcome(&mut self, arrival: Arrival, group: &mut Group) -> Result<(), RunError> {
-        let Arrival { worker, threads, process, executing } = arrival;
-        for lease in executing.unwrap_or_default() {
-            if let Some(node) = self.memory.today(lease) {
-                self.handle(Event::Continues { worker, node }, group)?;
+    /// Let the workers in that had to wait for each other. First each gets what it has in hand.
+    fn welcome(&mut self, arrivals: Vec<Arrival>, group: &mut Group) -> Result<(), RunError> {
+        for Arrival { worker, executing, .. } in &arrivals {
+            for lease in executing.iter().flatten() {
+                if let Some(node) = self.memory.today(*lease) {
+                    self.handle(Event::Continues { worker: *worker, node }, group)?;
+                }
             }
         }
-        self.handle(Event::WorkerJoined { worker, threads, process }, group)
+        arrivals.into_iter().try_for_each(|Arrival { worker, threads, process, .. }| {
+            self.handle(Event::WorkerJoined { worker, threads, process }, group)
+        })
     }
 
     fn handle(&mut self, event: Event, group: &mut Group) -> Result<(), RunError> {
@@ -289,6 +292,9 @@ impl<P: Planner, O: FnMut(&RunEvent)> Driver<P, O> {
             Inbound::Event(event) => {
                 if let Event::WorkerLeft { worker, .. } = &event {
                     self.cluster.iter_mut().for_each(|cluster| cluster.dismiss(*worker));
+                }
+                // Who is asked to end while others are waited for need not join any more.
+                if let Event::WorkerLeft { worker, .. } | Event::WorkerDrains { worker } = &event {
                     self.survivors.iter_mut().for_each(|survivors| survivors.left(*worker));
                 }
                 Some(event)
@@ -340,7 +346,12 @@ impl<P: Planner, O: FnMut(&RunEvent)> Driver<P, O> {
                 }
                 Action::Drop { worker } => self.cluster.iter_mut().for_each(|cluster| cluster.dismiss(worker)),
                 Action::RunHere { node, attempt } => self.run_here(node, attempt),
-                Action::Tell(event) => (self.observer)(&event),
+                Action::Tell(event) => {
+                    if let RunEvent::NodeStarted { site: Site::Worker(worker), .. } = &event {
+                        self.cluster.iter().for_each(|cluster| cluster.note_work(*worker));
+                    }
+                    (self.observer)(&event);
+                }
             }
         }
     }

@@ -100,90 +100,63 @@ fn nodes_that_shared_a_worker_with_a_killer_are_told_apart_from_it() {
     assert_eq!((&bench.planner.completed[..], bench.planner.failed.len()), (&[NodeId(1)][..], 1));
 }
 
-/// Worker 1 has executed something and holds node 0 as well, which then kills worker 2 twice.
-fn suspected_beside_a_worker(nodes: usize) -> Bench {
+/// Worker 1 has executed something, and worker 2 has died of a node that had killed another one before. The node.
+fn suspected_beside_a_worker(nodes: usize) -> (Bench, NodeId) {
     let mut bench = Bench::new(independent(nodes));
-    bench.join(A, 1);
-    let last = nodes as u64 - 1;
     bench.join(B, 1);
-    for crash in 1..=2 {
-        let held = bench.core.members.get(B).unwrap().leases.iter().next().map(|(node, held)| (*node, held.attempt));
-        let (node, attempt) = held.unwrap();
-        assert!(node.0 <= last);
-        bench.start(B, node.0, attempt);
-        bench.lose(B, Departure::Lost);
-        if crash == 1 {
-            bench.join(B, 1);
-        }
-    }
-    bench
-}
-
-#[test]
-fn suspect_waits_a_moment_for_a_fresh_worker_and_then_takes_an_idle_one() {
-    let mut bench = Bench::new(independent(2));
     bench.join(A, 1);
-    bench.start(A, 0, 1);
-    bench.finish(A, 0, 1, 0);
-    bench.handle(Event::WorkerLeft { worker: A, departure: Departure::Goodbye });
-    let mut deaths = Vec::new();
-    for number in 11..=12 {
-        let worker = WorkerId(number);
-        bench.join(worker, 1);
-        bench.start(worker, 1, bench.core.look(NodeId(1)).unwrap().attempts);
-        if number == 12 {
-            // Another one comes, and is not fresh any more: it helps with what seems slow.
-            bench.join(B, 1);
-            bench.live(5000, &[worker, B]);
-        }
-        deaths.extend(bench.lose(worker, Departure::Lost));
-    }
-    assert!(deaths.contains(&"n1 suspected, 2".to_owned()), "{deaths:?}");
-    assert_eq!(bench.core.look(NodeId(1)).unwrap().holders, [B], "it is fresh, and there");
-}
-
-#[test]
-fn worker_that_has_executed_something_takes_a_suspect_only_after_a_moment() {
-    let mut bench = Bench::new(independent(3));
-    bench.join(A, 1);
-    bench.start(A, 0, 1);
-    bench.finish(A, 0, 1, 0);
-    bench.start(A, 1, 1);
-    bench.finish(A, 1, 1, 1);
-    // Worker 2 takes the last node and dies of it, and so does worker 3.
-    bench.handle(Event::WorkerDrains { worker: A });
-    for worker in [B, C] {
-        bench.join(worker, 1);
-        bench.start(worker, 2, bench.core.look(NodeId(2)).unwrap().attempts);
-        bench.lose(worker, Departure::Lost);
-    }
-    bench.lose(A, Departure::Goodbye);
-    assert!(bench.core.is_suspect(NodeId(2)));
-    let fresh = bench.join(A, 1);
-    assert_eq!(fresh, ["worker 1 gets 2.4"]);
-}
-
-#[test]
-fn without_a_fresh_worker_an_idle_one_is_cleared_and_has_the_suspect_for_itself() {
-    let mut bench = suspected_beside_a_worker(6);
-    let suspect = (0..6).map(NodeId).find(|node| bench.core.is_suspect(*node));
-    // Both deaths were of whatever node was first on worker 2.
-    let Some(suspect) = suspect else { panic!("{:?}", bench.core.records) };
-    // Worker 1 is busy with others and has executed something.
-    let (first, attempt) = {
-        let member = bench.core.members.get(A).unwrap();
-        member.leases.iter().next().map(|(node, held)| (*node, held.attempt)).unwrap()
+    let first = |bench: &Bench, worker| {
+        let leases = &bench.core.members.get(worker).unwrap().leases;
+        leases.iter().next().map(|(node, held)| (*node, held.attempt)).unwrap()
     };
-    bench.start(A, first.0, attempt);
-    assert!(bench.live(1000, &[A]).is_empty(), "it waits for a fresh one");
-    let cleared = bench.live(1000, &[A]);
+    let (node, attempt) = first(&bench, A);
+    bench.start(A, node.0, attempt);
+    bench.finish(A, node.0, attempt, 1);
+    let (suspect, attempt) = first(&bench, B);
+    bench.core.record(suspect).unwrap().deaths.in_company = 1;
+    bench.start(B, suspect.0, attempt);
+    assert!(bench.lose(B, Departure::Lost).contains(&format!("n{} suspected, 2", suspect.0)));
+    (bench, suspect)
+}
+
+#[test]
+fn suspect_takes_a_fresh_worker_at_once_and_an_idle_one_after_a_moment() {
+    let (mut bench, suspect) = suspected_beside_a_worker(2);
+    assert!(bench.core.members.get(A).unwrap().leases.is_empty());
+    assert!(bench.live(1999, &[A]).is_empty());
+    assert_eq!(bench.core.next_deadline(), Some(bench.now + Duration::from_millis(1)));
+    assert_eq!(bench.live(1, &[A]), [format!("worker 1 gets {}.2", suspect.0)]);
+    let (mut bench, suspect) = suspected_beside_a_worker(2);
+    assert!(bench.live(1000, &[A]).is_empty());
+    assert_eq!(bench.join(C, 1), [format!("worker 3 gets {}.2", suspect.0)]);
+}
+
+#[test]
+fn without_a_fresh_or_idle_worker_one_is_cleared_and_has_the_suspect_for_itself() {
+    let (mut bench, suspect) = suspected_beside_a_worker(6);
+    let leases = &bench.core.members.get(A).unwrap().leases;
+    assert_eq!(leases.len(), 3);
+    let (busy_with, attempt) = leases.iter().next().map(|(node, held)| (*node, held.attempt)).unwrap();
+    bench.start(A, busy_with.0, attempt);
+    assert!(bench.live(1999, &[A]).is_empty(), "it waits for a fresh one");
+    let cleared = bench.live(1, &[A]);
     assert!(cleared.iter().all(|said| said.starts_with("worker 1 drops")) && cleared.len() == 2, "{cleared:?}");
-    let alone = bench.finish(A, first.0, attempt, 1);
-    let attempt = bench.core.look(suspect).unwrap().attempts;
-    assert_eq!(alone[1..], [format!("worker 1 gets {}.{attempt}", suspect.0)]);
-    bench.start(A, suspect.0, attempt);
-    let after = bench.finish(A, suspect.0, attempt, 0);
-    assert_eq!(after.len(), 4, "worker 1 goes on with three others: {after:?}");
+    let alone = bench.finish(A, busy_with.0, attempt, 1);
+    assert_eq!(alone[1..], [format!("worker 1 gets {}.2", suspect.0)]);
+    bench.start(A, suspect.0, 2);
+    let after = bench.finish(A, suspect.0, 2, 0);
+    assert_eq!(after.len(), 4, "thanks, and three others: {after:?}");
+}
+
+#[test]
+fn worker_that_is_cleared_goes_on_when_a_fresh_one_comes() {
+    let (mut bench, suspect) = suspected_beside_a_worker(6);
+    let (busy_with, held) = bench.core.members.get(A).unwrap().leases.iter().next().map(|(n, h)| (*n, *h)).unwrap();
+    bench.start(A, busy_with.0, held.attempt);
+    assert_eq!(bench.live(2000, &[A]).len(), 2);
+    let fresh = bench.join(C, 1);
+    assert_eq!(fresh[0], format!("worker 3 gets {}.2", suspect.0));
+    assert_eq!(fresh[1..].iter().filter(|said| said.starts_with("worker 1 gets")).count(), 2, "{fresh:?}");
 }
 
 #[test]
