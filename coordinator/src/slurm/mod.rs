@@ -1,7 +1,10 @@
 //! A batch as a job of Slurm (design section 8, "Beyond one machine"): the job script with the command line in it, and its
 //! submission. Where the job runs, with how much and until when, is Slurm's to say, and its options are passed on as they are.
 
+mod command_line;
 mod script;
+
+pub use command_line::command_line;
 
 use crate::cli::Exit;
 use anyhow::{Context, bail};
@@ -35,6 +38,21 @@ pub struct Submitted {
     pub script: PathBuf,
     /// Where the job's messages go.
     pub log: PathBuf,
+}
+
+impl Submitted {
+    /// What the user can do now, for stderr.
+    #[must_use]
+    pub fn advice(&self) -> String {
+        let (job, log) = (&self.job, self.log.display());
+        let out = self.script.parent().unwrap_or(&self.script).display();
+        format!(
+            "job {job} is submitted\n\
+             squeue --jobs={job} tells where it is, lookalike status {out} how far; it writes to {log}\n\
+             scancel {job} ends it; sbatch {} goes on with it",
+            self.script.display()
+        )
+    }
 }
 
 impl SlurmJob {

@@ -73,7 +73,10 @@ fn submitted_job_has_its_number_and_its_script() {
     let mut job = job(&out);
     job.folder = folder.path().to_owned();
     let submitted = job.submit(&sbatch(folder.path(), said)).unwrap();
-    assert_eq!((submitted.job.as_str(), submitted.log), ("4711", out.join("slurm-4711.out")));
+    assert_eq!((submitted.job.as_str(), &submitted.log), ("4711", &out.join("slurm-4711.out")));
+    for words in ["squeue --jobs=4711", "scancel 4711", &format!("lookalike status {}", out.display())] {
+        assert!(submitted.advice().contains(words), "{}", submitted.advice());
+    }
     assert_eq!(fs::read_to_string(submitted.script).unwrap(), job.script().unwrap());
 }
 
