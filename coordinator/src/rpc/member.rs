@@ -84,11 +84,11 @@ async fn write(
                     parcel.add_blob(&blob, &mut writer).await?;
                     pending_blobs.fetch_sub(1, Ordering::Relaxed);
                 }
+                Outgoing::NoBlob => _ = pending_blobs.fetch_sub(1, Ordering::Relaxed),
             }
             if parcel.is_full() {
                 parcel.send(&mut writer).await?;
             }
-            Outgoing::NoBlob => _ = pending_blobs.fetch_sub(1, Ordering::Relaxed),
         }
         parcel.send(&mut writer).await?;
     }
