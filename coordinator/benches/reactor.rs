@@ -22,7 +22,8 @@ impl Planner for Independent {
     fn start(&mut self, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
         (0..NODES).try_for_each(|number| {
             let (kind, label, parameters) = ("nothing".into(), format!("node {number}"), number.to_le_bytes().to_vec());
-            let spec = NodeSpec { kind, label, parameters, inputs: Vec::new(), placement: Placement::Worker };
+            let spec =
+                NodeSpec { kind, label, parameters, inputs: Vec::new(), placement: Placement::Worker, priority: 0 };
             graph.add_node(spec).map(|_| ())
         })
     }

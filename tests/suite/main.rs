@@ -14,6 +14,8 @@ mod cli;
 mod cluster;
 mod compare;
 mod crowd;
+#[cfg(unix)]
+mod deploy;
 mod faults;
 mod fit;
 mod hostile;

@@ -105,7 +105,7 @@ impl Planner for Rounds {
 /// A node that nobody waits for, unlike any other.
 pub(super) fn node(kind: &str, number: u64) -> NodeSpec {
     let (label, parameters) = (format!("{kind} {number}"), number.to_le_bytes().to_vec());
-    NodeSpec { kind: kind.into(), label, parameters, inputs: Vec::new(), placement: Placement::Worker }
+    NodeSpec { kind: kind.into(), label, parameters, inputs: Vec::new(), placement: Placement::Worker, priority: 0 }
 }
 
 /// The processor time that somebody has used.
