@@ -5,6 +5,7 @@ mod job_script;
 mod kubernetes;
 #[cfg(feature = "slow")]
 mod slurm;
+mod submission;
 
 use std::path::PathBuf;
 

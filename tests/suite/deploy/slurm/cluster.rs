@@ -61,10 +61,17 @@ impl Cluster {
         command.arg(super::super::source("deploy/slurm/lookalike.sbatch")).args(line.split_whitespace());
         command.current_dir(folder).env("LOOKALIKE", env!("CARGO_BIN_EXE_lookalike-under-test"));
         command.env("LOOKALIKE_ADVERTISE", "localhost").env_remove("RUST_LOG");
-        let output = Process::start(&mut command).output();
-        let number = String::from_utf8(output.stdout).unwrap().trim().to_owned();
-        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        let number = number(command);
         Job::follow(number.clone(), &self.folder.path().join(format!("job-{number}.out")))
+    }
+
+    /// Lets the program submit itself, and follows the job's messages in its folder of results.
+    pub(super) fn submit_with_the_program(&self, folder: &Path, line: &str, out: &str) -> Job {
+        let mut command = self.command(env!("CARGO_BIN_EXE_lookalike-under-test"));
+        command.args(line.split_whitespace()).current_dir(folder);
+        command.env("LOOKALIKE_ADVERTISE", "localhost").env_remove("RUST_LOG");
+        let number = number(command);
+        Job::follow(number.clone(), &folder.join(out).join(format!("slurm-{number}.out")))
     }
 
     /// Kills a node with all that runs on it, as a power cut would.
@@ -192,6 +199,13 @@ impl Drop for Lines {
         let _ = Command::new("kill").arg(self.follower.id().to_string()).status();
         let _ = self.follower.wait();
     }
+}
+
+/// The number of the job that this submits.
+fn number(mut command: Command) -> String {
+    let output = Process::start(&mut command).output();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    String::from_utf8(output.stdout).unwrap().trim().to_owned()
 }
 
 fn start_munged(folder: &Path) -> Child {
