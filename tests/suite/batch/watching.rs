@@ -8,6 +8,7 @@ use std::{
     io::{Read, Write},
     net::TcpStream,
     process::{Command, Output},
+    time::{Duration, Instant},
 };
 use tempfile::TempDir;
 
@@ -86,27 +87,35 @@ fn metrics_tell_what_waits_for_workers() {
         folder(&format!("photos = ['photo.exr', 'red.exr']\nenvironments = 'map.exr'\n{models}\n[defaults]\n{QUICK}"));
     let process = start(&folder, "--workers 0 --metrics 0");
     let coordinator = process.id();
+    let samples = [
+        "lookalike_workers 0",
+        "lookalike_fits{state=\"waiting\"} 2",
+        "lookalike_fits{state=\"running\"} 2",
+        "lookalike_fits{state=\"done\"} 0",
+    ];
+    let has = |page: &str, sample: &str| page.lines().any(|line| line == sample);
     let (mut address, mut page) = (None, None);
     let (output, events) = process.watch_stderr(|events| {
         let event = &events[events.len() - 1];
         if let Some(text) = event["text"].as_str().and_then(|text| text.strip_prefix("metrics at http://")) {
             address = text.strip_suffix("/metrics").map(str::to_owned);
         }
-        // Both fits have begun before anybody is told of their nodes.
+        // The other fit is about to begin.
         if page.is_none() && is(event, "node-added") {
-            page = Some(scrape(address.as_deref().expect("an address")));
+            let address = address.as_deref().expect("an address");
+            let patience = Instant::now() + Duration::from_secs(60);
+            let mut last = scrape(address);
+            while !samples.iter().all(|sample| has(&last, sample)) && Instant::now() < patience {
+                last = scrape(address);
+            }
+            page = Some(last);
             signal(coordinator, "INT");
         }
     });
     assert_eq!(output.status.code(), Some(130), "{events:?}");
     let page = page.unwrap();
-    for sample in [
-        "lookalike_workers 0",
-        "lookalike_fits{state=\"waiting\"} 2",
-        "lookalike_fits{state=\"running\"} 2",
-        "lookalike_fits{state=\"done\"} 0",
-    ] {
-        assert!(page.lines().any(|line| line == sample), "{sample} in:\n{page}");
+    for sample in samples {
+        assert!(has(&page, sample), "{sample} in:\n{page}");
     }
     let text = fs::read_to_string(folder.path().join("out/summary.json")).unwrap();
     assert!(text.contains("\"state\": \"stopped\"") && !text.contains("\"state\": \"running\""), "{text}");
