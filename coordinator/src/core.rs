@@ -11,6 +11,7 @@ use std::time::Duration;
 use lookalike::graph::{Blob, Graph, NodeId, NodeKey, WorkerId};
 
 pub(crate) use self::members::{Held, Member, Members};
+use self::members::{Size, weight};
 use self::pace::Pace;
 pub(crate) use self::waiting::{Place, Waiting};
 use crate::comm::{NodeName, Site};
@@ -65,6 +66,8 @@ pub struct Core {
     pub(crate) pace: Pace,
     /// When a node will be slow for which a worker has nothing else to do.
     pub(crate) next_slow: Option<Duration>,
+    /// When a worker whose short nodes were left to it has not got on with them for too long.
+    pub(crate) next_move: Option<Duration>,
     /// When a suspect's patience ends.
     pub(crate) next_patience: Option<Duration>,
     /// The worker that is being cleared for a suspect.
@@ -152,6 +155,7 @@ impl Core {
             members: Members::new(policy.spare_leases),
             pace: Pace::default(),
             next_slow: None,
+            next_move: None,
             next_patience: None,
             clearing: None,
             unexplained: VecDeque::new(),
@@ -192,7 +196,13 @@ impl Core {
     pub fn next_deadline(&self) -> Option<Duration> {
         let limit = self.starvation_limit();
         let starvation = self.starving.map(|starving| starving.next_reminder.min(starving.since + limit));
-        let delays = [self.members.next_deadline(), self.waiting.next_rested(), self.next_slow, self.next_patience];
+        let delays = [
+            self.members.next_deadline(),
+            self.waiting.next_rested(),
+            self.next_slow,
+            self.next_move,
+            self.next_patience,
+        ];
         delays.into_iter().flatten().chain(starvation).min()
     }
 
@@ -241,10 +251,12 @@ impl Core {
     /// A worker gets a lease of a node.
     pub(crate) fn give(&mut self, worker: WorkerId, node: NodeId, attempt: u32, now: Duration) {
         let inputs = self.graph.input_blobs(node).unwrap_or_default();
-        let parameters = self.graph.spec(node).map_or(0, |spec| spec.parameters.len());
+        let spec = self.graph.spec(node);
+        let parameters = spec.map_or(0, |spec| spec.parameters.len());
         let bytes = parameters + inputs.len() * size_of::<[u8; 32]>();
+        let size = Size { bytes, time: weight(spec.and_then(|spec| self.pace.usual(&spec.kind))) };
         self.members.change(worker, |member| {
-            member.give(node, attempt, bytes, now);
+            member.give(node, attempt, size, now);
             member.readable.extend(inputs.iter().map(Blob::hash));
         });
         if let Some(record) = self.record(node) {

@@ -23,6 +23,7 @@ pub mod recall;
 mod rpc;
 pub mod runner;
 pub mod settings;
+pub mod slurm;
 pub mod spawn;
 pub mod tls;
 

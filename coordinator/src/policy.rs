@@ -13,7 +13,8 @@ pub struct Policy {
     /// A worker that was not heard of for this long is lost, and so is one that reads nothing for this long while something
     /// waits to be read by it (default 5 s, at least two heartbeats).
     pub lost_after: Duration,
-    /// How many leases a worker holds beyond its threads, so that it never waits for the next one (default 2).
+    /// How many leases a worker holds beyond its threads, so that it never waits for the next one (default 2); more of nodes that
+    /// take less than a millisecond.
     pub spare_leases: usize,
     /// After so many deaths of workers that were executing a node, the node is a suspect and runs alone on a fresh worker
     /// (default 2).

@@ -2,9 +2,9 @@
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::mpsc::{Receiver, channel};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::thread::JoinHandle;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use lookalike::protocol::Access;
 use lookalike_coordinator::comm::RunEvent;
@@ -74,6 +74,21 @@ impl Cluster {
         }
     }
 
+    /// Watch for so long that nothing happens that `pick` takes.
+    ///
+    /// # Panics
+    /// When it does, or the run ends.
+    pub fn assert_none_for(&self, time: Duration, mut pick: impl FnMut(&RunEvent) -> bool) {
+        let until = Instant::now() + time;
+        loop {
+            match self.events.recv_timeout(until.saturating_duration_since(Instant::now())) {
+                Ok(event) => assert!(!pick(&event), "{event:?}"),
+                Err(RecvTimeoutError::Timeout) => return,
+                Err(RecvTimeoutError::Disconnected) => panic!("the run has ended"),
+            }
+        }
+    }
+
     /// Wait until the coordinator listens, and return where.
     pub fn address(&self) -> String {
         self.wait_for(|event| match event {
@@ -113,8 +128,8 @@ impl Cluster {
         loop {
             match self.events.recv_timeout(PATIENCE) {
                 Ok(event) => rest.push(event),
-                Err(std::sync::mpsc::RecvTimeoutError::Disconnected) => break,
-                Err(std::sync::mpsc::RecvTimeoutError::Timeout) => panic!("the run does not end: {rest:?}"),
+                Err(RecvTimeoutError::Disconnected) => break,
+                Err(RecvTimeoutError::Timeout) => panic!("the run does not end: {rest:?}"),
             }
         }
         (rest, self.thread.join().expect("a run that does not panic"))

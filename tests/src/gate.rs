@@ -1,7 +1,8 @@
 //! The test's end of `gate` nodes.
 
 use std::io::{ErrorKind, Read, Write};
-use std::net::{SocketAddr, TcpListener, TcpStream};
+use std::net::{IpAddr, Ipv4Addr, SocketAddr, TcpListener, TcpStream};
+use std::thread::JoinHandle;
 
 /// Where `gate` nodes wait.
 #[derive(Debug)]
@@ -23,7 +24,16 @@ impl Gate {
     /// When the system has no free port.
     #[must_use]
     pub fn new() -> Self {
-        Self { listener: TcpListener::bind("127.0.0.1:0").expect("a free port") }
+        Self::at(Ipv4Addr::LOCALHOST.into())
+    }
+
+    /// A gate at another address of this machine, which workers elsewhere reach.
+    ///
+    /// # Panics
+    /// When the address is not this machine's.
+    #[must_use]
+    pub fn at(address: IpAddr) -> Self {
+        Self { listener: TcpListener::bind((address, 0)).expect("a free port") }
     }
 
     /// The parameters of `gate` nodes.
@@ -57,6 +67,41 @@ impl Gate {
         let mut process = [0; 4];
         stream.read_exact(&mut process).expect("the process id of the node");
         Waiting { stream, process: u32::from_le_bytes(process) }
+    }
+}
+
+/// Somebody who stands at the gate until told to go.
+#[derive(Debug)]
+pub struct Keeper {
+    address: SocketAddr,
+    thread: JoinHandle<()>,
+}
+
+/// What a keeper's own process says instead of a process id.
+const LEAVE: u32 = 0;
+
+impl Gate {
+    /// Let somebody decide about every node that comes, in a thread of its own.
+    #[must_use]
+    pub fn keep(self, mut decide: impl FnMut(Waiting) + Send + 'static) -> Keeper {
+        let address = self.address();
+        let keep = move || {
+            let arrivals = std::iter::from_fn(|| Some(self.next()).filter(|waiting| waiting.process != LEAVE));
+            arrivals.for_each(&mut decide);
+        };
+        Keeper { address, thread: std::thread::spawn(keep) }
+    }
+}
+
+impl Keeper {
+    /// Let nobody pass any more.
+    ///
+    /// # Panics
+    /// When the keeper has panicked.
+    pub fn stop(self) {
+        let mut stream = TcpStream::connect(self.address).expect("a keeper");
+        stream.write_all(&LEAVE.to_le_bytes()).expect("a keeper");
+        self.thread.join().expect("a keeper that does not panic");
     }
 }
 

@@ -1,5 +1,6 @@
 //! What the journal of a run says, read as anybody could read it.
 
+use std::fs::OpenOptions;
 use std::path::Path;
 
 use rusqlite::types::FromSql;
@@ -44,8 +45,38 @@ impl JournalView {
     #[must_use]
     pub fn run_twice(&self) -> u64 {
         self.number(
-            "SELECT count(*) FROM nodes earlier JOIN nodes later ON earlier.key = later.key AND earlier.epoch < later.epoch
-             WHERE earlier.state IN (3, 4) AND (later.attempts > 0 OR later.state NOT IN (3, 4))",
+            "SELECT count(DISTINCT later.key) FROM results JOIN node_list later
+                 ON lower(hex(results.key)) = later.key AND results.epoch < later.epoch
+             WHERE later.attempts > 0 OR later.state <> 'recalled'",
         )
     }
+}
+
+/// Tear the end off the log of a journal whose process is gone, as a machine may that loses its power: this share of it is left. How
+/// many bytes are.
+///
+/// # Panics
+/// When there is no log.
+#[must_use]
+pub fn tear(folder: &Path, share: f64) -> u64 {
+    let log = OpenOptions::new().write(true).open(folder.join("run.sqlite-wal")).expect("the log of a journal");
+    let length = log.metadata().expect("a length").len();
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of what there is")]
+    let left = (length as f64 * share.clamp(0.0, 1.0)) as u64;
+    log.set_len(left).expect("a file of ours");
+    left
+}
+
+/// Damage the bytes of one of the outputs in a journal whose process is gone; `false` if there is none.
+///
+/// # Panics
+/// When there is no journal.
+#[must_use]
+pub fn damage_an_output(folder: &Path, choice: u64) -> bool {
+    let journal = Connection::open(folder.join("run.sqlite")).expect("a journal");
+    let count = "SELECT count(*) FROM results WHERE length(bytes) > 0";
+    let outputs: u64 = journal.query_row(count, [], |row| row.get(0)).expect("results");
+    let damage = "UPDATE results SET bytes = zeroblob(length(bytes)) WHERE id =
+         (SELECT id FROM results WHERE length(bytes) > 0 ORDER BY id LIMIT 1 OFFSET ?1)";
+    outputs > 0 && journal.execute(damage, [choice % outputs]).expect("a journal that can be written") == 1
 }

@@ -3,13 +3,47 @@
 use std::io::{Read, Write};
 use std::net::TcpStream;
 use std::path::Path;
+use std::sync::Arc;
 
+use lookalike::fit::nodes;
 use lookalike::graph::{Blob, BlobHash, NodeFailure, NodeType, Registry, RunContext};
 
 /// All of them.
 #[must_use]
 pub fn registry() -> Registry {
     Registry::default().with(Digest).with(Grow).with(Fail).with(Panic).with(Abort).with(Gate)
+}
+
+/// Those of fits, but that the outputs of one kind are wrong by one bit.
+#[must_use]
+pub fn lying_registry(kind: &str) -> Registry {
+    let honest = nodes::registry();
+    let kinds: Vec<_> = honest.kinds().collect();
+    let honest = Arc::new(honest);
+    kinds.into_iter().fold(Registry::default(), |registry, other| {
+        registry.with(Perhaps { kind: other, honest: Arc::clone(&honest), lies: other == kind })
+    })
+}
+
+/// A node type of fits, perhaps wrong.
+struct Perhaps {
+    kind: &'static str,
+    honest: Arc<Registry>,
+    lies: bool,
+}
+
+impl NodeType for Perhaps {
+    fn kind(&self) -> &'static str {
+        self.kind
+    }
+
+    fn run(&self, parameters: &[u8], inputs: &[Blob], context: &RunContext) -> Result<Vec<u8>, NodeFailure> {
+        let mut output = self.honest.run(self.kind, parameters, inputs, context)?.to_vec();
+        // Outputs are mostly numbers: one of them is another one now.
+        let middle = output.len() / 2;
+        output.get_mut(middle).into_iter().for_each(|byte| *byte ^= u8::from(self.lies));
+        Ok(output)
+    }
 }
 
 /// The hash of parameters and inputs: 32 bytes that depend on every bit and on the order.

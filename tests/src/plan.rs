@@ -34,6 +34,16 @@ pub enum Leaves {
         /// The file.
         marker: String,
     },
+    /// So many nodes that wait at a gate, and perhaps one more, `murderer`, that always aborts its process. Whatever fails, the others
+    /// go on, and the result is that of those that complete.
+    Mob {
+        /// How many wait at the gate.
+        innocents: usize,
+        /// Whether there is a murderer.
+        has_murderer: bool,
+        /// Where the gate is.
+        address: String,
+    },
     /// So many nodes that abort whatever process they run in, and a planner that does without them; then a digest of nothing.
     Killers {
         /// How many.
@@ -84,6 +94,19 @@ impl TestPlanner {
     }
 }
 
+impl TestPlanner {
+    /// When the last leaf is done, their digest is next.
+    fn leaf_is_done(&mut self, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
+        self.open_leaves -= 1;
+        if self.open_leaves == 0 {
+            let inputs = self.nodes.iter().map(|leaf| Input::OutputOf(*leaf)).collect();
+            let digest = node("digest", "of all leaves", vec![], inputs);
+            self.digest = Some(graph.add_node(NodeSpec { placement: Placement::Coordinator, ..digest })?);
+        }
+        Ok(())
+    }
+}
+
 impl Planner for TestPlanner {
     fn start(&mut self, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
         let (kind, parameters, shared_bytes) = match &self.leaves {
@@ -93,6 +116,9 @@ impl Planner for TestPlanner {
             }
             Leaves::Large { bytes } => ("grow", vec![(*bytes as u64).to_le_bytes().to_vec(); 2], *bytes),
             Leaves::Gates { count, address } => {
+                ("gate", (0..*count).map(|leaf| format!("{address}#{leaf}").into_bytes()).collect(), 0)
+            }
+            Leaves::Mob { innocents: count, address, .. } => {
                 ("gate", (0..*count).map(|leaf| format!("{address}#{leaf}").into_bytes()).collect(), 0)
             }
             Leaves::Abort { marker } => ("abort", vec![marker.clone().into_bytes()], 0),
@@ -109,13 +135,16 @@ impl Planner for TestPlanner {
             let placement = if is_here { Placement::Coordinator } else { Placement::Worker };
             self.nodes.push(graph.add_node(NodeSpec { placement, ..leaf })?);
         }
+        if matches!(self.leaves, Leaves::Mob { has_murderer: true, .. }) {
+            self.nodes.push(graph.add_node(node("abort", "murderer", vec![], vec![]))?);
+        }
         self.open_leaves = self.nodes.len();
         Ok(())
     }
 
     fn completed(&mut self, node_id: NodeId, output: &Blob, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
         if self.nodes.contains(&node_id) {
-            self.leaf_is_done(self.nodes.clone(), graph)?;
+            self.leaf_is_done(graph)?;
         } else if self.digest == Some(node_id) {
             graph.add_node(node("digest", "last", b"last".to_vec(), vec![Input::OutputOf(node_id)]))?;
         } else {
@@ -124,25 +153,13 @@ impl Planner for TestPlanner {
         Ok(())
     }
 
-    fn failed(&mut self, node: NodeId, reason: &FailureReason, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
-        if matches!(self.leaves, Leaves::Killers { .. }) {
-            return self.leaf_is_done(Vec::new(), graph);
+    fn failed(&mut self, id: NodeId, reason: &FailureReason, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
+        if matches!(self.leaves, Leaves::Mob { .. } | Leaves::Killers { .. }) {
+            self.nodes.retain(|leaf| *leaf != id);
+            return self.leaf_is_done(graph);
         }
-        let (kind, label) = graph.spec(node).map(|spec| (spec.kind.clone(), spec.label.clone())).unwrap_or_default();
+        let (kind, label) = graph.spec(id).map(|spec| (spec.kind.clone(), spec.label.clone())).unwrap_or_default();
         Err(PlanError::NodeFailed { kind, label, reason: reason.clone() })
-    }
-}
-
-impl TestPlanner {
-    /// Once all leaves are done, digest the outputs of these.
-    fn leaf_is_done(&mut self, leaves: Vec<NodeId>, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
-        self.open_leaves -= 1;
-        if self.open_leaves == 0 {
-            let inputs = leaves.into_iter().map(Input::OutputOf).collect();
-            let digest = node("digest", "of all leaves", vec![], inputs);
-            self.digest = Some(graph.add_node(NodeSpec { placement: Placement::Coordinator, ..digest })?);
-        }
-        Ok(())
     }
 }
 

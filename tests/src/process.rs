@@ -1,8 +1,9 @@
 //! Real processes: to signal them, and to wait for them without ever hanging a test for good.
 
 use serde_json::Value;
-use std::io::{BufRead, BufReader};
+use std::io::{BufRead, BufReader, Write};
 use std::process::{Child, Command, Output, Stdio};
+use std::sync::mpsc::{Receiver, channel};
 
 /// A process that is killed when the test forgets it.
 #[derive(Debug)]
@@ -36,6 +37,32 @@ impl Process {
             let line = line.expect("lines of text");
             pick(&serde_json::from_str(&line).unwrap_or(Value::String(line)))
         })
+    }
+
+    /// Read its stderr in a thread of its own, each line as JSON where it is JSON, for as long as it or another process that shares it
+    /// lives. What is read is copied to `log`.
+    ///
+    /// # Panics
+    /// When it is watched already.
+    pub fn follow_stderr(&mut self, mut log: impl Write + Send + 'static) -> Receiver<Value> {
+        let stderr = self.0.as_mut().and_then(|child| child.stderr.take()).expect("a process that is watched once");
+        let (sender, lines) = channel();
+        std::thread::spawn(move || {
+            for line in BufReader::new(stderr).lines().map_while(Result::ok) {
+                // The log is for whoever looks into a failure, and nobody may listen any more.
+                let _ = writeln!(log, "{line}");
+                let _ = sender.send(serde_json::from_str(&line).unwrap_or(Value::String(line)));
+            }
+        });
+        lines
+    }
+
+    /// Whether it has ended.
+    ///
+    /// # Panics
+    /// When the system does not tell.
+    pub fn has_ended(&mut self) -> bool {
+        self.0.as_mut().is_none_or(|child| child.try_wait().expect("a child of ours").is_some())
     }
 
     /// Kill it with SIGKILL, and wait until it is gone. Processes that it has started are not.

@@ -4,8 +4,10 @@
 //!   lookalike-test-cluster worker --access FILE ...
 //!   lookalike-test-cluster gates COUNT ADDRESS WORKERS ACCESS_FILE [STRANGERS]
 //!   lookalike-test-cluster resume COUNT ADDRESS WORKERS ACCESS_FILE
+//!   lookalike-test-cluster liar KIND --access FILE ...
 //! ```
-//! `resume` keeps a journal beside the access file, or goes on with the run in it.
+//! `resume` keeps a journal beside the access file, or goes on with the run in it. `liar` is a worker for fits whose outputs of one
+//! kind of node are wrong by one bit.
 
 use std::io::Write;
 use std::path::Path;
@@ -16,7 +18,7 @@ use lookalike_coordinator::journal::{JOURNAL_FILE, JournalOptions, RunIdentity};
 use lookalike_coordinator::limits::Limits;
 use lookalike_coordinator::runner::{RunError, RunnerOptions, run};
 
-use crate::nodes::registry;
+use crate::nodes::{lying_registry, registry};
 use crate::plan::{Leaves, TestPlanner};
 
 /// The program.
@@ -25,6 +27,12 @@ pub fn main() -> ExitCode {
     let arguments: Vec<_> = std::env::args_os().collect();
     if arguments.get(1).is_some_and(|command| command == "worker") {
         return lookalike_worker::main_from(arguments.into_iter().skip(1), registry());
+    }
+    if let [_, command, kind, rest @ ..] = &arguments[..]
+        && command == "liar"
+    {
+        let arguments = arguments.iter().take(1).chain(rest).cloned();
+        return lookalike_worker::main_from(arguments, lying_registry(&kind.to_string_lossy()));
     }
     let arguments: Vec<_> = arguments.iter().map(|argument| argument.to_string_lossy().into_owned()).collect();
     let mut limits = Limits::default();

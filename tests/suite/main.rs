@@ -9,9 +9,13 @@
 mod access;
 mod bad_input;
 mod batch;
+mod chaos;
 mod cli;
 mod cluster;
 mod compare;
+mod crowd;
+#[cfg(unix)]
+mod deploy;
 mod faults;
 mod fit;
 mod hostile;

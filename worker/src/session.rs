@@ -21,7 +21,7 @@ use crate::execute::{Completed, Executor};
 use crate::options::WorkerOptions;
 use crate::tasks::{Action, Tasks};
 use crate::tls::{self, TlsError, Transport};
-use crate::wire::{Incoming, Received, WireError, greet_coordinator, send_message, send_parts};
+use crate::wire::{Incoming, Parcel, Received, WireError, greet_coordinator, is_small, send_message};
 
 /// How long connecting and greeting may take.
 const GREETING_TIME: Duration = Duration::from_secs(10);
@@ -310,28 +310,47 @@ enum Outgoing {
 
 type Writing = JoinHandle<Result<(), WireError>>;
 
+/// How much of the queue is written at a time.
+const WRITTEN_TOGETHER: usize = 256;
+
 /// Write in a task of its own: a large output must not keep the worker from reading, nor the other way round.
-fn start_writing(mut writer: Writer) -> (UnboundedSender<Outgoing>, UnboundedReceiver<u64>, Writing) {
-    let (outgoing, mut queue) = unbounded_channel();
+fn start_writing(writer: Writer) -> (UnboundedSender<Outgoing>, UnboundedReceiver<u64>, Writing) {
+    let (outgoing, queue) = unbounded_channel();
     let (written, announced) = unbounded_channel();
-    let writing = tokio::spawn(async move {
-        while let Some(next) = queue.recv().await {
-            match next {
-                Outgoing::Message(message) => send_message(&mut writer, &message).await?,
-                Outgoing::Announce(message, serial) => {
-                    send_message(&mut writer, &message).await?;
-                    let _ = written.send(serial);
-                }
-                Outgoing::Output(message, output) => {
-                    send_message(&mut writer, &message).await?;
-                    send_parts(&mut writer, &output).await?;
-                }
+    (outgoing, announced, tokio::spawn(write(writer, queue, written)))
+}
+
+/// Write what is queued, together what came together: the output of a node and the start of the next leave in one packet.
+async fn write(
+    mut writer: Writer,
+    mut queue: UnboundedReceiver<Outgoing>,
+    written: UnboundedSender<u64>,
+) -> Result<(), WireError> {
+    let (mut together, mut parcel, mut serials) = (Vec::new(), Parcel::default(), Vec::new());
+    while queue.recv_many(&mut together, WRITTEN_TOGETHER).await > 0 {
+        for next in together.drain(..) {
+            let (message, serial, output) = match next {
+                Outgoing::Message(message) => (message, None, None),
+                Outgoing::Announce(message, serial) => (message, Some(serial), None),
+                Outgoing::Output(message, output) => (message, None, Some(output)),
+            };
+            parcel.add(&message)?;
+            serials.extend(serial);
+            let is_large = output.as_ref().is_some_and(|output| !is_small(output));
+            if parcel.is_full() || is_large {
+                // Nobody shall wait for a large output who is to begin.
+                parcel.send(&mut writer).await?;
+                serials.drain(..).for_each(|serial| _ = written.send(serial));
+            }
+            if let Some(output) = output {
+                parcel.add_blob(&output, &mut writer).await?;
             }
         }
-        writer.shutdown().await?;
-        Ok(())
-    });
-    (outgoing, announced, writing)
+        parcel.send(&mut writer).await?;
+        serials.drain(..).for_each(|serial| _ = written.send(serial));
+    }
+    writer.shutdown().await?;
+    Ok(())
 }
 
 /// Wait until then; for ever if there is no then.

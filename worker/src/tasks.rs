@@ -38,8 +38,10 @@ pub(crate) struct Tasks {
     fetching: BTreeSet<BlobHash>,
     /// Nothing more begins.
     is_draining: bool,
+    /// Those whose inputs are there, in the order in which they came; also some that have gone since.
+    ready: BTreeMap<u64, Place>,
     /// Executions, by serial number, that use a thread: also those whose task is gone.
-    running: BTreeSet<u64>,
+    running: BTreeMap<u64, Place>,
     next_serial: u64,
 }
 
@@ -83,7 +85,8 @@ impl Tasks {
             tasks: BTreeMap::new(),
             fetching: BTreeSet::new(),
             is_draining: false,
-            running: BTreeSet::new(),
+            ready: BTreeMap::new(),
+            running: BTreeMap::new(),
             next_serial: 0,
         }
     }
@@ -150,6 +153,9 @@ impl Tasks {
             }
         }
         let arrival = self.serial();
+        if inputs.iter().all(Option::is_some) {
+            self.ready.insert(arrival, place(lease));
+        }
         self.tasks.insert(place(lease), Task { lease, key, stage: Stage::Gathering { assignment, inputs, arrival } });
         actions.extend(self.begin(new_context));
         actions
@@ -157,17 +163,21 @@ impl Tasks {
 
     /// If an earlier coordinator gave us what this one gives us under a new lease, go on with that.
     fn take_over(&mut self, lease: LeaseName, key: NodeKey) {
-        let is_same = |(_, task): &(&Place, &Task)| task.lease.epoch < lease.epoch && task.key == key;
-        let earlier = self.tasks.iter().find(is_same).map(|(place, _)| *place);
+        let mut earlier = self.tasks.range(..(lease.epoch, 0));
+        let earlier = earlier.find(|(_, task)| task.key == key).map(|(place, _)| *place);
         if let Some(task) = earlier.and_then(|earlier| self.tasks.remove(&earlier)) {
+            if let Some(serial) = task.serial() {
+                self.running.insert(serial, place(lease));
+            }
             self.tasks.insert(place(lease), task);
         }
     }
 
     /// The "started" of this execution is on the wire.
     pub(crate) fn announced(&mut self, serial: u64) -> Vec<Action> {
-        let is_meant = |task: &&mut Task| matches!(&task.stage, Stage::Announcing(job) if job.serial == serial);
-        let Some(task) = self.tasks.values_mut().find(is_meant) else {
+        let is_meant = |task: &&mut Task| task.serial() == Some(serial);
+        let place = self.running.get(&serial);
+        let Some(task) = place.and_then(|place| self.tasks.get_mut(place)).filter(is_meant) else {
             return Vec::new();
         };
         let Stage::Announcing(Job { context, .. }) = &task.stage else {
@@ -183,10 +193,13 @@ impl Tasks {
     /// A fetched blob has come.
     pub(crate) fn fetched(&mut self, blob: Blob, new_context: impl Fn() -> RunContext) -> Vec<Action> {
         self.fetching.remove(&blob.hash());
-        for task in self.tasks.values_mut() {
-            let Stage::Gathering { assignment, inputs, .. } = &mut task.stage else { continue };
-            let missing = assignment.inputs.iter().zip(inputs).filter(|(hash, _)| **hash == blob.hash().0);
+        for (place, task) in &mut self.tasks {
+            let Stage::Gathering { assignment, inputs, arrival } = &mut task.stage else { continue };
+            let missing = assignment.inputs.iter().zip(&mut *inputs).filter(|(hash, _)| **hash == blob.hash().0);
             missing.for_each(|(_, input)| *input = Some(blob.clone()));
+            if inputs.iter().all(Option::is_some) {
+                self.ready.insert(*arrival, *place);
+            }
         }
         self.cache.insert(blob);
         self.begin(new_context)
@@ -194,11 +207,10 @@ impl Tasks {
 
     /// An execution has ended.
     pub(crate) fn completed(&mut self, completed: Completed, new_context: impl Fn() -> RunContext) -> Vec<Action> {
-        self.running.remove(&completed.serial);
-        let is_meant =
-            |task: &&mut Task| matches!(task.stage, Stage::Executing { serial, .. } if serial == completed.serial);
+        let place = self.running.remove(&completed.serial);
+        let is_meant = |task: &&mut Task| task.serial() == Some(completed.serial);
         let mut actions = Vec::new();
-        if let Some(task) = self.tasks.values_mut().find(is_meant) {
+        if let Some(task) = place.and_then(|place| self.tasks.get_mut(&place)).filter(is_meant) {
             task.stage = Stage::Answered(completed.result);
             actions.extend(task.answer());
         }
@@ -258,20 +270,21 @@ impl Tasks {
     /// Give free threads to the nodes that came first among those whose inputs are there.
     fn begin(&mut self, new_context: impl Fn() -> RunContext) -> Vec<Action> {
         let mut actions = Vec::new();
-        let mut gathering: Vec<_> = self.tasks.values().filter_map(Task::gathering).collect();
-        gathering.sort_unstable();
-        for (_, place) in gathering {
-            if self.running.len() >= self.threads {
-                break;
-            }
+        while self.running.len() < self.threads
+            && let Some((came, place)) = self.ready.pop_first()
+        {
             let serial = self.serial();
             let Some(task) = self.tasks.get_mut(&place) else { continue };
-            let Stage::Gathering { assignment, inputs, .. } = &mut task.stage else { continue };
+            let Stage::Gathering { assignment, inputs, arrival } = &mut task.stage else { continue };
+            // It was cancelled, and given to us again.
+            if *arrival != came {
+                continue;
+            }
             let Some(inputs) = inputs.iter().cloned().collect::<Option<Vec<_>>>() else { continue };
             let kind = std::mem::take(&mut assignment.kind);
             let parameters = std::mem::take(&mut assignment.parameters);
             task.stage = Stage::Announcing(Job { serial, kind, parameters, inputs, context: new_context() });
-            self.running.insert(serial);
+            self.running.insert(serial, place);
             actions.push(Action::Announce { lease: task.lease, serial });
         }
         actions
@@ -296,10 +309,12 @@ impl Task {
         }
     }
 
-    fn gathering(&self) -> Option<(u64, Place)> {
+    /// Which execution this is, while it is one.
+    fn serial(&self) -> Option<u64> {
         match &self.stage {
-            Stage::Gathering { arrival, .. } => Some((*arrival, place(self.lease))),
-            _ => None,
+            Stage::Announcing(job) => Some(job.serial),
+            Stage::Executing { serial, .. } => Some(*serial),
+            Stage::Gathering { .. } | Stage::Answered(_) => None,
         }
     }
 }

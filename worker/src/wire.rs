@@ -18,6 +18,9 @@ use crate::tls::TlsError;
 /// How much is read at a time.
 const READ_BYTES: usize = 64 << 10;
 
+/// How much is written at a time, large blobs apart.
+const PARCEL_BYTES: usize = 32 << 10;
+
 /// A connection that cannot go on.
 #[derive(Debug, Error)]
 #[non_exhaustive]
@@ -138,26 +141,73 @@ impl<R: AsyncRead + Unpin> Incoming<R> {
 /// # Errors
 /// When the stream fails or the message does not fit into a frame.
 pub async fn send_message<T: Serialize>(stream: &mut (impl AsyncWrite + Unpin), message: &T) -> Result<(), WireError> {
-    let body = encode_message(message)?;
-    let header = frame_header(FrameTag::Message, body.len())?;
-    // One write: a small message leaves in one packet.
-    stream.write_all(&[&header, body.as_slice()].concat()).await?;
-    // TLS may hold back what the socket did not take.
-    stream.flush().await?;
-    Ok(())
+    let mut parcel = Parcel::default();
+    parcel.add(message)?;
+    parcel.send(stream).await
 }
 
-/// Send the parts of a blob; the message that announces it went before.
-///
-/// # Errors
-/// When the stream fails.
-pub async fn send_parts(stream: &mut (impl AsyncWrite + Unpin), blob: &Blob) -> Result<(), WireError> {
-    for part in parts(blob) {
-        stream.write_all(&frame_header(FrameTag::Part, part.len())?).await?;
-        stream.write_all(part).await?;
+/// Frames that leave together: a write costs as much as many small messages do.
+#[derive(Debug, Default)]
+pub struct Parcel {
+    bytes: Vec<u8>,
+}
+
+impl Parcel {
+    /// Add a message.
+    ///
+    /// # Errors
+    /// When it does not fit into a frame.
+    pub fn add<T: Serialize>(&mut self, message: &T) -> Result<(), WireError> {
+        let body = encode_message(message)?;
+        self.bytes.extend_from_slice(&frame_header(FrameTag::Message, body.len())?);
+        self.bytes.extend_from_slice(&body);
+        Ok(())
     }
-    stream.flush().await?;
-    Ok(())
+
+    /// Add a blob behind the message that announces it, if it is small; else send all there is, and the blob.
+    ///
+    /// # Errors
+    /// When the stream fails.
+    pub async fn add_blob(&mut self, blob: &Blob, stream: &mut (impl AsyncWrite + Unpin)) -> Result<(), WireError> {
+        let is_small = is_small(blob);
+        for part in parts(blob) {
+            self.bytes.extend_from_slice(&frame_header(FrameTag::Part, part.len())?);
+            if is_small {
+                self.bytes.extend_from_slice(part);
+            } else {
+                stream.write_all(&self.bytes).await?;
+                self.bytes.clear();
+                stream.write_all(part).await?;
+            }
+        }
+        if is_small { Ok(()) } else { self.send(stream).await }
+    }
+
+    /// Whether it is time to send it, whatever else there is to be sent.
+    #[must_use]
+    pub fn is_full(&self) -> bool {
+        self.bytes.len() >= PARCEL_BYTES
+    }
+
+    /// Write everything that was added; nothing of it stays.
+    ///
+    /// # Errors
+    /// When the stream fails.
+    pub async fn send(&mut self, stream: &mut (impl AsyncWrite + Unpin)) -> Result<(), WireError> {
+        stream.write_all(&self.bytes).await?;
+        // TLS may hold back what the socket did not take.
+        stream.flush().await?;
+        self.bytes.clear();
+        // A message may be long once.
+        self.bytes.shrink_to(2 * PARCEL_BYTES);
+        Ok(())
+    }
+}
+
+/// Whether a blob travels in one parcel with other things.
+#[must_use]
+pub fn is_small(blob: &Blob) -> bool {
+    blob.len() <= PARCEL_BYTES
 }
 
 /// The worker's side of the preamble: prove the secret, and have it proved.
@@ -202,5 +252,42 @@ async fn read_array<const N: usize>(stream: &mut (impl AsyncRead + Unpin)) -> Re
         Ok(_) => Ok(bytes),
         Err(error) if error.kind() == io::ErrorKind::UnexpectedEof => Err(WireError::Ended),
         Err(error) => Err(error.into()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use lookalike::protocol::ToWorker;
+    use tokio::io::duplex;
+
+    #[tokio::test]
+    async fn what_leaves_together_arrives_in_order_small_or_large() {
+        let (mut near, far) = duplex(1000);
+        let blobs = [vec![1; 10], vec![2; PARCEL_BYTES + 1], Vec::new(), vec![3; 3 << 20], vec![4; 7]].map(Blob::new);
+        let sent = blobs.clone();
+        let sending = tokio::spawn(async move {
+            let mut parcel = Parcel::default();
+            for blob in &sent {
+                parcel.add(&ToWorker::Blob { hash: blob.hash().0, length: blob.len() as u64 })?;
+                parcel.add_blob(blob, &mut near).await?;
+            }
+            parcel.send(&mut near).await
+        });
+        let mut incoming = Incoming::new(far);
+        for blob in &blobs {
+            let announced = ToWorker::Blob { hash: blob.hash().0, length: blob.len() as u64 };
+            assert_eq!(incoming.message::<ToWorker>().await.unwrap(), announced);
+            let mut bytes = Vec::new();
+            while bytes.len() < blob.len() {
+                match incoming.next::<ToWorker>().await.unwrap() {
+                    Some(Received::Part(part)) => bytes.extend(part),
+                    other => panic!("expected a part, found {other:?}"),
+                }
+            }
+            assert_eq!(Blob::new(bytes), *blob);
+        }
+        sending.await.unwrap().unwrap();
+        assert!(incoming.next::<ToWorker>().await.unwrap().is_none());
     }
 }

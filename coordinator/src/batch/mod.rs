@@ -105,6 +105,15 @@ pub(crate) fn run(settings: BatchSettings) -> anyhow::Result<ExitCode> {
     end(&board, run.map(|_| ()))
 }
 
+/// Tells all that is wrong with a batch, without running it.
+pub(crate) fn check(settings: &BatchSettings) -> anyhow::Result<()> {
+    if !settings.resume {
+        resume::refuse_old(&settings.out)?;
+    }
+    show_warnings(&check::check(settings, &Lights::default())?.warnings);
+    Ok(())
+}
+
 /// The files of all fits, each with its hash.
 fn outputs(out: &OutFolder, fits: &[BatchFit]) -> anyhow::Result<Vec<(String, String)>> {
     let files = fits.iter().flat_map(|fit| FIT_FILES.map(|file| format!("{}/{file}", fit.name)));

@@ -49,6 +49,7 @@ fn parse(argv: Vec<OsString>) -> anyhow::Result<Cli> {
     let argv = expand::expand_config(&grammar, argv)?;
     let mut cli = Cli::try_parse_from(&argv)?;
     if let Command::Batch(args) = &mut cli.command {
+        args.typed = tokens::subcommand_first(&grammar, &argv);
         args.given = expand::given_flags::<MethodArgs>(grammar, &argv)?;
         return Ok(cli);
     }
@@ -82,11 +83,14 @@ fn dispatch(Cli { log, command }: Cli) -> anyhow::Result<ExitCode> {
         Command::Access(args) => access::run(args.into_settings()),
         Command::Worker(args) => worker::run(args),
         Command::Batch(args) => {
-            args.check()?;
             let fits = manifest::read(&args.manifest, &args.given)?;
+            let job = args.job();
             let mut settings = args.into_settings(fits)?;
             settings.cluster.log = Some(log);
-            batch::run(settings)
+            match job {
+                Some(job) => batch::submit(&settings, job),
+                None => batch::run(settings),
+            }
         }
         Command::Status(args) => status::run(&args.into_settings()),
         Command::Check(_) => later("lookalike check", "`lookalike fit` refuses inputs that it cannot use"),

@@ -9,6 +9,12 @@ pub(crate) fn subcommand<'g>(grammar: &'g Command, tokens: &[OsString]) -> Optio
     Some((first, grammar.find_subcommand(&tokens[first])?))
 }
 
+/// The tokens without the program's name, and with the subcommand's before flags that may stand there too, such as `--log`.
+pub(crate) fn subcommand_first(grammar: &Command, tokens: &[OsString]) -> Vec<OsString> {
+    let Some((place, _)) = subcommand(grammar, tokens) else { return tokens.iter().skip(1).cloned().collect() };
+    [&tokens[place..=place], &tokens[1..place], &tokens[place + 1..]].concat()
+}
+
 /// The indices, from `start`, of tokens that are neither flags nor values of flags.
 pub(crate) fn positionals(grammar: &Command, tokens: &[OsString], start: usize) -> Vec<usize> {
     let (mut found, mut value_follows, mut flags_are_over) = (Vec::new(), false, false);

@@ -11,6 +11,27 @@ use lookalike::graph::{BlobHash, NodeId, WorkerId};
 /// small as this, and one assignment.
 const UNBEGUN_BYTES: usize = 8 << 20;
 
+/// How long a worker shall have something to do for each of its threads without being heard: more than the journal and the way
+/// there and back take.
+const ENOUGH: Duration = Duration::from_millis(10);
+
+/// A worker that has not moved for this long does not get on: a busy machine lets a process wait for a few hundredths of a second.
+const STANDSTILL: Duration = Duration::from_millis(50);
+
+/// A node that takes less than this is short: a worker is given many of them at a time.
+const SHORT: Duration = Duration::from_millis(1);
+
+/// No node is thought to take less.
+const SHORTEST: Duration = Duration::from_micros(20);
+
+/// What a node counts for that is not short, or of which nobody knows how long it takes.
+const LONG: Duration = Duration::from_hours(1);
+
+/// What a node counts for in a worker's queue whose like have usually taken so long.
+pub(crate) fn weight(usual: Option<Duration>) -> Duration {
+    usual.filter(|usual| *usual < SHORT).map_or(LONG, |usual| usual.max(SHORTEST))
+}
+
 /// A worker that has joined.
 #[derive(Clone, Debug)]
 pub(crate) struct Member {
@@ -19,6 +40,8 @@ pub(crate) struct Member {
     /// The leases that it has not begun with.
     pub(crate) waiting: BTreeSet<NodeId>,
     waiting_bytes: usize,
+    /// How long they will take one after the other.
+    waiting_time: Duration,
     /// The inputs of every node it was ever given: what it may read. (One that was taken back may still be asked about.)
     pub(crate) readable: BTreeSet<BlobHash>,
     /// When it is lost, and with it its leases, unless it is heard of before.
@@ -43,7 +66,15 @@ pub(crate) struct Held {
     pub(crate) started_at: Option<Duration>,
     /// How far it said to be.
     pub(crate) permille: u16,
-    assignment_bytes: usize,
+    assignment: Size,
+}
+
+/// What an assignment is for the queue that it waits in.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Size {
+    pub(crate) bytes: usize,
+    /// See [`weight`].
+    pub(crate) time: Duration,
 }
 
 impl Member {
@@ -53,6 +84,7 @@ impl Member {
             leases: BTreeMap::new(),
             waiting: BTreeSet::new(),
             waiting_bytes: 0,
+            waiting_time: Duration::ZERO,
             readable: BTreeSet::new(),
             deadline,
             is_draining: false,
@@ -64,10 +96,11 @@ impl Member {
     }
 
     /// A lease begins.
-    pub(crate) fn give(&mut self, node: NodeId, attempt: u32, assignment_bytes: usize, now: Duration) {
-        self.leases.insert(node, Held { attempt, started_at: None, permille: 0, assignment_bytes });
+    pub(crate) fn give(&mut self, node: NodeId, attempt: u32, assignment: Size, now: Duration) {
+        self.leases.insert(node, Held { attempt, started_at: None, permille: 0, assignment });
         self.waiting.insert(node);
-        self.waiting_bytes += assignment_bytes;
+        self.waiting_bytes += assignment.bytes;
+        self.waiting_time += assignment.time;
         self.last_move = now;
     }
 
@@ -78,7 +111,8 @@ impl Member {
             return false;
         }
         held.started_at = Some(now);
-        self.waiting_bytes -= held.assignment_bytes;
+        self.waiting_bytes -= held.assignment.bytes;
+        self.waiting_time -= held.assignment.time;
         self.is_fresh = false;
         self.last_move = now;
         true
@@ -88,7 +122,8 @@ impl Member {
     pub(crate) fn end(&mut self, node: NodeId, now: Duration) -> Option<Held> {
         let held = self.leases.remove(&node)?;
         if self.waiting.remove(&node) {
-            self.waiting_bytes -= held.assignment_bytes;
+            self.waiting_bytes -= held.assignment.bytes;
+            self.waiting_time -= held.assignment.time;
         }
         self.alone_with = self.alone_with.filter(|alone| *alone != node);
         self.last_move = now;
@@ -100,6 +135,24 @@ impl Member {
         self.leases.len() - self.waiting.len()
     }
 
+    /// How much may wait for it.
+    fn enough(&self) -> Duration {
+        ENOUGH * u32::try_from(self.threads).unwrap_or(u32::MAX).min(1024)
+    }
+
+    /// When what it has not begun with may be moved to another worker. Short nodes stay as long as it gets on with them: they
+    /// would be begun with here before anybody there hears of it.
+    pub(crate) fn movable_at(&self) -> Duration {
+        if self.waiting_time > self.enough() + SHORT { Duration::ZERO } else { self.last_move + STANDSTILL }
+    }
+
+    /// Whether it was given something though it had enough.
+    #[cfg(test)]
+    pub(crate) fn has_too_much(&self, spare_leases: usize) -> bool {
+        let longest = self.waiting.iter().map(|node| self.leases[node].assignment.time).max().unwrap_or_default();
+        self.leases.len() > self.threads + spare_leases && self.waiting_time - longest >= self.enough()
+    }
+
     /// Whether it gets leases like any other.
     fn accepts(&self) -> bool {
         !self.is_draining && !self.is_clearing && self.alone_with.is_none()
@@ -107,14 +160,16 @@ impl Member {
 
     fn keys(&self, worker: WorkerId, spare_leases: usize) -> Keys {
         let is_idle = self.leases.is_empty();
-        let is_full = self.leases.len() >= self.threads + spare_leases || self.waiting_bytes >= UNBEGUN_BYTES;
+        let has_enough = self.waiting.is_empty() || self.waiting_time >= self.enough();
+        let is_busy = self.leases.len() >= self.threads + spare_leases && has_enough;
+        let is_full = is_busy || self.waiting_bytes >= UNBEGUN_BYTES;
         let load = Load { leases: self.leases.len(), threads: self.threads };
         let surplus = self.leases.len().saturating_sub(self.threads.max(self.executing()));
         let has_thread = self.executing() < self.threads;
         Keys {
             rank: self.accepts().then_some(Rank { is_full, load, worker }),
             is_fresh: self.accepts() && self.is_fresh && is_idle,
-            surplus: Some(surplus).filter(|surplus| *surplus > 0 && self.accepts()),
+            surplus: Some((self.waiting_time, surplus)).filter(|_| surplus > 0 && self.accepts()),
             stalled_since: Some(self.last_move).filter(|_| has_thread && !self.waiting.is_empty()),
         }
     }
@@ -125,7 +180,7 @@ impl Member {
 struct Keys {
     rank: Option<Rank>,
     is_fresh: bool,
-    surplus: Option<usize>,
+    surplus: Option<(Duration, usize)>,
     stalled_since: Option<Duration>,
 }
 
@@ -175,7 +230,7 @@ pub(crate) struct Members {
     /// Those of them that have executed nothing and hold nothing.
     fresh: BTreeSet<WorkerId>,
     /// Those of them that hold leases which another one could begin with at once.
-    surplus: BTreeSet<(usize, WorkerId)>,
+    surplus: BTreeSet<((Duration, usize), WorkerId)>,
     /// Those that have not begun with a node though they have a thread for it, since then.
     stalled: BTreeSet<(Duration, WorkerId)>,
     deadlines: BTreeSet<(Duration, WorkerId)>,
@@ -285,7 +340,7 @@ impl Members {
         self.fresh.first().copied()
     }
 
-    /// The one with the most leases that another one could begin with at once.
+    /// The one with the most to do that another one could begin with at once.
     pub(crate) fn busiest(&self) -> Option<(WorkerId, &Member)> {
         let (_, worker) = self.surplus.last()?;
         Some((*worker, self.get(*worker)?))

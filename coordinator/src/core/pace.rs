@@ -41,6 +41,11 @@ impl Pace {
         pace.sorted.insert(place, took);
     }
 
+    /// How long nodes of a kind have usually taken lately; `None` while nobody knows.
+    pub(crate) fn usual(&self, kind: &str) -> Option<Duration> {
+        self.kinds.get(kind)?.usual()
+    }
+
     /// A node runs since then, and may be run on a second worker.
     pub(crate) fn watch(&mut self, kind: &str, since: Duration, node: NodeId) {
         self.of(kind).running.insert((since, node));
@@ -88,10 +93,14 @@ impl Pace {
 }
 
 impl KindPace {
+    fn usual(&self) -> Option<Duration> {
+        self.sorted.get(self.sorted.len() / 2).copied()
+    }
+
     /// A node of this kind is slow after this time; `None`: never.
     fn limit(&self, speculation: Speculation) -> Option<Duration> {
         let factor = speculation.factor?;
-        let median = self.sorted.get(self.sorted.len() / 2)?;
+        let median = self.usual()?;
         // A policy's factor is finite; a time beyond all bounds is never reached.
         let usual = Duration::try_from_secs_f64(median.as_secs_f64() * factor).unwrap_or(Duration::MAX / 2);
         Some(usual.max(speculation.after))

@@ -43,22 +43,13 @@ pub(super) struct NodeRow {
     pub(super) error: Option<String>,
 }
 
-/// An attempt that begins.
+/// What happens to attempts.
 #[derive(Debug)]
-pub(super) struct AttemptRow {
-    pub(super) node: u64,
-    pub(super) attempt: u32,
-    pub(super) worker: u64,
-    pub(super) at: Duration,
-}
-
-/// The open attempts of a node, all or those of one worker, have ended.
-#[derive(Debug)]
-pub(super) struct EndRow {
-    pub(super) node: u64,
-    pub(super) worker: Option<u64>,
-    pub(super) outcome: Outcome,
-    pub(super) at: Duration,
+pub(super) enum AttemptChange {
+    /// One begins.
+    Begun { node: u64, attempt: u32, worker: u64, at: Duration },
+    /// The open ones of a node, all or that of one worker, have ended.
+    Ended { node: u64, worker: Option<u64>, outcome: Outcome, at: Duration },
 }
 
 /// A worker that has joined.
@@ -83,8 +74,14 @@ pub(super) struct LeftRow {
 pub(crate) struct Batch {
     /// By number.
     pub(super) nodes: BTreeMap<u64, NodeRow>,
-    pub(super) attempts: Vec<AttemptRow>,
-    pub(super) ends: Vec<EndRow>,
+    /// Nodes that did run before, and do not any more.
+    pub(super) stopped: Vec<u64>,
+    /// Nodes that run since, each with the number of its attempts.
+    pub(super) started: Vec<(u64, u32)>,
+    /// Nodes that are completed, each with the number of its attempts.
+    pub(super) finished: Vec<(u64, u32)>,
+    /// In order.
+    pub(super) attempts: Vec<AttemptChange>,
     pub(super) workers: Vec<WorkerRow>,
     pub(super) left: Vec<LeftRow>,
     pub(super) local_workers: Vec<u32>,
@@ -121,13 +118,14 @@ impl Batch {
                 self.touch(name.node, core).added = Some((name.kind.clone(), name.label.clone()));
             }
             RunEvent::NodeReady { node } => _ = self.touch(*node, core),
-            RunEvent::NodeStarted { name, .. } => _ = self.touch(name.node, core),
+            RunEvent::NodeStarted { name, .. } => self.started.push(numbers(name.node, core)),
             RunEvent::NodeRecalled { name, .. } => self.touch(name.node, core).state = State::Recalled,
             RunEvent::NodeFinished { name, site, .. } => {
-                let key = self.touch(name.node, core).key;
+                self.finished.push(numbers(name.node, core));
                 if *site == Site::Coordinator {
                     self.end(name.node, Some(HERE), Outcome::Finished, now);
                 }
+                let key = core.look(name.node).and_then(|record| record.key);
                 let brought = output.filter(|(node, _)| *node == name.node).map(|(_, output)| output);
                 self.results.extend(key.zip(brought.or_else(|| core.graph.output(name.node)).cloned()));
             }
@@ -139,11 +137,12 @@ impl Batch {
             RunEvent::NodeSuspected { name, .. } => _ = self.touch(name.node, core),
             RunEvent::NodeRequeued { name, worker, .. } => {
                 self.touch(name.node, core);
+                self.started.retain(|(node, _)| *node != name.node.0);
+                self.stopped.push(name.node.0);
                 self.end(name.node, Some(worker.0), Outcome::Lost, now);
             }
             RunEvent::NodeReleased { name } => {
-                let key = self.touch(name.node, core).key;
-                self.released.extend(key);
+                self.released.extend(core.look(name.node).and_then(|record| record.key));
             }
             RunEvent::WorkerJoined { worker, threads, process } => {
                 self.workers.push(WorkerRow { worker: worker.0, process: *process, threads: *threads, at: now });
@@ -177,19 +176,25 @@ impl Batch {
         self.nodes.iter().filter_map(|(node, row)| Some((row.key?, NodeId(*node))))
     }
 
+    /// Whether nobody may be told of the group before this is written: there is more in it than what people see.
+    pub(crate) fn is_urgent(&self) -> bool {
+        let Self { nodes, workers, left, local_workers, results, forgotten, released, listen, .. } = self;
+        let rows = nodes.len() + workers.len() + left.len() + local_workers.len();
+        rows + results.len() + forgotten.len() + released.len() > 0 || listen.is_some()
+    }
+
     /// Whether there is nothing to write.
     pub(crate) fn is_empty(&self) -> bool {
-        let Self { nodes, attempts, ends, workers, left, local_workers, results, forgotten, released, listen } = self;
-        let rows = nodes.len() + attempts.len() + ends.len() + workers.len() + left.len() + local_workers.len();
-        rows + results.len() + forgotten.len() + released.len() == 0 && listen.is_none()
+        // What is finished is among the results, and what has stopped among the nodes.
+        !self.is_urgent() && self.started.is_empty() && self.attempts.is_empty()
     }
 
     fn begin(&mut self, node: NodeId, attempt: u32, worker: u64, at: Duration) {
-        self.attempts.push(AttemptRow { node: node.0, attempt, worker, at });
+        self.attempts.push(AttemptChange::Begun { node: node.0, attempt, worker, at });
     }
 
     fn end(&mut self, node: NodeId, worker: Option<u64>, outcome: Outcome, at: Duration) {
-        self.ends.push(EndRow { node: node.0, worker, outcome, at });
+        self.attempts.push(AttemptChange::Ended { node: node.0, worker, outcome, at });
     }
 
     /// The row of a node, as the node is now.
@@ -217,4 +222,9 @@ impl Batch {
         (row.state, row.attempts, row.deaths, row.key) = (state, attempts, deaths, key);
         row
     }
+}
+
+/// The number of a node and that of its attempts.
+fn numbers(node: NodeId, core: &Core) -> (u64, u32) {
+    (node.0, core.look(node).map_or(0, |record| record.attempts))
 }

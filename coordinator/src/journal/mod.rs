@@ -19,12 +19,15 @@
 //! | `workers`, `local_workers` | connection of a worker; process of this machine that was started as one |
 //! | `results` | node key: the hash and the bytes of its output |
 //!
+//! What nothing depends on is written about once a second: `deferred.rs`.
+//!
 //! Keys and hashes have no index: they are random, and an index would write one page for each. A coordinator that goes on reads all
 //! keys once. The secret of the access file is never here; the file is readable by its owner alone all the same.
 //!
 //! On a network file system the journal is locked for this process alone, and others read `status.json`.
 
 mod batch;
+mod deferred;
 mod error;
 mod finish;
 mod identity;
@@ -48,6 +51,7 @@ use lookalike::protocol::RunName;
 use tokio::sync::mpsc::{UnboundedReceiver, unbounded_channel};
 
 pub(crate) use self::batch::Batch;
+use self::deferred::Deferred;
 pub use self::error::JournalError;
 pub(crate) use self::finish::{Finished, finish, finished};
 pub use self::identity::{Difference, RunIdentity};
@@ -125,6 +129,7 @@ impl Journal {
             results: loaded.results,
             commands: asked,
             committed: sender,
+            deferred: Deferred::new(loaded.epoch),
             next_status: Instant::now(),
             is_news: true,
         };
@@ -143,13 +148,19 @@ impl Journal {
     /// Write a batch, after those before. [`Self::committed`] tells when it is written.
     pub(crate) fn commit(&mut self, batch: Batch) {
         // A thread that has ended is noticed by `committed`.
-        let _ = self.commands.send(Command::Commit(batch));
+        let _ = self.commands.send(Command::Commit(Box::new(batch)));
     }
 
     /// Wait until the earliest batch that was not told of is written.
     pub(crate) async fn committed(&mut self) -> Result<(), JournalError> {
         let gone = || JournalError::Busy { path: self.path.clone() };
         self.committed.recv().await.unwrap_or_else(|| Err(gone()))
+    }
+
+    /// Write a batch that is not [urgent](Batch::is_urgent) some time.
+    pub(crate) fn note(&mut self, batch: Batch) {
+        // A thread that has ended is noticed by `committed`.
+        let _ = self.commands.send(Command::Note(Box::new(batch)));
     }
 
     /// A result was kept whose node is not there today: should it become ready, it is completed from here.

@@ -93,8 +93,9 @@ fn results(connection: &Connection) -> rusqlite::Result<HashMap<NodeKey, i64>> {
 
 fn past(connection: &Connection, results: usize) -> rusqlite::Result<Past> {
     let mut past = Past { results, ..Past::default() };
-    let mut statement = connection
-        .prepare("SELECT epoch, node, key, deaths, deaths_alone, deaths_excused FROM nodes WHERE key IS NOT NULL")?;
+    let mut statement = connection.prepare(
+        "SELECT id >> 32, id & 0xffffffff, key, deaths, deaths_alone, deaths_excused FROM nodes WHERE key IS NOT NULL",
+    )?;
     let mut rows = statement.query([])?;
     while let Some(row) = rows.next()? {
         let (epoch, node, key): (u64, u64, _) = (row.get(0)?, row.get(1)?, NodeKey(row.get(2)?));

@@ -16,7 +16,7 @@ pub(super) const FORMAT: i64 = 1;
 /// Marks the file as a journal of this program: `PRAGMA application_id`, the letters `Look`.
 pub(super) const APPLICATION: i64 = 0x4c6f_6f6b;
 
-/// docs/journal.md explains them.
+/// docs/journal.md explains them. What is written for every node is appended, or found by a number: no index besides.
 const TABLES: &str = "
 CREATE TABLE run (
     id          INTEGER PRIMARY KEY CHECK (id = 1),
@@ -39,8 +39,7 @@ CREATE TABLE epochs (
     best_cssim  REAL
 );
 CREATE TABLE nodes (
-    epoch       INTEGER NOT NULL,
-    node        INTEGER NOT NULL,
+    id          INTEGER PRIMARY KEY,
     kind        TEXT NOT NULL,
     label       TEXT NOT NULL,
     state       INTEGER NOT NULL,
@@ -49,9 +48,8 @@ CREATE TABLE nodes (
     deaths_alone    INTEGER NOT NULL,
     deaths_excused  INTEGER NOT NULL,
     key         BLOB,
-    error       TEXT,
-    PRIMARY KEY (epoch, node)
-) WITHOUT ROWID;
+    error       TEXT
+);
 CREATE TABLE attempts (
     epoch       INTEGER NOT NULL,
     node        INTEGER NOT NULL,
@@ -59,9 +57,8 @@ CREATE TABLE attempts (
     worker      INTEGER NOT NULL,
     begun_ms    INTEGER NOT NULL,
     ended_ms    INTEGER,
-    outcome     INTEGER,
-    PRIMARY KEY (epoch, node, attempt)
-) WITHOUT ROWID;
+    outcome     INTEGER
+);
 CREATE TABLE workers (
     epoch       INTEGER NOT NULL,
     worker      INTEGER NOT NULL,
@@ -79,12 +76,13 @@ CREATE TABLE local_workers (
 ) WITHOUT ROWID;
 CREATE TABLE results (
     id          INTEGER PRIMARY KEY,
+    epoch       INTEGER NOT NULL,
     key         BLOB NOT NULL,
     hash        BLOB NOT NULL,
     bytes       BLOB
 );
 CREATE VIEW node_list AS
-    SELECT epoch, node, kind, label,
+    SELECT id >> 32 AS epoch, id & 0xffffffff AS node, kind, label,
            CASE state WHEN 0 THEN 'waiting' WHEN 1 THEN 'ready' WHEN 2 THEN 'running' WHEN 3 THEN 'completed'
                       WHEN 4 THEN 'recalled' ELSE 'failed' END AS state,
            attempts, deaths + deaths_alone + deaths_excused AS deaths, lower(hex(key)) AS key, error
@@ -103,6 +101,11 @@ const CACHE_KIB: i64 = 16 << 10;
 
 /// How long to wait for a reader that is in the way; there should be none.
 const BUSY_TIME: Duration = Duration::from_secs(5);
+
+/// The number of a node among those of all epochs; the first node of an epoch comes after the last one of the one before.
+pub(super) fn node_id(epoch: u64, node: u64) -> u64 {
+    (epoch << 32) + node
+}
 
 /// The files of a journal: itself, its log, their index, and the log of the older kind.
 pub(crate) fn files(path: &Path) -> [PathBuf; 4] {
@@ -138,7 +141,7 @@ pub(super) fn create(path: &Path) -> Result<Connection, JournalError> {
         _ => JournalError::Create { path: path.to_owned(), source },
     })?;
     let writing = |source| JournalError::writing(path, source);
-    let connection = connect(path)?;
+    let connection = connect(path, is_shared(path))?;
     connection
         .execute_batch(&format!(
             "BEGIN; {TABLES} PRAGMA application_id = {APPLICATION}; PRAGMA user_version = {FORMAT}; COMMIT;"
@@ -154,7 +157,11 @@ pub(super) fn open(path: &Path) -> Result<Connection, JournalError> {
         .map_err(|source| JournalError::reading(path, source))?;
     check_format(path, &looking)?;
     drop(looking);
-    connect(path)
+    connect(path, is_shared(path))
+}
+
+fn is_shared(path: &Path) -> bool {
+    path.parent().is_some_and(place::is_shared)
 }
 
 /// That a file is a journal of this format.
@@ -172,12 +179,13 @@ pub(super) fn check_format(path: &Path, connection: &Connection) -> Result<(), J
     }
 }
 
-fn connect(path: &Path) -> Result<Connection, JournalError> {
+/// Connect to a journal, alone if other machines may write to its file system.
+pub(super) fn connect(path: &Path, is_shared: bool) -> Result<Connection, JournalError> {
     let connect = || {
         let connection = Connection::open_with_flags(path, OpenFlags::SQLITE_OPEN_READ_WRITE)?;
         connection.busy_timeout(BUSY_TIME)?;
         connection.set_prepared_statement_cache_capacity(32);
-        if path.parent().is_some_and(place::is_shared) {
+        if is_shared {
             // Before the first use of the log: then it needs no shared memory.
             connection.pragma_update(None, "locking_mode", "EXCLUSIVE")?;
         }

@@ -12,6 +12,7 @@ use thiserror::Error;
 
 use super::error::JournalError;
 use super::lock::RunLock;
+use super::schema::node_id;
 use super::{JOURNAL_FILE, place, schema};
 
 /// The status of a run beside its journal, for where the journal cannot be read by others.
@@ -288,12 +289,14 @@ fn read(connection: &Connection) -> rusqlite::Result<Status> {
     })
 }
 
+/// Nodes by kind and state. That a node is completed is written a little later than its result, so results count.
 fn kinds(connection: &Connection, epoch: u64) -> rusqlite::Result<Vec<KindCounts>> {
-    let sql =
-        "SELECT kind, state, count(*), min(node) FROM nodes WHERE epoch = ?1 GROUP BY kind, state ORDER BY min(node)";
+    let sql = "SELECT kind, iif(state IN (1, 2) AND done.key IS NOT NULL, 3, state) AS now, count(*), min(id)
+               FROM nodes LEFT JOIN (SELECT DISTINCT key FROM results WHERE epoch = ?1) AS done ON done.key = nodes.key
+               WHERE id >= ?2 GROUP BY kind, now ORDER BY min(id)";
     let mut kinds: Vec<KindCounts> = Vec::new();
     let mut statement = connection.prepare_cached(sql)?;
-    let mut rows = statement.query([epoch])?;
+    let mut rows = statement.query([epoch, node_id(epoch, 0)])?;
     while let Some(row) = rows.next()? {
         let (kind, state, count): (String, u8, u64) = (row.get(0)?, row.get(1)?, row.get(2)?);
         let place = kinds.iter().position(|known| known.kind == kind).unwrap_or_else(|| {
@@ -323,7 +326,7 @@ fn workers(connection: &Connection, epoch: u64) -> rusqlite::Result<Vec<WorkerSt
 
 fn failures(connection: &Connection, epoch: u64) -> rusqlite::Result<Vec<NodeError>> {
     let sql = format!(
-        "SELECT kind, label, ifnull(error, '') FROM nodes WHERE epoch = ?1 AND state = 5 ORDER BY node LIMIT {MOST_FAILURES}"
+        "SELECT kind, label, ifnull(error, '') FROM nodes WHERE id >= ?1 AND state = 5 ORDER BY id LIMIT {MOST_FAILURES}"
     );
     let mut statement = connection.prepare_cached(&sql)?;
     let rows = statement

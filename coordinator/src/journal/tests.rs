@@ -121,12 +121,29 @@ fn torn_write_costs_only_the_group_that_was_being_written() {
 }
 
 #[test]
+fn number_of_an_epoch_is_never_given_again_whatever_is_left_of_the_log() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut journal = begun(&folder);
+    let mut batch = Batch::default();
+    batch.listens("127.0.0.1:4100".into());
+    write(&mut journal, [batch, completed(1)]);
+    let copy = copied(&folder);
+    fs::write(copy.path().join("run.sqlite-wal"), "").unwrap();
+    let again = Journal::open(&options(&copy), RunName([8; 16])).unwrap();
+    assert_eq!((again.run, again.epoch, again.past.results), (NAME, 2, 0));
+    assert_eq!(again.past.listen, "127.0.0.1:4100".parse().ok());
+}
+
+#[test]
 fn damaged_output_is_dropped_and_the_others_stay() {
     let folder = tempfile::tempdir().unwrap();
     let mut journal = begun(&folder);
     write(&mut journal, [completed(1), completed(2)]);
     journal.close(None).unwrap();
-    sql(&folder, "UPDATE results SET bytes = zeroblob(1000) WHERE key = (SELECT key FROM nodes WHERE node = 1)");
+    sql(
+        &folder,
+        "UPDATE results SET bytes = zeroblob(1000) WHERE key = (SELECT key FROM nodes WHERE id & 0xffffffff = 1)",
+    );
     let again = begun(&folder);
     let mut recall = again.recall();
     assert_eq!(recall.recall(key(1)).output, None);
@@ -251,6 +268,25 @@ fn status_tells_counts_workers_and_whether_somebody_is_at_work() {
     assert_eq!((file.run, file.nodes), (stopped.run, stopped.nodes));
     finish(&folder.path().join(JOURNAL_FILE), &Finished { outputs: Vec::new() }).unwrap();
     assert_eq!(Status::of(folder.path()).unwrap().state, RunState::Finished);
+}
+
+#[test]
+fn where_the_journal_is_locked_the_status_file_tells() {
+    let folder = tempfile::tempdir().unwrap();
+    let _lock = RunLock::take(folder.path()).unwrap();
+    let mut journal = begun(&folder);
+    write(&mut journal, [completed(1)]);
+    journal.close(None).unwrap();
+    // As on a network file system.
+    let path = folder.path().join(JOURNAL_FILE);
+    let alone = schema::connect(&path, true).unwrap();
+    alone.execute("UPDATE epochs SET ended_ms = NULL", []).unwrap();
+    assert!(!folder.path().join("run.sqlite-shm").exists(), "there is no memory to share");
+    let status = Status::of(folder.path()).unwrap();
+    assert_eq!((status.state, status.nodes.completed), (RunState::Running, 1));
+    fs::remove_file(folder.path().join("status.json")).unwrap();
+    let error = Status::of(folder.path()).unwrap_err().to_string();
+    assert!(error.contains("another process is using the journal"), "{error}");
 }
 
 #[cfg(unix)]

@@ -11,7 +11,9 @@ use tracing::warn;
 
 use super::JournalOptions;
 use super::batch::{Batch, NodeRow};
+use super::deferred::{Deferred, ms};
 use super::error::JournalError;
+use super::schema::node_id;
 use super::status;
 use super::unix_ms;
 use crate::core::Deaths;
@@ -29,7 +31,9 @@ const STATUS_SHARE: u32 = 20;
 #[derive(Debug)]
 pub(super) enum Command {
     /// Write a batch, then say so.
-    Commit(Batch),
+    Commit(Box<Batch>),
+    /// Write a batch that can wait.
+    Note(Box<Batch>),
     /// Read the output of a node.
     Read(NodeKey, SyncSender<Option<Blob>>),
     /// Write how this coordinator's part ended, and end.
@@ -44,6 +48,7 @@ pub(super) struct Writer {
     pub(super) results: HashMap<NodeKey, i64>,
     pub(super) commands: Receiver<Command>,
     pub(super) committed: UnboundedSender<Result<(), JournalError>>,
+    pub(super) deferred: Deferred,
     /// When `status.json` may be written next.
     pub(super) next_status: Instant,
     /// Whether something has happened since it was written.
@@ -62,6 +67,10 @@ impl Writer {
                     // When nobody listens any more the run is over.
                     let _ = self.committed.send(outcome);
                 }
+                Ok(Command::Note(batch)) => {
+                    self.deferred.take(&batch);
+                    self.is_news = true;
+                }
                 Ok(Command::Read(key, answer)) => _ = answer.send(self.read(key)),
                 Ok(Command::Close(ended)) => return self.close(ended.as_deref()),
                 // The coordinator's future was dropped.
@@ -76,18 +85,40 @@ impl Writer {
     }
 
     fn commit(&mut self, batch: &Batch) -> Result<(), JournalError> {
-        let path = self.options.path.clone();
+        self.deferred.take(batch);
+        let is_much = self.deferred.is_much();
+        if !is_much && !batch.is_urgent() {
+            return Ok(());
+        }
         let mut new = Vec::new();
         let outcome = self.connection.transaction().and_then(|transaction| {
             new = write(&transaction, self.epoch, batch, &self.results)?;
+            if is_much {
+                self.deferred.write(&transaction)?;
+            }
             transaction.commit()
         });
-        outcome.map_err(|source| JournalError::writing(&path, source))?;
+        let outcome = match batch.listen {
+            Some(_) => outcome.and_then(|()| self.reach_the_disk()),
+            None => outcome,
+        };
+        outcome.map_err(|source| JournalError::writing(&self.options.path, source))?;
+        if is_much {
+            self.deferred.forget();
+        }
         self.results.extend(new);
         for key in &batch.forgotten {
             self.results.remove(key);
         }
         Ok(())
+    }
+
+    /// Wait until all that was written is on the disk. Once per epoch, before its first lease: a machine that loses its power may
+    /// lose the end of the log, but must not lose which epochs there were. The next one would have the number of one that was lost,
+    /// and a worker elsewhere might bring it an answer to the other's node of the same number.
+    fn reach_the_disk(&self) -> rusqlite::Result<()> {
+        // What readers still need stays in the log as well, and is synchronised with it.
+        self.connection.query_row("PRAGMA wal_checkpoint(PASSIVE)", [], |_| Ok(()))
     }
 
     /// The output of a node. A damaged one is dropped, and the node runs again.
@@ -113,6 +144,7 @@ impl Writer {
     }
 
     fn close(mut self, ended: Option<&str>) -> Result<(), JournalError> {
+        self.write_deferred();
         let write = || -> rusqlite::Result<()> {
             self.connection.execute(
                 "UPDATE epochs SET ended_ms = ?2, seen_ms = ?2, ended = ?3 WHERE epoch = ?1",
@@ -127,9 +159,22 @@ impl Writer {
         written
     }
 
+    /// Write what could wait.
+    fn write_deferred(&mut self) {
+        let outcome = self.connection.transaction().and_then(|transaction| {
+            self.deferred.write(&transaction)?;
+            transaction.commit()
+        });
+        match outcome {
+            Ok(()) => self.deferred.forget(),
+            Err(error) => warn!(%error, "cannot note in the journal what is under way"),
+        }
+    }
+
     /// Write `status.json`. A disk that is full will stop the run elsewhere.
     fn tell_status(&mut self) {
         let began = Instant::now();
+        self.write_deferred();
         let best = self.options.best.as_ref().and_then(|best| best.get());
         let seen = self.connection.execute(
             "UPDATE epochs SET seen_ms = ?2, best_cssim = ?3 WHERE epoch = ?1",
@@ -154,14 +199,14 @@ fn write(
     known: &HashMap<NodeKey, i64>,
 ) -> rusqlite::Result<Vec<(NodeKey, i64)>> {
     for (node, row) in &batch.nodes {
-        write_node(transaction, epoch, *node, row)?;
+        write_node(transaction, node_id(epoch, *node), row)?;
     }
-    write_attempts(transaction, epoch, batch)?;
     let mut new = Vec::new();
-    let mut insert = transaction.prepare_cached("INSERT INTO results (key, hash, bytes) VALUES (?1, ?2, ?3)")?;
+    let mut insert =
+        transaction.prepare_cached("INSERT INTO results (epoch, key, hash, bytes) VALUES (?1, ?2, ?3, ?4)")?;
     for (key, output) in &batch.results {
         if !known.contains_key(key) {
-            new.push((*key, insert.insert(params![key.0, output.hash().0, &output[..]])?));
+            new.push((*key, insert.insert(params![epoch, key.0, output.hash().0, &output[..]])?));
         }
     }
     let row_of = |key: &NodeKey| new.iter().rev().find(|(other, _)| other == key).map(|(_, id)| *id);
@@ -177,7 +222,7 @@ fn write(
     Ok(new)
 }
 
-fn write_node(transaction: &Transaction<'_>, epoch: u64, node: u64, row: &NodeRow) -> rusqlite::Result<()> {
+fn write_node(transaction: &Transaction<'_>, id: u64, row: &NodeRow) -> rusqlite::Result<()> {
     let NodeRow { added, state, attempts, deaths, key, error } = row;
     let Deaths { in_company, alone, excused } = deaths;
     let (state, key) = (*state as u8, key.as_ref().map(|key| key.0));
@@ -185,34 +230,18 @@ fn write_node(transaction: &Transaction<'_>, epoch: u64, node: u64, row: &NodeRo
         Some((kind, label)) => transaction
             .prepare_cached(
                 "INSERT INTO nodes
-                     (epoch, node, kind, label, state, attempts, deaths, deaths_alone, deaths_excused, key, error)
-                 VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11)",
+                     (id, kind, label, state, attempts, deaths, deaths_alone, deaths_excused, key, error)
+                 VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10)",
             )?
-            .execute(params![epoch, node, kind, label, state, attempts, in_company, alone, excused, key, error])?,
+            .execute(params![id, kind, label, state, attempts, in_company, alone, excused, key, error])?,
         None => transaction
             .prepare_cached(
-                "UPDATE nodes SET state = ?3, attempts = ?4, deaths = ?5, deaths_alone = ?6, deaths_excused = ?7, key = ?8,
-                     error = ?9
-                 WHERE epoch = ?1 AND node = ?2",
+                "UPDATE nodes SET state = ?2, attempts = ?3, deaths = ?4, deaths_alone = ?5, deaths_excused = ?6, key = ?7,
+                     error = ?8
+                 WHERE id = ?1",
             )?
-            .execute(params![epoch, node, state, attempts, in_company, alone, excused, key, error])?,
+            .execute(params![id, state, attempts, in_company, alone, excused, key, error])?,
     };
-    Ok(())
-}
-
-fn write_attempts(transaction: &Transaction<'_>, epoch: u64, batch: &Batch) -> rusqlite::Result<()> {
-    let mut begin = transaction
-        .prepare_cached("INSERT INTO attempts (epoch, node, attempt, worker, begun_ms) VALUES (?1, ?2, ?3, ?4, ?5)")?;
-    for row in &batch.attempts {
-        begin.execute(params![epoch, row.node, row.attempt, row.worker, ms(row.at)])?;
-    }
-    let mut end = transaction.prepare_cached(
-        "UPDATE attempts SET outcome = ?4, ended_ms = ?5
-         WHERE epoch = ?1 AND node = ?2 AND worker = ifnull(?3, worker) AND outcome IS NULL",
-    )?;
-    for row in &batch.ends {
-        end.execute(params![epoch, row.node, row.worker, row.outcome as u8, ms(row.at)])?;
-    }
     Ok(())
 }
 
@@ -238,9 +267,4 @@ fn write_workers(transaction: &Transaction<'_>, epoch: u64, batch: &Batch) -> ru
         transaction.execute("UPDATE epochs SET listen = ?2 WHERE epoch = ?1", params![epoch, listen])?;
     }
     Ok(())
-}
-
-/// Milliseconds since this coordinator began.
-fn ms(at: Duration) -> i64 {
-    i64::try_from(at.as_millis()).unwrap_or(i64::MAX)
 }

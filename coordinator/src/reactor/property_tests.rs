@@ -177,7 +177,7 @@ impl World {
         }
         for (worker, leases) in &self.connected {
             let member = self.core.members.get(*worker).unwrap();
-            assert!(leases.len() <= member.threads + self.core.policy.spare_leases);
+            assert!(!member.has_too_much(self.core.policy.spare_leases), "{member:?}");
             assert!(leases.keys().eq(member.leases.keys()));
             let executing = leases.keys().filter(|node| self.executing.contains(&(*worker, **node)));
             assert_eq!(executing.count(), member.executing());

@@ -115,9 +115,14 @@ pub(super) fn is_origin(core: &Core, node: NodeId, worker: WorkerId) -> bool {
 
 /// Move nodes that merely wait on one worker to a worker with an idle thread.
 fn balance(core: &mut Core, now: Duration, outbox: &mut Outbox) {
+    core.next_move = None;
     loop {
         let idle = core.members.with_thread().next();
         let (Some(idle), Some((from, member))) = (idle, core.members.busiest()) else { return };
+        if member.movable_at() > now {
+            core.next_move = Some(member.movable_at());
+            return;
+        }
         let has = |node: &NodeId| core.members.get(idle).is_some_and(|member| member.leases.contains_key(node));
         let movable = member.waiting.iter().rev().take(CHECKS_LOOKED_AT);
         let Some(node) = movable.copied().find(|node| !has(node) && !is_origin(core, *node, idle)) else { return };

@@ -15,6 +15,7 @@ use crate::runner::RunError;
 
 mod draining;
 mod quarantine;
+mod short;
 mod speculation;
 mod verification;
 

@@ -18,6 +18,9 @@ use super::Outgoing;
 /// What a message takes in a queue beside what it points to.
 const MESSAGE_BYTES: usize = 128;
 
+/// How much of a queue is written at a time.
+const WRITTEN_TOGETHER: usize = 256;
+
 /// Where messages for a worker are put. Dropped, it lets what is in it be written and the connection end in order.
 #[derive(Debug)]
 pub(crate) struct Mailbox {
@@ -29,6 +32,8 @@ pub(crate) struct Mailbox {
 #[derive(Debug)]
 pub(super) struct Postman {
     queue: UnboundedReceiver<Outgoing>,
+    /// What was taken last and may not be written yet.
+    taken_bytes: usize,
     state: Arc<State>,
 }
 
@@ -45,7 +50,7 @@ pub(super) fn mailbox(bound_bytes: usize) -> (Mailbox, Postman) {
     let (sender, receiver) = unbounded_channel();
     let (overflowing, closed) = (CancellationToken::new(), CancellationToken::new());
     let state = Arc::new(State { waiting_bytes: AtomicUsize::new(0), bound_bytes, overflowing, closed });
-    (Mailbox { queue: sender, state: Arc::clone(&state) }, Postman { queue: receiver, state })
+    (Mailbox { queue: sender, state: Arc::clone(&state) }, Postman { queue: receiver, taken_bytes: 0, state })
 }
 
 impl Mailbox {
@@ -67,11 +72,13 @@ impl Mailbox {
 }
 
 impl Postman {
-    /// The next thing to write; `None` once the mailbox is dropped and empty.
-    pub(super) async fn next(&mut self) -> Option<Outgoing> {
-        let next = self.queue.recv().await?;
-        self.state.waiting_bytes.fetch_sub(weight(&next), Ordering::Relaxed);
-        Some(next)
+    /// Take what there is to write; `false` once the mailbox is dropped and empty. What was taken the time before is written by
+    /// now: it counts until then.
+    pub(super) async fn take(&mut self, together: &mut Vec<Outgoing>) -> bool {
+        self.state.waiting_bytes.fetch_sub(std::mem::take(&mut self.taken_bytes), Ordering::Relaxed);
+        let count = self.queue.recv_many(together, WRITTEN_TOGETHER).await;
+        self.taken_bytes = together.iter().map(weight).sum();
+        count > 0
     }
 
     /// Wait until more was sent than fits.

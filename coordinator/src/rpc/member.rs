@@ -10,7 +10,7 @@ use lookalike::graph::{BlobHash, NodeFailure, NodeId, WorkerId};
 use lookalike::protocol::{
     FailureKind, IncomingBlob, LeaseName, PART_BYTES, ToCoordinator, ToWorker, Welcome, bounded_text,
 };
-use lookalike_worker::wire::{Incoming, Received, WireError, send_message, send_parts};
+use lookalike_worker::wire::{Incoming, Parcel, Received, WireError};
 use tokio::io::{AsyncWriteExt, ReadHalf, WriteHalf};
 use tokio::sync::mpsc::Sender;
 use tokio::sync::oneshot;
@@ -74,17 +74,23 @@ async fn write(
     mut postman: Postman,
     pending_blobs: &AtomicUsize,
 ) -> Result<(), WireError> {
-    while let Some(next) = postman.next().await {
-        match next {
-            Outgoing::Message(message) => send_message(&mut writer, &message).await?,
-            Outgoing::Blob(blob) => {
-                let announcement = ToWorker::Blob { hash: blob.hash().0, length: blob.len() as u64 };
-                send_message(&mut writer, &announcement).await?;
-                send_parts(&mut writer, &blob).await?;
-                pending_blobs.fetch_sub(1, Ordering::Relaxed);
+    let (mut together, mut parcel) = (Vec::new(), Parcel::default());
+    while postman.take(&mut together).await {
+        for next in together.drain(..) {
+            match next {
+                Outgoing::Message(message) => parcel.add(&message)?,
+                Outgoing::Blob(blob) => {
+                    parcel.add(&ToWorker::Blob { hash: blob.hash().0, length: blob.len() as u64 })?;
+                    parcel.add_blob(&blob, &mut writer).await?;
+                    pending_blobs.fetch_sub(1, Ordering::Relaxed);
+                }
+                Outgoing::NoBlob => _ = pending_blobs.fetch_sub(1, Ordering::Relaxed),
             }
-            Outgoing::NoBlob => _ = pending_blobs.fetch_sub(1, Ordering::Relaxed),
+            if parcel.is_full() {
+                parcel.send(&mut writer).await?;
+            }
         }
+        parcel.send(&mut writer).await?;
     }
     writer.shutdown().await?;
     Ok(())
@@ -127,13 +133,15 @@ impl Reader {
             match event {
                 // When nobody listens any more the run is over. Then we still read until the worker has closed its end:
                 // closing over unread bytes would destroy our last word to it.
-                Ok(event) => _ = self.inbound.send(event).await,
+                Ok(Some(event)) => _ = self.inbound.send(event).await,
+                // Its first part follows.
+                Ok(None) => {}
                 Err(error) => return departure_of(&error),
             }
         }
     }
 
-    async fn event(&mut self, received: Received<ToCoordinator>) -> Result<Inbound, WireError> {
+    async fn event(&mut self, received: Received<ToCoordinator>) -> Result<Option<Inbound>, WireError> {
         let worker = self.worker;
         let message = match received {
             Received::Message(message) => message,
@@ -142,14 +150,14 @@ impl Reader {
                     return Err(unexpected("a message", "a part of an output"));
                 };
                 output.push(&part)?;
-                return self.output_or_life();
+                return Ok(Some(self.output()?.unwrap_or_else(|| Inbound::Event(self.life()))));
             }
         };
-        Ok(Inbound::Event(match message {
+        Ok(Some(Inbound::Event(match message {
             ToCoordinator::Heartbeat { executing } if !self.has_reported => {
                 self.has_reported = true;
                 let earlier = executing.iter().map(|node| node.lease).filter(|lease| lease.epoch < self.epoch);
-                return Ok(Inbound::Reported { worker, executing: earlier.collect() });
+                return Ok(Some(Inbound::Reported { worker, executing: earlier.collect() }));
             }
             ToCoordinator::Heartbeat { executing } => {
                 // What was begun for an earlier coordinator has another number there.
@@ -173,18 +181,18 @@ impl Reader {
                 }
                 self.output = Some((lease, IncomingBlob::begin(BlobHash(hash), length)?));
                 self.ask_before(lease, length).await?;
-                return self.output_or_life();
+                return self.output();
             }
             ToCoordinator::Failed { lease, kind, message } => {
                 if !self.is_ours(lease)? {
-                    return Ok(Inbound::Late { worker, lease, output: None });
+                    return Ok(Some(Inbound::Late { worker, lease, output: None }));
                 }
                 let failure = failure(kind, bounded_text(&message));
                 Event::Failed { site: Site::Worker(worker), node: NodeId(lease.node), attempt: lease.attempt, failure }
             }
             ToCoordinator::Draining => Event::WorkerDrains { worker },
             ToCoordinator::Hello(_) | ToCoordinator::Goodbye => return Err(unexpected("work", "a greeting")),
-        }))
+        })))
     }
 
     /// Whether this coordinator gave out a lease; else an earlier one of the run did.
@@ -223,17 +231,17 @@ impl Reader {
         }
     }
 
-    /// The output, if it is complete; else a sign of life.
-    fn output_or_life(&mut self) -> Result<Inbound, WireError> {
+    /// The output, once it is complete.
+    fn output(&mut self) -> Result<Option<Inbound>, WireError> {
         let Some((lease, output)) = self.output.take_if(|(_, output)| output.is_complete()) else {
-            return Ok(Inbound::Event(self.life()));
+            return Ok(None);
         };
         let (worker, output) = (self.worker, output.finish()?);
         if !self.is_ours(lease)? {
-            return Ok(Inbound::Late { worker, lease, output: Some(output) });
+            return Ok(Some(Inbound::Late { worker, lease, output: Some(output) }));
         }
         let (site, node, attempt) = (Site::Worker(worker), NodeId(lease.node), lease.attempt);
-        Ok(Inbound::Event(Event::Finished { site, node, attempt, output }))
+        Ok(Some(Inbound::Event(Event::Finished { site, node, attempt, output })))
     }
 }
 

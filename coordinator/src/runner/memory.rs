@@ -10,8 +10,9 @@ use crate::comm::Action;
 use crate::journal::{Batch, Journal};
 use crate::reactor::Event;
 
-/// How many groups may wait for their transactions: while one is written, the next is made.
-const WAITING_GROUPS: usize = 2;
+/// How many groups may wait for their transactions. With one, what comes while it is written becomes the next: a transaction costs
+/// as much as many events, and a node that begins and ends within one is written once.
+const WAITING_GROUPS: usize = 1;
 
 /// What a group of events has led to: done once it is written down.
 #[derive(Debug, Default)]
@@ -61,10 +62,14 @@ impl Memory {
                 self.today.entry(key).or_insert(node);
             }
         }
-        if group.batch.is_empty() && self.waiting.is_empty() {
+        let batch = std::mem::take(&mut group.batch);
+        if self.waiting.is_empty() && !batch.is_urgent() {
+            if !batch.is_empty() {
+                journal.note(batch);
+            }
             return Some(group);
         }
-        journal.commit(std::mem::take(&mut group.batch));
+        journal.commit(batch);
         self.waiting.push_back(group);
         None
     }

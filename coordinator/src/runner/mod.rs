@@ -6,7 +6,7 @@
 //!   the next deadline ----------------+
 //! ```
 //! Events that have come together are one group. With a journal, a group is written down as one transaction before anything of it
-//! is done: while one is being written, the next is handled.
+//! is done; what comes while it is being written is the next.
 //!
 //! One task owns the state; everything else talks to it through channels. Stopping is a message to every worker and then
 //! waiting for what was started: when [`run`] returns, there is no process and no connection left.
@@ -50,7 +50,7 @@ const FIRST_EPOCH: u64 = 1;
 const INBOUND_CAPACITY: usize = 1024;
 
 /// How many events are handled, and written down, as one group.
-const EVENTS_PER_GROUP: usize = 512;
+const EVENTS_PER_GROUP: usize = 1024;
 
 /// Run the planner's graph on workers, and its coordinator nodes on this process's rayon pool. Returns the planner, which
 /// has seen every output, when no node is open any more. `observer` is told what happens, as it happens; it should be

@@ -4,7 +4,7 @@ use super::{
     Circle, ClusterSettings, DisplayExposure, EnvironmentSettings, MethodSettings, MetricsAddress, ProgressKind,
     ViewSettings,
 };
-use std::path::PathBuf;
+use std::{ffi::OsString, path::PathBuf};
 
 /// Many fits as one run.
 #[derive(Debug, Clone, PartialEq)]
@@ -27,6 +27,15 @@ pub struct BatchSettings {
     pub cluster: ClusterSettings,
     /// How progress is shown.
     pub progress: ProgressKind,
+}
+
+/// What `lookalike batch --slurm` submits.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct JobSettings {
+    /// The user's command line, the command first.
+    pub typed: Vec<OsString>,
+    /// Options of `sbatch`.
+    pub options: Vec<String>,
 }
 
 /// One photo of a batch, its light, and how to fit it.

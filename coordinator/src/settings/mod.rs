@@ -25,7 +25,7 @@ mod scene;
 mod status;
 
 pub use access::AccessSettings;
-pub use batch::{BatchFit, BatchSettings, OnFailure, StageTwo};
+pub use batch::{BatchFit, BatchSettings, JobSettings, OnFailure, StageTwo};
 pub use camera::CameraSpec;
 pub use choices::{CompressAtZero, EnvMapping, Judge, MetricKind, Preset, ProgressKind, Sampling, SearchKind, Start};
 pub use circle::Circle;

@@ -50,7 +50,7 @@ fn killed_anywhere_and_resumed_a_fit_gives_the_same_bits_and_does_nothing_twice(
         resume(folder.path(), &name).done();
         let journal = JournalView::of(&out(&name));
         assert_eq!(journal.run_twice(), 0, "after {finished}");
-        let recalled = journal.number("SELECT count(*) FROM nodes WHERE epoch = 2 AND state = 4");
+        let recalled = journal.number("SELECT count(*) FROM node_list WHERE epoch = 2 AND state = 'recalled'");
         assert!(recalled >= finished as u64, "{recalled} after {finished}");
         assert!(fs::read(out(&name).join("access.json")).unwrap() == access, "workers elsewhere have this file");
         assert_eq!(without_timing(&out("whole")), without_timing(&out(&name)), "after {finished}");

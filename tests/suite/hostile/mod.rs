@@ -1,6 +1,8 @@
 //! What happens when somebody is not who they should be, on either end of the wire: they get nothing, they cost little, and the
 //! run goes on.
 
+mod false_results;
+mod impostors;
 mod liars;
 mod refusals;
 mod secrets;

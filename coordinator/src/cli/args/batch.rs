@@ -1,13 +1,12 @@
 //! `lookalike batch`.
 
 use super::{
-    super::NotThereYet,
     cluster::ClusterArgs,
     fit::{DiagnosticsArgs, score},
     method::MethodArgs,
     scene::{EnvironmentArgs, PhotoArgs, SphereArgs, ViewArgs},
 };
-use crate::settings::{BatchFit, BatchSettings, OnFailure, Preset, StageTwo};
+use crate::settings::{BatchFit, BatchSettings, JobSettings, OnFailure, Preset, StageTwo};
 use clap::{Args, Parser};
 use std::{ffi::OsString, path::PathBuf};
 
@@ -23,6 +22,9 @@ pub(crate) struct BatchArgs {
     /// Flags of the method that were given, as they were typed.
     #[arg(skip)]
     pub(crate) given: Vec<OsString>,
+    /// The whole command line, the command first.
+    #[arg(skip)]
+    pub(crate) typed: Vec<OsString>,
     /// Folder of results, one subfolder per fit; must not hold a run, unless --resume goes on with it
     #[arg(long, short, value_name = "DIR", help_heading = "Output")]
     out: PathBuf,
@@ -41,9 +43,12 @@ pub(crate) struct BatchArgs {
     /// Where candidates are rendered, judged and polished; the results are the same
     #[arg(long, value_name = "WHERE", value_enum, default_value_t, help_heading = "Workers")]
     stage_two: StageTwo,
-    /// Submit the run to Slurm (not there yet)
-    #[arg(long, help_heading = "Workers")]
+    /// Submit the run to Slurm, which starts coordinator and workers where there is room, and return
+    #[arg(long, conflicts_with_all = ["workers", "listen", "advertise", "access"], help_heading = "Workers")]
     slurm: bool,
+    /// With --slurm: options of sbatch, such as --nodes=4 --cpus-per-task=16 --time=2:00:00
+    #[arg(last = true, requires = "slurm", value_name = "SBATCH_OPTION")]
+    sbatch: Vec<String>,
     #[command(flatten)]
     diagnostics: DiagnosticsArgs,
 }
@@ -65,14 +70,9 @@ impl BatchArgs {
         })
     }
 
-    /// Refuses what this version does not have.
-    pub(crate) fn check(&self) -> anyhow::Result<()> {
-        if self.slurm {
-            let instead =
-                "run lookalike batch in a job of its own, and its workers with srun lookalike worker --access FILE";
-            return Err(NotThereYet { what: "--slurm", instead }.into());
-        }
-        Ok(())
+    /// The job that the run is to be, if it is to be one.
+    pub(crate) fn job(&self) -> Option<JobSettings> {
+        self.slurm.then(|| JobSettings { typed: self.typed.clone(), options: self.sbatch.clone() })
     }
 }
 
@@ -125,6 +125,7 @@ Examples:
   lookalike batch balls.toml --out runs --seed 3 --fail-fast
   lookalike batch balls.toml --out runs --resume
   lookalike batch balls.toml --out runs --workers 0 --listen 10.0.0.1:4100 --stage-two workers --metrics 9100
+  lookalike batch balls.toml --out runs --slurm -- --nodes=4 --cpus-per-task=16 --time=2:00:00
 
 where balls.toml is, for instance (its relative paths are relative to the file):
   photos = \"balls/*.exr\"                  # every photo under every light with every model
@@ -142,4 +143,4 @@ where balls.toml is, for instance (its relative paths are relative to the file):
   sphere = [128, 128, 100]
   max-cssim = 0.05
 
-docs/batch.md has the whole grammar. The exit code is 4 if a fit failed, else 1 if one missed its max-cssim, else 0.";
+docs/batch.md has the whole grammar, docs/cluster.md more on Slurm. The exit code is 4 if a fit failed, else 1 if one missed its max-cssim, else 0.";

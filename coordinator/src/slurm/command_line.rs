@@ -1,0 +1,34 @@
+//! What a job runs, from what the user typed to submit it.
+
+use anyhow::bail;
+use std::ffi::OsString;
+
+/// The command line of the job: the user's own, the command first, without what submits it. What stands behind a lone `--` is for
+/// `sbatch`.
+///
+/// # Errors
+/// When an argument is not UTF-8, which a job script cannot hold.
+pub fn command_line(typed: &[OsString]) -> anyhow::Result<Vec<String>> {
+    let mut command = Vec::new();
+    for argument in typed.iter().take_while(|argument| *argument != "--") {
+        match argument.to_str() {
+            // The script asks for --resume itself.
+            Some("--slurm" | "--resume") => {}
+            Some(text) => command.push(text.to_owned()),
+            None => bail!("a job script is text, and the argument {argument:?} is not UTF-8"),
+        }
+    }
+    Ok(command)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn job_runs_what_was_typed_without_what_submits_it() {
+        let typed = "batch a.toml --resume --out run --slurm --seed 3 -- --nodes=4 -p gpu";
+        let command = command_line(&typed.split(' ').map(OsString::from).collect::<Vec<_>>()).unwrap();
+        assert_eq!(command, ["batch", "a.toml", "--out", "run", "--seed", "3"]);
+    }
+}

@@ -1,0 +1,7 @@
+//! What the runner itself costs: see `lookalike_tests::overhead`.
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    lookalike_tests::overhead::main()
+}

@@ -1,0 +1,187 @@
+//! A machine of its own for a worker: a network namespace with two cables to this one, of which a test can pull one.
+//!
+//! ```text
+//!   this machine ---- line ----- worker's namespace     what the worker and its coordinator say
+//!                ---- control --                        what nodes say to the test; never hurt
+//! ```
+//! Needs root and iproute2. One direction goes silent by a wrong hardware address for the other end: packets leave and nobody takes
+//! them, which needs no packet filter.
+
+use std::net::IpAddr;
+use std::path::Path;
+use std::process::Command;
+use std::sync::atomic::{AtomicU32, Ordering};
+
+/// A namespace, gone when dropped, with all processes in it.
+#[derive(Debug)]
+pub struct Namespace {
+    name: String,
+    line: Cable,
+    control: Cable,
+}
+
+/// A pair of interfaces. The addresses are those of RFC 2544, which no network uses.
+#[derive(Debug)]
+struct Cable {
+    /// The interface at this machine's end.
+    here: String,
+    /// The interface at the namespace's end.
+    there: String,
+    near: String,
+    far: String,
+}
+
+/// A hardware address that nobody has.
+const NOBODY: &str = "02:00:00:00:00:01";
+
+impl Namespace {
+    /// A namespace; says why there is none where it cannot be made.
+    #[must_use]
+    pub fn new() -> Option<Self> {
+        static COUNT: AtomicU32 = AtomicU32::new(0);
+        // Other test processes have other numbers, as far as there are enough.
+        let (number, serial) = (std::process::id() & 0xfff, COUNT.fetch_add(1, Ordering::Relaxed));
+        let name = format!("lk{number}-{serial}");
+        if let Err(why) = try_ip(&format!("netns add {name}")) {
+            skip(&why);
+            return None;
+        }
+        let cable = |kind: &str, index: u32| Cable::new(&name, kind, number * 8 + (serial * 2 + index) % 8);
+        let namespace = Self { line: cable("l", 0), control: cable("c", 1), name };
+        let laid = namespace.line.lay(&namespace.name).and_then(|()| namespace.control.lay(&namespace.name));
+        match laid {
+            Ok(()) => Some(namespace),
+            Err(why) => {
+                skip(&why);
+                None
+            }
+        }
+    }
+
+    /// This machine's address on the line: where a coordinator has to listen.
+    ///
+    /// # Panics
+    /// Never.
+    #[must_use]
+    pub fn line(&self) -> IpAddr {
+        self.line.near.parse().expect("an address")
+    }
+
+    /// This machine's address on the control cable: where a gate has to be.
+    ///
+    /// # Panics
+    /// Never.
+    #[must_use]
+    pub fn control(&self) -> IpAddr {
+        self.control.near.parse().expect("an address")
+    }
+
+    /// A program that is to run in there. The process is that of the program itself.
+    #[must_use]
+    pub fn command(&self, program: impl AsRef<Path>) -> Command {
+        let mut command = Command::new("ip");
+        command.args(["netns", "exec", &self.name]).arg(program.as_ref());
+        command
+    }
+
+    /// Pull the cable: silence both ways, and no end.
+    ///
+    /// # Panics
+    /// When the system does not let us.
+    pub fn cut(&self) {
+        ip(&format!("link set {} down", self.line.here));
+    }
+
+    /// Plug the cable in again.
+    ///
+    /// # Panics
+    /// When the system does not let us.
+    pub fn heal(&self) {
+        ip(&format!("link set {} up", self.line.here));
+    }
+
+    /// This machine hears no more of what the namespace says on the line; the other way all is well.
+    ///
+    /// # Panics
+    /// When the system does not let us.
+    pub fn mute(&self) {
+        let Cable { near, there, .. } = &self.line;
+        ip(&format!("-n {} neigh replace {near} lladdr {NOBODY} dev {there} nud permanent", self.name));
+    }
+
+    /// The namespace hears no more of what this machine says on the line; the other way all is well.
+    ///
+    /// # Panics
+    /// When the system does not let us.
+    pub fn deafen(&self) {
+        let Cable { far, here, .. } = &self.line;
+        ip(&format!("neigh replace {far} lladdr {NOBODY} dev {here} nud permanent"));
+    }
+
+    /// Undo [`mute`](Self::mute) and [`deafen`](Self::deafen).
+    ///
+    /// # Panics
+    /// When neither was done.
+    pub fn hear(&self) {
+        let Cable { here, there, near, far } = &self.line;
+        let ends = [format!("neigh del {far} dev {here}"), format!("-n {} neigh del {near} dev {there}", self.name)];
+        let undone = ends.map(|end| try_ip(&end).is_ok());
+        assert!(undone.contains(&true), "the line was well");
+    }
+}
+
+impl Drop for Namespace {
+    fn drop(&mut self) {
+        // Its processes keep a namespace alive.
+        let pids = Command::new("ip").args(["netns", "pids", &self.name]).output();
+        let pids = pids.map(|output| String::from_utf8_lossy(&output.stdout).into_owned()).unwrap_or_default();
+        for process in pids.split_whitespace() {
+            let _ = Command::new("kill").args(["-KILL", process]).status();
+        }
+        // The other ends of its cables go with it; those of cables that were not laid into it have to be taken away.
+        for cable in [&self.line, &self.control] {
+            let _ = try_ip(&format!("link del {}", cable.here));
+        }
+        let _ = try_ip(&format!("netns del {}", self.name));
+    }
+}
+
+impl Cable {
+    /// The cable of this number: four addresses of 198.18.0.0/15 each.
+    fn new(namespace: &str, kind: &str, number: u32) -> Self {
+        let address = |host: u32| {
+            let [_, b, c, d] = (0xc612_0000 + number * 4 + host).to_be_bytes();
+            format!("198.{b}.{c}.{d}")
+        };
+        let here = format!("{namespace}{kind}");
+        Self { here, there: format!("{kind}0"), near: address(1), far: address(2) }
+    }
+
+    fn lay(&self, namespace: &str) -> Result<(), String> {
+        let Self { here, there, near, far } = self;
+        try_ip(&format!("link add {here} type veth peer name {there} netns {namespace}"))?;
+        try_ip(&format!("addr add {near}/30 dev {here}"))?;
+        try_ip(&format!("link set {here} up"))?;
+        try_ip(&format!("-n {namespace} addr add {far}/30 dev {there}"))?;
+        try_ip(&format!("-n {namespace} link set {there} up"))
+    }
+}
+
+#[expect(clippy::print_stdout, reason = "a test says what it skips")]
+fn skip(why: &str) {
+    println!("skipped: cannot make a network namespace here (needs root and iproute2): {}", why.trim());
+}
+
+fn ip(arguments: &str) {
+    if let Err(why) = try_ip(arguments) {
+        panic!("ip {arguments}: {why}");
+    }
+}
+
+fn try_ip(arguments: &str) -> Result<(), String> {
+    let output = Command::new("ip").args(arguments.split_whitespace()).output().map_err(|error| error.to_string())?;
+    match output.status.success() {
+        true => Ok(()),
+        false => Err(String::from_utf8_lossy(&output.stderr).into_owned()),
+    }
+}

@@ -1,0 +1,246 @@
+//! A wire between a worker and its coordinator in the hands of a test: it counts bytes, stops, stays silent, breaks.
+//!
+//! Everything on it is encrypted, so what it can tell and do is about bytes and connections, as with a real one.
+
+use std::io::{ErrorKind, Read, Write};
+use std::net::{Shutdown, SocketAddr, TcpListener, TcpStream};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::thread;
+use std::time::Duration;
+
+/// Longer than anything takes; a test that waits longer has failed.
+const PATIENCE: Duration = Duration::from_secs(60);
+
+/// How much is recorded.
+const RECORD_BYTES: usize = 64 << 10;
+
+/// Where bytes go.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Way {
+    /// From the worker to the coordinator.
+    Up,
+    /// From the coordinator to the worker.
+    Down,
+}
+
+/// A wire that worker after worker may use.
+#[derive(Debug)]
+pub struct Proxy {
+    address: SocketAddr,
+    wire: Arc<Wire>,
+}
+
+#[derive(Debug, Default)]
+struct Wire {
+    state: Mutex<State>,
+    changed: Condvar,
+}
+
+/// What has passed and what may, since the last connection began.
+#[derive(Debug, Default)]
+struct State {
+    passed: [u64; 2],
+    allowed: [Option<u64>; 2],
+    /// Bytes that wait to be allowed.
+    stopped: [bool; 2],
+    connections: u64,
+    /// What went up first.
+    record: Vec<u8>,
+    /// Both ends of what is connected.
+    streams: Vec<TcpStream>,
+    is_over: bool,
+}
+
+impl Proxy {
+    /// A wire to this coordinator.
+    ///
+    /// # Panics
+    /// When the system has no free port.
+    #[must_use]
+    pub fn to(coordinator: &str) -> Self {
+        let listener = TcpListener::bind("127.0.0.1:0").expect("a free port");
+        let address = listener.local_addr().expect("the address of a bound socket");
+        let wire = Arc::new(Wire::default());
+        let (accepting, coordinator) = (Arc::clone(&wire), coordinator.to_owned());
+        thread::spawn(move || accepting.serve(&listener, &coordinator));
+        Self { address, wire }
+    }
+
+    /// What to tell the worker with `--address`.
+    #[must_use]
+    pub fn address(&self) -> String {
+        self.address.to_string()
+    }
+
+    /// Let only so many bytes through on this way, counted from the begin of each connection; `None`: all. The end of a stream does
+    /// not get past bytes that wait.
+    pub fn allow(&self, way: Way, bytes: Option<u64>) {
+        let mut state = self.wire.lock();
+        state.allowed[way as usize] = bytes;
+        // Whoever has to wait still will say so again.
+        state.stopped[way as usize] = false;
+        drop(state);
+        self.wire.changed.notify_all();
+    }
+
+    /// Let nothing more through on either way: silence, and no end. Undone by [`heal`](Self::heal).
+    pub fn silence(&self) {
+        let mut state = self.wire.lock();
+        state.allowed = [Some(0), Some(0)];
+        state.stopped = [false, false];
+    }
+
+    /// Let everything through again.
+    pub fn heal(&self) {
+        self.wire.lock().allowed = [None, None];
+        self.wire.changed.notify_all();
+    }
+
+    /// Wait until bytes have to wait on this way, and return how many have passed.
+    ///
+    /// # Panics
+    /// When none come.
+    #[must_use]
+    pub fn wait_for_stop(&self, way: Way) -> u64 {
+        self.wire.wait_while(|state| !state.stopped[way as usize]).passed[way as usize]
+    }
+
+    /// How many bytes have passed on this way since the last connection began.
+    #[must_use]
+    pub fn passed(&self, way: Way) -> u64 {
+        self.wire.lock().passed[way as usize]
+    }
+
+    /// The first bytes of all that the last worker has sent, as somebody on the wire sees them: 64 KiB at most.
+    #[must_use]
+    pub fn record(&self) -> Vec<u8> {
+        self.wire.lock().record.clone()
+    }
+
+    /// Break all connections, and let everything through on the next ones.
+    pub fn renew(&self) {
+        let mut state = self.wire.lock();
+        state.cut();
+        state.allowed = [None, None];
+        drop(state);
+        self.wire.changed.notify_all();
+    }
+
+    /// Break all connections; what waits is lost. New ones may come.
+    pub fn cut(&self) {
+        self.wire.lock().cut();
+        self.wire.changed.notify_all();
+    }
+}
+
+impl Drop for Proxy {
+    fn drop(&mut self) {
+        let mut state = self.wire.lock();
+        state.is_over = true;
+        state.cut();
+        drop(state);
+        self.wire.changed.notify_all();
+        // Wakes the thread that accepts.
+        let _ = TcpStream::connect(self.address);
+    }
+}
+
+impl State {
+    fn cut(&mut self) {
+        // An error means that it is broken already.
+        self.streams.drain(..).for_each(|stream| _ = stream.shutdown(Shutdown::Both));
+    }
+}
+
+impl Wire {
+    fn lock(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn wait_while(&self, condition: impl FnMut(&mut State) -> bool) -> MutexGuard<'_, State> {
+        let waited = self.changed.wait_timeout_while(self.lock(), PATIENCE, condition);
+        let (state, timeout) = waited.unwrap_or_else(PoisonError::into_inner);
+        assert!(!timeout.timed_out(), "nothing comes on the wire: {state:?}");
+        state
+    }
+
+    fn serve(self: &Arc<Self>, listener: &TcpListener, coordinator: &str) {
+        for below in listener.incoming() {
+            let Ok(below) = below else { continue };
+            let mut state = self.lock();
+            if state.is_over {
+                return;
+            }
+            // No coordinator at the moment: the worker sees its connection closed.
+            let Ok(above) = TcpStream::connect(coordinator) else { continue };
+            state.passed = [0, 0];
+            state.stopped = [false, false];
+            state.record.clear();
+            state.connections += 1;
+            let number = state.connections;
+            for (way, from, to) in [(Way::Up, &below, &above), (Way::Down, &above, &below)] {
+                let (Ok(from), Ok(to)) = (from.try_clone(), to.try_clone()) else { continue };
+                let wire = Arc::clone(self);
+                thread::spawn(move || wire.carry(way, number, from, &to));
+            }
+            state.streams.extend([below, above]);
+            drop(state);
+            self.changed.notify_all();
+        }
+    }
+
+    /// Carry bytes one way until the end.
+    fn carry(&self, way: Way, number: u64, mut from: TcpStream, mut to: &TcpStream) {
+        let mut buffer = [0; 4096];
+        loop {
+            let count = match from.read(&mut buffer) {
+                Ok(count) => count,
+                Err(error) if error.kind() == ErrorKind::Interrupted => continue,
+                Err(_) => 0,
+            };
+            let mut rest = &buffer[..count];
+            loop {
+                let Some(now) = self.take(way, number, rest) else { return };
+                let (passing, waiting) = rest.split_at(now);
+                if to.write_all(passing).is_err() {
+                    return;
+                }
+                rest = waiting;
+                if rest.is_empty() {
+                    break;
+                }
+            }
+            if count == 0 {
+                // The other side may still have something to say.
+                let _ = to.shutdown(Shutdown::Write);
+                return;
+            }
+        }
+    }
+
+    /// How many of so many bytes may pass now; waits until one may, and the end of a stream until everything may. `None` when their
+    /// connection is broken.
+    fn take(&self, way: Way, number: u64, bytes: &[u8]) -> Option<usize> {
+        let (is_up, way) = (way == Way::Up, way as usize);
+        let mut state = self.lock();
+        loop {
+            if state.is_over || state.streams.is_empty() || state.connections != number {
+                return None;
+            }
+            let room = state.allowed[way].map_or(u64::MAX, |allowed| allowed.saturating_sub(state.passed[way]));
+            if room > 0 {
+                let now = bytes.len().min(usize::try_from(room).unwrap_or(usize::MAX));
+                let recorded = RECORD_BYTES.saturating_sub(state.record.len()).min(now);
+                if is_up {
+                    state.record.extend_from_slice(&bytes[..recorded]);
+                }
+                state.passed[way] += now as u64;
+                state.stopped[way] = false;
+                return Some(now);
+            }
+            state.stopped[way] = true;
+            self.changed.notify_all();
+            state = self.changed.wait(state).unwrap_or_else(PoisonError::into_inner);
+        }
+    }
+}

@@ -1,0 +1,140 @@
+//! A worker on a machine of its own, and what may happen to the line to it. Needs root and iproute2; skipped with a message else.
+
+use std::time::Duration;
+
+use lookalike_coordinator::comm::{Departure, RunEvent};
+use lookalike_coordinator::core::Policy;
+use lookalike_coordinator::runner::RunnerOptions;
+use lookalike_tests::cluster::Cluster;
+use lookalike_tests::gate::{Gate, Waiting};
+use lookalike_tests::netns::Namespace;
+use lookalike_tests::process::Process;
+
+use super::{
+    PROGRAM, deaths_when_requeued, departure, gates, gates_reference, run_for_others, wait_for_start, wait_for_worker,
+    without_workers, worker_at,
+};
+
+/// A worker in a namespace, at the first gate of a run.
+struct Scene {
+    // Dropped in this order: the processes in the namespace, then the namespace.
+    worker: Process,
+    waiting: Waiting,
+    gate: Gate,
+    cluster: Cluster,
+    namespace: Namespace,
+}
+
+/// `None` where there are no namespaces.
+fn scene(nodes: usize, lost_after: Duration) -> Option<Scene> {
+    let namespace = Namespace::new()?;
+    let gate = Gate::at(namespace.control());
+    let policy = Policy { heartbeat: Duration::from_millis(100), lost_after, spare_leases: 0, ..Policy::default() };
+    let listen = Some((namespace.line(), 0).into());
+    let options = RunnerOptions { policy, listen, ..without_workers() };
+    let (cluster, _) = run_for_others(gates(&gate, nodes), options);
+    let mut command = namespace.command(PROGRAM);
+    let worker = Process::start(command.args(["worker", "--threads", "1", "--access"]).arg(cluster.access_file()));
+    let waiting = gate.next();
+    assert_eq!(waiting.process(), worker.id());
+    wait_for_start(&cluster);
+    Some(Scene { worker, waiting, gate, cluster, namespace })
+}
+
+const SHORT: Duration = Duration::from_millis(700);
+
+#[test]
+fn line_cut_for_less_than_the_lease_delays_the_result_and_nothing_else() {
+    let Some(Scene { worker, waiting, gate, cluster, namespace }) = scene(1, Duration::from_secs(20)) else { return };
+    namespace.cut();
+    waiting.release();
+    let left = |event: &RunEvent| matches!(event, RunEvent::WorkerLeft { .. } | RunEvent::NodeFinished { .. });
+    cluster.assert_none_for(Duration::from_millis(800), left);
+    namespace.heal();
+    let (result, summary) = cluster.finish();
+    assert_eq!(result, gates_reference(1));
+    assert_eq!((summary.workers_joined, summary.requeued_nodes), (1, 0));
+    assert!(gate.is_deserted());
+    assert_eq!(worker.output().status.code(), Some(0));
+}
+
+#[test]
+fn line_cut_for_longer_than_the_lease_gives_the_node_to_another_and_the_late_result_is_equal() {
+    let Some(Scene { worker, waiting, gate, cluster, namespace }) = scene(3, SHORT) else { return };
+    namespace.cut();
+    assert_eq!(departure(&cluster), Departure::Silent);
+    assert_eq!(deaths_when_requeued(&cluster), 0);
+    waiting.release();
+    let other = worker_at(&cluster.access_file(), &cluster.access().address);
+    gate.next().release();
+    let second = gate.next();
+    wait_for_start(&cluster);
+    wait_for_start(&cluster);
+    namespace.heal();
+    // By itself it notices that its connection is dead, comes back with its result, and takes the third node.
+    wait_for_worker(&cluster);
+    let third = gate.next();
+    assert_eq!(third.process(), worker.id());
+    wait_for_start(&cluster);
+    let keeper = gate.keep(Waiting::release);
+    [second, third].into_iter().for_each(Waiting::release);
+    let (result, summary) = cluster.finish();
+    keeper.stop();
+    assert_eq!(result, gates_reference(3));
+    assert_eq!((summary.duplicate_results, summary.suspected_nodes), (1, 0), "{summary:?}");
+    for worker in [worker, other] {
+        assert_eq!(worker.output().status.code(), Some(0));
+    }
+}
+
+#[test]
+fn worker_that_is_not_heard_though_it_hears_is_lost_and_comes_back() {
+    let Some(Scene { worker, waiting, gate, cluster, namespace }) = scene(1, SHORT) else { return };
+    namespace.mute();
+    assert_eq!(departure(&cluster), Departure::Silent);
+    namespace.hear();
+    // It finds out that it was given up, comes back, and goes on with what it has in hand.
+    wait_for_worker(&cluster);
+    wait_for_start(&cluster);
+    waiting.release();
+    let (result, summary) = cluster.finish();
+    assert_eq!(result, gates_reference(1));
+    assert_eq!((summary.workers_joined, summary.requeued_nodes, summary.suspected_nodes), (2, 1, 0));
+    // It was not run a second time.
+    assert!(gate.is_deserted());
+    assert_eq!(worker.output().status.code(), Some(0));
+}
+
+#[test]
+fn worker_that_hears_nothing_though_it_is_heard_still_brings_its_result() {
+    let Some(Scene { worker, waiting, gate, cluster, namespace }) = scene(1, Duration::from_secs(20)) else { return };
+    namespace.deafen();
+    waiting.release();
+    cluster.wait_for(|event| matches!(event, RunEvent::NodeFinished { .. }).then_some(()));
+    // The receipt, and the last node, are on their way until it hears again.
+    cluster.assert_none_for(Duration::from_millis(300), |event| matches!(event, RunEvent::WorkerLeft { .. }));
+    namespace.hear();
+    let (result, summary) = cluster.finish();
+    assert_eq!(result, gates_reference(1));
+    assert_eq!((summary.workers_joined, summary.requeued_nodes), (1, 0));
+    assert!(gate.is_deserted());
+    assert_eq!(worker.output().status.code(), Some(0));
+}
+
+#[test]
+fn machine_that_vanishes_with_its_worker_leaves_half_a_connection_and_loses_no_node() {
+    let Some(Scene { worker, waiting, gate, cluster, namespace }) = scene(1, SHORT) else { return };
+    namespace.cut();
+    // Nobody hears of its end.
+    worker.kill();
+    waiting.wait_for_death();
+    assert_eq!(departure(&cluster), Departure::Silent);
+    assert_eq!(deaths_when_requeued(&cluster), 0);
+    let other = worker_at(&cluster.access_file(), &cluster.access().address);
+    gate.next().release();
+    let (result, summary) = cluster.finish();
+    assert_eq!(result, gates_reference(1));
+    assert_eq!((summary.workers_joined, summary.requeued_nodes), (2, 1));
+    assert_eq!(other.output().status.code(), Some(0));
+    drop(namespace);
+}

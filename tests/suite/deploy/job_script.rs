@@ -1,0 +1,198 @@
+//! The job script of Slurm on stand-ins: `srun` runs its command here, `scontrol` and `squeue` say what the test wants them to.
+
+use super::source;
+use crate::fit::scene::{fit, folder, without_timing};
+use lookalike_tests::process::{Process, signal, stderr};
+use serde_json::Value;
+use std::{
+    fs,
+    os::unix::fs::PermissionsExt,
+    path::Path,
+    process::{Command, Output},
+};
+use tempfile::TempDir;
+
+/// Several shards of the subset's table, so that something can die between them.
+const FLAGS: &str = "--samples 128 --seed 5";
+
+/// The node that a step is for is in its environment, and what ends the step is told to all its processes, as Slurm would have it.
+const SRUN: &str = r#"for argument; do
+  case "$argument" in
+    --nodelist=*) export SLURMD_NODENAME="${argument#--nodelist=}" ;;
+    bash) break ;;
+  esac
+  shift
+done
+setsid "$@" &
+trap 'kill -TERM -$!; wait $!' TERM
+wait $!"#;
+
+/// Lists of hosts are written out; what was requeued is noted.
+const SCONTROL: &str = r#"case "$1" in
+  show) echo "$3" | tr , '\n' ;;
+  requeue) echo "$2" >> "$SITE/requeued" ;;
+esac"#;
+
+/// The nodes of the job.
+const SQUEUE: &str = r#"cat "$SITE/nodes""#;
+
+/// A folder with the scene of a fit, and a site of Slurm in it that has two nodes.
+fn site() -> TempDir {
+    let folder = folder();
+    fs::create_dir(folder.path().join("bin")).unwrap();
+    fs::write(folder.path().join("nodes"), "first,second\n").unwrap();
+    for (name, body) in [("srun", SRUN), ("scontrol", SCONTROL), ("squeue", SQUEUE)] {
+        let path = folder.path().join("bin").join(name);
+        fs::write(&path, format!("#!/bin/sh\n{body}\n")).unwrap();
+        fs::set_permissions(&path, fs::Permissions::from_mode(0o755)).unwrap();
+    }
+    folder
+}
+
+/// The job script with a command line, as Slurm starts it on the first of two nodes.
+fn job(site: &Path, line: &str, environment: &[(&str, &str)]) -> Command {
+    let path = format!("{}:{}", site.join("bin").display(), std::env::var("PATH").unwrap());
+    let mut command = Command::new("bash");
+    command.arg(source("deploy/slurm/lookalike.sbatch")).args(line.split_whitespace()).current_dir(site);
+    command.env("PATH", path).env("SITE", site).env_remove("RUST_LOG");
+    command.env("SLURM_JOB_ID", "7").env("SLURM_JOB_NODELIST", "first,second").env("SLURMD_NODENAME", "first");
+    command.env("SLURM_CPUS_ON_NODE", "1").env("LOOKALIKE", env!("CARGO_BIN_EXE_lookalike-under-test"));
+    command.env("LOOKALIKE_ADVERTISE", "localhost").env("LOOKALIKE_LISTEN", "127.0.0.1:0");
+    command.envs(environment.iter().copied());
+    command
+}
+
+fn line(out: &str) -> String {
+    format!("fit photo.exr --env map.exr --out {out} --progress json {FLAGS}")
+}
+
+/// Runs the job; `act` is told of the script's process and of each event or message, once all before it.
+fn watch(mut command: Command, mut act: impl FnMut(u32, &[Value])) -> (Output, Vec<Value>) {
+    let process = Process::start(&mut command);
+    let script = process.id();
+    process.watch_stderr(|events| act(script, events))
+}
+
+fn is(event: &Value, name: &str, label: &str) -> bool {
+    event["event"] == name && event["label"].as_str().is_some_and(|text| text.starts_with(label))
+}
+
+fn says(events: &[Value], words: &str) -> bool {
+    events.iter().any(|event| event.as_str().is_some_and(|line| line.contains(words)))
+}
+
+/// The process that a process has started with this word in its command line.
+fn child(parent: u32, word: &str) -> u32 {
+    let listed = Command::new("ps").args(["-o", "pid=,args=", "--ppid", &parent.to_string()]).output().unwrap();
+    let listed = String::from_utf8(listed.stdout).unwrap();
+    let found = listed.lines().find(|line| line.split_whitespace().any(|argument| argument == word));
+    found.and_then(|line| line.split_whitespace().next()?.parse().ok()).unwrap_or_else(|| panic!("{word}: {listed}"))
+}
+
+/// The results of the job are those of a fit of this machine alone.
+fn assert_same_as_local(site: &Path, out: &str) {
+    fit(site, "local", &format!("{FLAGS} --workers 1 --progress none")).done();
+    assert_eq!(without_timing(&site.join("local")), without_timing(&site.join(out)));
+}
+
+#[test]
+fn task_of_an_array_runs_a_worker_on_each_node_and_leaves_the_same_results() {
+    let site = site();
+    let job = job(site.path(), &line("run-%a"), &[("SLURM_ARRAY_TASK_ID", "3")]);
+    let (output, events) = watch(job, |_, _| ());
+    assert_eq!(output.status.code(), Some(0), "{events:?}");
+    let joined = events.iter().filter(|event| event["event"] == "worker-joined");
+    let processes: Vec<_> = joined.map(|event| &event["process"]).collect();
+    assert!(processes.len() == 2 && processes[0] != processes[1], "{events:?}");
+    assert_same_as_local(site.path(), "run-3");
+}
+
+#[test]
+fn killed_worker_and_killed_coordinator_are_started_again_and_leave_no_trace() {
+    let site = site();
+    let (mut worker, mut coordinator) = (None, None);
+    let (output, events) = watch(job(site.path(), &line("run"), &[]), |script, events| {
+        let last = events.last().unwrap();
+        if worker.is_none() && is(last, "node-started", "transport of the subset") {
+            let joined = |event: &&Value| event["event"] == "worker-joined" && event["worker"] == last["worker"];
+            let process = events.iter().find(joined).and_then(|event| event["process"].as_u64()).unwrap();
+            worker = Some(process);
+            signal(u32::try_from(process).unwrap(), "KILL");
+        }
+        if coordinator.is_none() && is(last, "node-started", "transport in full") {
+            let process = child(script, "fit");
+            coordinator = Some(process);
+            signal(process, "KILL");
+        }
+    });
+    assert!(worker.is_some() && coordinator.is_some(), "{events:?}");
+    assert_eq!(output.status.code(), Some(0), "{events:?}");
+    assert!(says(&events, "ended with status 137; starting it again in 1 s"), "{events:?}");
+    assert!(says(&events, "the coordinator was killed (status 137); starting it again"), "{events:?}");
+    assert_same_as_local(site.path(), "run");
+}
+
+#[test]
+fn time_limit_gives_the_job_back_and_its_next_turn_goes_on() {
+    let site = site();
+    let mut warned = false;
+    let (output, events) = watch(job(site.path(), &line("run"), &[]), |script, events| {
+        if !warned && is(events.last().unwrap(), "node-started", "transport in full") {
+            warned = true;
+            signal(script, "USR1");
+        }
+    });
+    assert_eq!(output.status.code(), Some(130), "{events:?}");
+    assert_eq!(fs::read_to_string(site.path().join("requeued")).unwrap(), "7\n");
+    assert!(says(&events, "the time limit is near; giving the job back to the queue"), "{events:?}");
+    let (output, events) = watch(job(site.path(), &line("run"), &[("SLURM_RESTART_COUNT", "1")]), |_, _| ());
+    assert_eq!(output.status.code(), Some(0), "{events:?}");
+    assert!(!events.iter().any(|event| is(event, "node-started", "search")), "searches were done twice: {events:?}");
+    assert_same_as_local(site.path(), "run");
+}
+
+#[test]
+fn job_that_was_given_back_too_often_says_so_and_stays() {
+    let site = site();
+    let environment = [("SLURM_RESTART_COUNT", "2"), ("LOOKALIKE_MAX_RESTARTS", "2")];
+    let mut warned = false;
+    let (output, events) = watch(job(site.path(), &line("run"), &environment), |script, events| {
+        if !warned && events.last().unwrap()["event"] == "worker-joined" {
+            warned = true;
+            signal(script, "USR1");
+        }
+    });
+    assert_eq!(output.status.code(), Some(130), "{events:?}");
+    assert!(says(&events, "the job was given back 2 times already"), "{events:?}");
+    assert!(!site.path().join("requeued").exists());
+}
+
+#[test]
+fn command_lines_that_cannot_work_are_refused_before_anything_is_started() {
+    let site = site();
+    let cases = [
+        ("", "expected a command line of lookalike"),
+        ("demo --out run", "expected the command batch or fit, found demo"),
+        ("fit photo.exr --env map.exr", "expected --out DIR"),
+        ("fit photo.exr --env map.exr --out run --workers 3", "--workers is not for a job of Slurm"),
+        ("fit photo.exr --env map.exr --out run --listen=0.0.0.0:1", "--listen is not for a job of Slurm"),
+    ];
+    for (line, words) in cases {
+        let output = Process::start(&mut job(site.path(), line, &[])).output();
+        assert_eq!(output.status.code(), Some(2), "{line}: {}", stderr(&output));
+        assert!(stderr(&output).contains(words), "{line}: {}", stderr(&output));
+    }
+    let output = Process::start(&mut job(site.path(), &line("run"), &[("LOOKALIKE", "/no/lookalike")])).output();
+    assert!(output.status.code() == Some(2) && stderr(&output).contains("cannot find the program /no/lookalike"));
+    let output = Process::start(job(site.path(), &line("run"), &[]).env_remove("SLURM_JOB_ID")).output();
+    assert!(output.status.code() == Some(2) && stderr(&output).contains("submit it with sbatch"));
+    assert!(!site.path().join("run").exists());
+}
+
+#[test]
+fn bad_input_ends_the_job_with_the_coordinators_code() {
+    let site = site();
+    let (output, events) = watch(job(site.path(), "fit photo.exr --env missing.exr --out run", &[]), |_, _| ());
+    assert_eq!(output.status.code(), Some(2), "{events:?}");
+    assert!(says(&events, "missing.exr") && says(&events, "the coordinator ended with status 2"), "{events:?}");
+}

@@ -1,0 +1,67 @@
+//! `lookalike batch --slurm` from end to end, with a stand-in for `sbatch`.
+
+use crate::fit::scene::folder;
+use std::{fs, os::unix::fs::PermissionsExt, path::Path, process::Command};
+use tempfile::TempDir;
+
+/// A folder with a scene, a manifest of two fits, and an `sbatch` that says this.
+fn site(sbatch: &str) -> TempDir {
+    let folder = folder();
+    let manifest = "photos = [\"photo.exr\"]\nenvironments = [\"map.exr\"]\nmodels = [\"ggx\", \"cook-torrance\"]\n";
+    fs::write(folder.path().join("two.toml"), manifest).unwrap();
+    let path = folder.path().join("sbatch");
+    fs::write(&path, format!("#!/bin/sh\n{sbatch}\n")).unwrap();
+    fs::set_permissions(&path, fs::Permissions::from_mode(0o755)).unwrap();
+    folder
+}
+
+/// Exit code, stdout and stderr of a command line.
+fn say(site: &Path, line: &str) -> (Option<i32>, String, String) {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_lookalike-under-test"));
+    let path = format!("{}:{}", site.display(), std::env::var("PATH").unwrap());
+    command.args(line.split_whitespace()).current_dir(site).env("PATH", path).env_remove("RUST_LOG");
+    let output = command.output().unwrap();
+    let text = |bytes| String::from_utf8(bytes).unwrap();
+    (output.status.code(), text(output.stdout), text(output.stderr))
+}
+
+#[test]
+fn batch_is_submitted_with_its_command_line_and_the_options_behind_the_dashes() {
+    let site = site("echo 4711");
+    let line = "batch two.toml --out run --samples 32 --slurm -- --nodes=2 -p long";
+    let (code, stdout, stderr) = say(site.path(), line);
+    assert_eq!((code, stdout.as_str()), (Some(0), "4711\n"), "{stderr}");
+    assert!(stderr.contains("lookalike status") && stderr.contains("scancel 4711"), "{stderr}");
+    let script = fs::read_to_string(site.path().join("run/lookalike.sbatch")).unwrap();
+    assert!(script.contains("\n#SBATCH --nodes=2 -p long\n"), "{script}");
+    assert!(script.contains("\nset -- batch two.toml --out run --samples 32\n"), "{script}");
+    // Nothing runs yet: the same may be submitted again.
+    assert_eq!(say(site.path(), line).0, Some(0));
+}
+
+#[test]
+fn what_is_wrong_is_told_before_anything_is_submitted() {
+    let site = site("touch submitted; echo 4711");
+    for (line, words) in [
+        ("batch two.toml --out run --slurm --workers 3", "--workers"),
+        ("batch two.toml --out run --slurm --access a.json", "--access"),
+        ("batch two.toml --out run -- --nodes=4", "--slurm"),
+        ("batch missing.toml --out run --slurm", "missing.toml"),
+    ] {
+        let (code, stdout, stderr) = say(site.path(), line);
+        assert_eq!((code, stdout.as_str()), (Some(2), ""), "{line}: {stderr}");
+        assert!(stderr.contains(words), "{line}: {stderr}");
+    }
+    fs::remove_file(site.path().join("map.exr")).unwrap();
+    let (code, _, stderr) = say(site.path(), "batch two.toml --out run --slurm");
+    assert!(code == Some(2) && stderr.contains("map.exr"), "{stderr}");
+    assert!(!site.path().join("submitted").exists() && !site.path().join("run").exists());
+}
+
+#[test]
+fn refusal_of_slurm_is_told_in_its_own_words() {
+    let site = site("echo 'sbatch: error: invalid partition specified: gold' >&2; exit 1");
+    let (code, stdout, stderr) = say(site.path(), "batch two.toml --out run --slurm -- -p gold");
+    assert_eq!((code, stdout.as_str()), (Some(3), ""), "{stderr}");
+    assert!(stderr.contains("invalid partition specified: gold") && stderr.contains("lookalike.sbatch"), "{stderr}");
+}

@@ -1,0 +1,189 @@
+//! Those who listen on the wire, and workers that speak for others, for the past, or far too much.
+
+use std::io::Write;
+use std::process::Command;
+use std::time::Duration;
+
+use lookalike::graph::BlobHash;
+use lookalike::protocol::{Executing, FailureKind, FrameTag, Hello, LeaseName, ToCoordinator, ToWorker};
+use lookalike_coordinator::comm::{Departure, RunEvent};
+use lookalike_coordinator::core::Policy;
+use lookalike_coordinator::limits::Limits;
+use lookalike_coordinator::runner::{RunError, RunnerOptions};
+use lookalike_tests::cluster::{Cluster, options, read_access};
+use lookalike_tests::gate::{Gate, Waiting};
+use lookalike_tests::plan::{Leaves, TestPlanner};
+use lookalike_tests::process::{Process, stderr};
+use lookalike_tests::proxy::Proxy;
+use lookalike_tests::stranger::{TlsClient, connect, connect_tls, greet, hear, join, read_to_the_end, say, say_frame};
+
+use super::{PROGRAM, run_at_the_gate, run_within, worker};
+
+/// Say that a node has this output.
+fn claim(liar: &mut TlsClient, lease: LeaseName, output: &[u8]) {
+    let (hash, length) = (BlobHash::of(output).0, output.len() as u64);
+    say(liar, &ToCoordinator::Finished { lease, hash, length });
+    say_frame(liar, FrameTag::Part, output);
+}
+
+#[test]
+fn recorded_session_that_is_played_again_lets_nobody_in() {
+    let gate = Gate::new();
+    let cluster = run_within(&gate, 0, Limits::default());
+    let address = cluster.access().address;
+    let proxy = Proxy::to(&address);
+    let mut command = Command::new(PROGRAM);
+    command.args(["worker", "--threads", "1", "--address", &proxy.address(), "--access"]);
+    let worker = Process::start(command.arg(cluster.access_file()));
+    let waiting = gate.next();
+    let record = proxy.record();
+    assert!(record.len() > 400, "{} bytes of a session", record.len());
+    for cut in [record.len(), record.len() / 2] {
+        let mut again = connect(&address).unwrap();
+        // It may be closed before all is sent.
+        let _ = again.write_all(&record[..cut]);
+        let _ = again.shutdown(std::net::Shutdown::Write);
+        let _ = read_to_the_end(again);
+    }
+    waiting.release();
+    let (result, summary) = cluster.finish();
+    assert!(result.is_some());
+    assert_eq!(summary.workers_joined, 1);
+    assert_eq!(worker.output().status.code(), Some(0));
+}
+
+#[test]
+fn worker_that_answers_for_a_node_of_another_is_found_out_where_outputs_are_verified() {
+    let gate = Gate::new();
+    let policy = Policy { verify_fraction: 1.0, ..Policy::default() };
+    let leaves = Leaves::Gates { count: 1, address: gate.address().to_string() };
+    let listen = Some(([127, 0, 0, 1], 0).into());
+    let cluster = Cluster::start(leaves, RunnerOptions { listen, policy, ..options(PROGRAM, 1) });
+    let waiting = gate.next();
+    let mut liar = join(&cluster.access(), 1);
+    let name = LeaseName { node: 0, attempt: 1, epoch: 1 };
+    claim(&mut liar, name, b"not passed");
+    hear(&mut liar, |message| (message == ToWorker::Acknowledge(name)).then_some(()));
+    waiting.release();
+    let error = cluster.error();
+    assert!(matches!(error, RunError::ResultsDiffer { .. }), "{error}");
+}
+
+#[test]
+fn old_lease_with_other_bytes_ends_the_run_by_name_and_the_next_coordinator_computes_the_node_again() {
+    let (gate, folder) = (Gate::new(), tempfile::tempdir().unwrap());
+    let access = folder.path().join("access.json");
+    let coordinator = || {
+        let arguments = ["resume", "5", &gate.address().to_string(), "1"].map(str::to_owned);
+        Process::start(Command::new(PROGRAM).args(arguments).arg(&access))
+    };
+    let first = coordinator();
+    let waiting = gate.next();
+    first.kill();
+    waiting.release();
+    // The survivor had three leases: when it begins with another one, the second coordinator is there and has the others' outputs.
+    let second = coordinator();
+    (0..2).for_each(|_| gate.next().release());
+    let waiting = gate.next();
+    let mut liar = join(&read_access(&access), 1);
+    claim(&mut liar, LeaseName { node: 0, attempt: 1, epoch: 1 }, b"not passed");
+    let output = second.output();
+    assert_eq!(output.status.code(), Some(3), "{}", stderr(&output));
+    assert!(stderr(&output).contains("two results of gate \"leaf 0\" differ"), "{}", stderr(&output));
+    drop((waiting, liar));
+    let third = coordinator();
+    let keeper = gate.keep(Waiting::release);
+    let output = third.output();
+    keeper.stop();
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    let gate = Gate::new();
+    let leaves = Leaves::Gates { count: 5, address: gate.address().to_string() };
+    let keeper = gate.keep(Waiting::release);
+    let reference = TestPlanner::reference(leaves);
+    keeper.stop();
+    assert_eq!(String::from_utf8_lossy(&output.stdout), format!("{reference:?}\n"));
+}
+
+#[test]
+fn lease_of_the_future_is_no_lease() {
+    let gate = Gate::new();
+    let cluster = run_at_the_gate(&gate);
+    let waiting = gate.next();
+    for epoch in [0, 2, u64::MAX] {
+        let mut liar = join(&cluster.access(), 1);
+        claim(&mut liar, LeaseName { node: 0, attempt: 1, epoch }, b"not passed");
+        let departure = cluster.wait_for(|event| match event {
+            RunEvent::WorkerLeft { departure, .. } => Some(departure.clone()),
+            _ => None,
+        });
+        assert!(matches!(departure, Departure::Violation(_)), "{departure:?}");
+    }
+    waiting.release();
+    assert!(cluster.finish().0.is_some());
+}
+
+#[test]
+fn worker_that_floods_its_coordinator_does_not_keep_the_others_from_working() {
+    let gate = Gate::new();
+    let cluster = run_at_the_gate(&gate);
+    let waiting = gate.next();
+    let mut liar = join(&cluster.access(), 1);
+    let lease = LeaseName { node: 7, attempt: 1, epoch: 1 };
+    let beat = ToCoordinator::Heartbeat { executing: vec![Executing { lease, permille: u16::MAX }; 1000] };
+    for _ in 0..200 {
+        say(&mut liar, &beat);
+        say(&mut liar, &ToCoordinator::Started(lease));
+    }
+    let empty = ToCoordinator::Heartbeat { executing: Vec::new() };
+    (0..10_000).for_each(|_| say(&mut liar, &empty));
+    // Behind all that, on another connection, somebody is heard at once.
+    let honest = worker(&cluster.access_file());
+    let joined = |event: &RunEvent| matches!(event, RunEvent::WorkerJoined { threads: 1, .. }).then_some(());
+    (0..2).for_each(|_| cluster.wait_for(joined));
+    waiting.release();
+    let (result, summary) = cluster.finish();
+    assert!(result.is_some());
+    assert_eq!((summary.workers_joined, summary.requeued_nodes), (3, 0), "{summary:?}");
+    assert_eq!(honest.output().status.code(), Some(0));
+}
+
+#[test]
+fn words_without_end_are_cut_or_refused() {
+    let gate = Gate::new();
+    let cluster = run_at_the_gate(&gate);
+    let waiting = gate.next();
+    let access = cluster.access();
+    // A hello as long as a frame may be, of a worker with more threads than there are.
+    let mut loud = connect_tls(&access).unwrap();
+    greet(&mut loud, &access.secret, |_| {}).unwrap();
+    let build = "x".repeat(2_000_000);
+    say(&mut loud, &ToCoordinator::Hello(Hello { build, threads: u32::MAX, process: u32::MAX }));
+    let joined = cluster.wait_for(|event| match event {
+        RunEvent::WorkerJoined { threads, process: u32::MAX, .. } => Some(*threads),
+        _ => None,
+    });
+    assert!(joined <= 4096, "{joined} threads");
+    drop(loud);
+    // Waits for the end of its life, so that it gets nothing.
+    cluster.wait_for(|event| matches!(event, RunEvent::WorkerLeft { .. }).then_some(()));
+    waiting.release();
+    assert!(cluster.finish().0.is_some());
+}
+
+#[test]
+fn error_without_end_is_cut_before_anybody_has_to_read_it() {
+    let listen = Some(([127, 0, 0, 1], 0).into());
+    let policy = Policy { grace: Duration::from_secs(5), ..Policy::default() };
+    let leaves = Leaves::Digests { count: 1, shared_bytes: 1 };
+    let cluster = Cluster::start(leaves, RunnerOptions { listen, policy, ..options(PROGRAM, 0) });
+    cluster.address();
+    let mut liar = join(&cluster.access(), 1);
+    let lease = hear(&mut liar, |message| match message {
+        ToWorker::Assign(assignment) => Some(assignment.lease),
+        _ => None,
+    });
+    let message = "x".repeat(2_000_000);
+    say(&mut liar, &ToCoordinator::Failed { lease, kind: FailureKind::Application, message });
+    let text = cluster.error().to_string();
+    assert!(text.contains("xxx") && text.len() < 20_000, "{} bytes", text.len());
+}
