@@ -11,14 +11,15 @@ use lookalike::protocol::{
     FailureKind, IncomingBlob, LeaseName, PART_BYTES, ToCoordinator, ToWorker, Welcome, bounded_text,
 };
 use lookalike_worker::wire::{Incoming, Parcel, Received, WireError};
-use tokio::io::{AsyncWriteExt, ReadHalf, WriteHalf};
+use lookalike_worker::world::World;
+use tokio::io::{AsyncRead, AsyncWrite, AsyncWriteExt};
 use tokio::sync::mpsc::Sender;
 use tokio::sync::oneshot;
 use tokio::time::timeout;
 use tracing::info;
 
 use super::mailbox::{Patient, Postman, mailbox};
-use super::{Connection, Gate, Greeted, Inbound, Outgoing};
+use super::{Gate, Greeted, Inbound, Outgoing};
 use crate::comm::{Departure, Site};
 use crate::reactor::Event;
 
@@ -26,7 +27,7 @@ use crate::reactor::Event;
 const UNASKED_BYTES: u64 = 8 << 20;
 
 /// Serve a worker to its end.
-pub(super) async fn serve(greeted: Greeted, worker: WorkerId, peer: SocketAddr, gate: &Gate) {
+pub(super) async fn serve<W: World>(greeted: Greeted<W::Stream>, worker: WorkerId, peer: SocketAddr, gate: &Gate<W>) {
     let Greeted { incoming, writer, hello } = greeted;
     info!(%worker, %peer, process = hello.process, build = bounded_text(&hello.build), "joined");
     let (mailbox, postman) = mailbox(gate.limits.queued_bytes);
@@ -52,10 +53,11 @@ pub(super) async fn serve(greeted: Greeted, worker: WorkerId, peer: SocketAddr, 
     let (overflowing, closed) = (postman.overflowing(), postman.closed());
     let writer = Patient::new(writer, gate.policy.lost_after);
     let departure = tokio::select! {
-        departure = &mut reading => departure,
-        () = overflowing => Departure::TooSlow,
+        biased;
         // Thrown out: whoever did it knows.
         () = closed => return,
+        () = overflowing => Departure::TooSlow,
+        departure = &mut reading => departure,
         written = write(writer, postman, &pending_blobs) => match written {
             // We have said our last word: let the worker say its own, so that closing does not destroy ours.
             Ok(()) => timeout(gate.limits.farewell_time, reading).await.unwrap_or(Departure::Lost),
@@ -70,7 +72,7 @@ pub(super) async fn serve(greeted: Greeted, worker: WorkerId, peer: SocketAddr, 
 }
 
 async fn write(
-    mut writer: Patient<WriteHalf<Connection>>,
+    mut writer: Patient<impl AsyncWrite + Unpin>,
     mut postman: Postman,
     pending_blobs: &AtomicUsize,
 ) -> Result<(), WireError> {
@@ -105,13 +107,13 @@ fn departure_of(error: &WireError) -> Departure {
 }
 
 /// The reading end of one worker's connection.
-struct Reader {
+struct Reader<R> {
     worker: WorkerId,
     /// That of this coordinator.
     epoch: u64,
     /// Whether it has told what it does for earlier ones.
     has_reported: bool,
-    incoming: Incoming<ReadHalf<Connection>>,
+    incoming: Incoming<R>,
     /// The output that is being received.
     output: Option<(LeaseName, IncomingBlob)>,
     /// The announced lengths of outputs since the last question.
@@ -121,7 +123,7 @@ struct Reader {
     inbound: Sender<Inbound>,
 }
 
-impl Reader {
+impl<R: AsyncRead + Unpin> Reader<R> {
     async fn read_to_the_end(&mut self) -> Departure {
         loop {
             let event = match self.incoming.next().await {
