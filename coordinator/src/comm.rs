@@ -61,6 +61,13 @@ pub enum Action {
         /// The worker.
         worker: WorkerId,
     },
+    /// Write down the output that a node has got: it need never run again.
+    Keep {
+        /// The node.
+        node: NodeId,
+        /// Its output; the planner may have let it go by now.
+        output: Blob,
+    },
     /// Run this node in the coordinator's own process.
     RunHere {
         /// The node.

@@ -166,7 +166,7 @@ fn line(action: &Action) -> Option<String> {
         Action::Tell(RunEvent::NodeSuspected { name, deaths }) => format!("{} suspected, {deaths}", name.label),
         Action::Tell(RunEvent::NodeSpeculated { name, worker }) => format!("{} is slow, {worker} helps", name.label),
         Action::Tell(RunEvent::WaitingForWorkers { waited, .. }) => format!("waiting since {} s", waited.as_secs()),
-        Action::Tell(_) => return None,
+        Action::Keep { .. } | Action::Tell(_) => return None,
     })
 }
 

@@ -23,7 +23,7 @@ use std::error::Error as _;
 use std::sync::Arc;
 use std::time::Duration;
 
-use lookalike::graph::{Blob, NodeId, Planner, Registry, WorkerId};
+use lookalike::graph::{NodeId, Planner, Registry, WorkerId};
 use lookalike::protocol::{Assignment, LeaseName, RunName, ToWorker};
 use lookalike_worker::world::{Real, World};
 use tokio::sync::mpsc::{Receiver, UnboundedReceiver, channel, unbounded_channel};
@@ -205,7 +205,7 @@ impl<W: World, P: Planner, O: FnMut(&RunEvent)> Driver<W, P, O> {
         }
         let started = reactor::start(&mut self.core, &mut self.planner, now, &mut self.outbox);
         self.forget_if_wrong(started.as_ref().err(), &mut group);
-        self.collect(&mut group, None, now);
+        self.collect(&mut group, now);
         if started.is_ok() && !self.core.is_finished() {
             let is_new = takeover.is_none();
             let survivors = takeover.as_ref().map(|takeover| takeover.survivors.clone()).unwrap_or_default();
@@ -270,23 +270,17 @@ impl<W: World, P: Planner, O: FnMut(&RunEvent)> Driver<W, P, O> {
         trace!(?event);
         self.here.forget(&event);
         let now = self.now();
-        let output = match &event {
-            Event::Finished { node, output, .. } | Event::Recovered { node, output, .. } => {
-                Some((*node, output.clone()))
-            }
-            _ => None,
-        };
         let outcome = reactor::handle(&mut self.core, &mut self.planner, event, now, &mut self.outbox);
-        self.collect(group, output.as_ref(), now);
+        self.collect(group, now);
         self.forget_if_wrong(outcome.as_ref().err(), group);
         outcome
     }
 
     /// Move what the reactor has said into the group, and tell the journal.
-    fn collect(&mut self, group: &mut Group, output: Option<&(NodeId, Blob)>, now: Duration) {
+    fn collect(&mut self, group: &mut Group, now: Duration) {
         let actions = self.outbox.take();
         if self.memory.is_kept() {
-            actions.iter().for_each(|action| group.batch.note(action, &self.core, output, now));
+            actions.iter().for_each(|action| group.batch.note(action, &self.core, now));
         }
         group.actions.extend(actions);
     }
@@ -340,7 +334,7 @@ impl<W: World, P: Planner, O: FnMut(&RunEvent)> Driver<W, P, O> {
                 None
             }
             Inbound::Tell(event) => {
-                group.batch.note_event(&event, &self.core, None, self.now());
+                group.batch.note_event(&event, &self.core, self.now());
                 group.actions.push(Action::Tell(event));
                 None
             }
@@ -367,6 +361,8 @@ impl<W: World, P: Planner, O: FnMut(&RunEvent)> Driver<W, P, O> {
                     self.send(worker, ToWorker::Acknowledge(name));
                 }
                 Action::Drop { worker } => self.cluster.iter_mut().for_each(|cluster| cluster.dismiss(worker)),
+                // The journal has it.
+                Action::Keep { .. } => {}
                 Action::RunHere { node, attempt } => self.run_here(node, attempt),
                 Action::Tell(event) => {
                     if let RunEvent::NodeStarted { site: Site::Worker(worker), .. } = &event {

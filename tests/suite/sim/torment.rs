@@ -105,7 +105,6 @@ impl Run {
         if place == Place::Coordinator {
             self.coordinators_ended.push(self.sim.elapsed());
         }
-        self.stage.state().stuck.remove(&place);
         self.gone(place);
         self.plan(time, Deed::Start(place));
     }
@@ -113,7 +112,9 @@ impl Run {
     /// There is no process in a place any more.
     fn gone(&mut self, place: Place) {
         self.absent.insert(place);
-        self.stage.state().wishes.remove(&place);
+        let mut state = self.stage.state();
+        state.wishes.remove(&place);
+        state.stuck.remove(&place);
     }
 
     fn break_link(&mut self, index: usize, link: Link, time: Duration) {
