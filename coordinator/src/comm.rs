@@ -309,6 +309,13 @@ pub enum RunEvent {
         /// How many workers.
         deaths: u32,
     },
+    /// A worker goes on with this node that was thought to have died of it: only its connection had ended.
+    NodeAbsolved {
+        /// The node.
+        name: NodeName,
+        /// How many workers are still thought to have died while they executed it.
+        deaths: u32,
+    },
     /// A slow node runs on a second worker as well.
     NodeSpeculated {
         /// The node.

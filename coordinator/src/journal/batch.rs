@@ -134,7 +134,7 @@ impl Batch {
                 let is_own = matches!(reason, FailureReason::Node(_));
                 self.end(name.node, None, if is_own { Outcome::Failed } else { Outcome::Lost }, now);
             }
-            RunEvent::NodeSuspected { name, .. } => _ = self.touch(name.node, core),
+            RunEvent::NodeSuspected { name, .. } | RunEvent::NodeAbsolved { name, .. } => _ = self.touch(name.node, core),
             RunEvent::NodeRequeued { name, worker, .. } => {
                 self.touch(name.node, core);
                 self.started.retain(|(node, _)| *node != name.node.0);

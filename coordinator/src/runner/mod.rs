@@ -323,9 +323,9 @@ impl<W: World, P: Planner, O: FnMut(&RunEvent)> Driver<W, P, O> {
                 }
                 None
             }
-            Inbound::Reported { worker, executing } => {
-                self.survivors.iter_mut().for_each(|survivors| survivors.reported(worker, executing.clone()));
-                Some(Event::Heartbeat { worker, executing: Vec::new() })
+            Inbound::Reported { worker, earlier, executing } => {
+                self.survivors.iter_mut().for_each(|survivors| survivors.reported(worker, earlier.clone()));
+                Some(Event::Heartbeat { worker, executing })
             }
             Inbound::Late { worker, lease, output } => Some(self.memory.late_answer(worker, lease, output, group)),
             Inbound::Ask { lease, answer } => {

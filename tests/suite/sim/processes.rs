@@ -30,6 +30,8 @@ pub(super) fn policy(chance: &mut Chance) -> Policy {
         // Late messages alone shall not lose a worker.
         lost_after: heartbeat * 2 + chance.time(1000, 3000),
         spare_leases: usize::try_from(chance.between(0, 4)).unwrap_or(0),
+        suspect_after: u32::try_from(chance.between(2, 3)).unwrap_or(2),
+        node_crashes: u32::try_from(chance.between(2, 4)).unwrap_or(2),
         suspect_patience: chance.time(100, 2000),
         speculation: Speculation {
             factor: chance.happens(0.8).then_some(2.0),

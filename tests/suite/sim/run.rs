@@ -69,6 +69,8 @@ pub(super) struct Run {
     pub(super) deeds: BTreeMap<(Duration, u64), Deed>,
     pub(super) planned: u64,
     pub(super) faults_left: u64,
+    /// The longest time between two faults, in milliseconds.
+    pub(super) pause_ms: u64,
     /// The workers whose links are not as they should be.
     pub(super) broken: BTreeSet<usize>,
     /// Where there is no process.
@@ -114,7 +116,8 @@ impl Run {
                 }
             });
         }
-        let faults_left = chance.between(0, 14);
+        let faults_left = chance.between(0, 30);
+        let pause_ms = chance.of(&[300, 1000, 3000]);
         let mut run = Self {
             stage,
             sim,
@@ -123,6 +126,7 @@ impl Run {
             deeds: BTreeMap::new(),
             planned: 0,
             faults_left,
+            pause_ms,
             broken: BTreeSet::new(),
             absent: BTreeSet::new(),
             left_unasked: Vec::new(),

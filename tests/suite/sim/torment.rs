@@ -14,7 +14,7 @@ impl Run {
     pub(super) fn plan_fault(&mut self) {
         if self.faults_left > 0 {
             self.faults_left -= 1;
-            let pause = self.chance.time(20, 3000);
+            let pause = self.chance.time(0, self.pause_ms);
             self.plan(pause, Deed::Fault);
         }
     }
@@ -86,7 +86,7 @@ impl Run {
                 self.plan(time, Deed::Unstick(index));
             }
             Fault::SlowDown => {
-                let factor = u32::try_from(self.chance.between(2, 10)).unwrap_or(2);
+                let factor = u32::try_from(self.chance.between(2, 5)).unwrap_or(2);
                 self.stage.state().slow.insert(place, factor);
                 self.plan(time, Deed::Hurry(index));
             }

@@ -49,7 +49,7 @@ impl SimWorld {
     pub(super) fn new(stage: Arc<Stage>, place: Place, number: u32) -> Self {
         let mut chance = Chance::new(stage.seed, u64::from(number) + (1 << 32));
         let node_ms = stage.node_ms;
-        let disk_time = chance.time(0, 30);
+        let disk_time = if chance.happens(0.1) { chance.time(500, 2000) } else { chance.time(0, 30) };
         Self(Arc::new(Process { stage, place, number, chance: Mutex::new(chance), node_ms, disk_time }))
     }
 
@@ -57,7 +57,7 @@ impl SimWorld {
     fn node_time(&self) -> Duration {
         let mut chance = self.0.chance.lock().expect("a chance");
         let (least, most) = self.0.node_ms;
-        let factor = if chance.happens(0.03) { 20 } else { 1 };
+        let factor = if chance.happens(0.03) { 10 } else { 1 };
         chance.time(least, most) * factor * self.0.stage.slowness(self.0.place)
     }
 }
