@@ -61,13 +61,6 @@ pub enum Action {
         /// The worker.
         worker: WorkerId,
     },
-    /// Write down the output that a node has got: it need never run again.
-    Keep {
-        /// The node.
-        node: NodeId,
-        /// Its output; the planner may have let it go by now.
-        output: Blob,
-    },
     /// Run this node in the coordinator's own process.
     RunHere {
         /// The node.
@@ -307,13 +300,6 @@ pub enum RunEvent {
         /// The node.
         name: NodeName,
         /// How many workers.
-        deaths: u32,
-    },
-    /// A worker goes on with this node that was thought to have died of it: only its connection had ended.
-    NodeAbsolved {
-        /// The node.
-        name: NodeName,
-        /// How many workers are still thought to have died while they executed it.
         deaths: u32,
     },
     /// A slow node runs on a second worker as well.

@@ -106,8 +106,6 @@ pub(crate) struct Record {
     /// How often it has lost a worker that executed it, for whatever reason but a drain.
     pub(crate) losses: u32,
     pub(crate) deaths: Deaths,
-    /// The attempts whose workers are among these deaths, as long as nobody has been heard of who goes on with them.
-    mourned: Vec<(u32, Death)>,
     /// What it computes: known once it is ready, where the run is remembered.
     pub(crate) key: Option<NodeKey>,
 }
@@ -123,39 +121,7 @@ pub struct Deaths {
     pub excused: u32,
 }
 
-/// How a death counts.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Death {
-    InCompany,
-    Alone,
-    Excused,
-}
-
-impl Record {
-    /// Count a death. With the attempt that it ended, it can be taken back.
-    pub(crate) fn mourn(&mut self, death: Death, attempt: Option<u32>) {
-        *self.deaths.of(death) += 1;
-        self.mourned.extend(attempt.map(|attempt| (attempt, death)));
-    }
-
-    /// Take the death back that has ended this attempt. Whether there was one.
-    pub(crate) fn revive(&mut self, attempt: u32) -> bool {
-        let Some(index) = self.mourned.iter().position(|(mourned, _)| *mourned == attempt) else { return false };
-        let (_, death) = self.mourned.swap_remove(index);
-        *self.deaths.of(death) -= 1;
-        true
-    }
-}
-
 impl Deaths {
-    fn of(&mut self, death: Death) -> &mut u32 {
-        match death {
-            Death::InCompany => &mut self.in_company,
-            Death::Alone => &mut self.alone,
-            Death::Excused => &mut self.excused,
-        }
-    }
-
     pub(crate) fn total(self) -> u32 {
         self.in_company + self.alone + self.excused
     }

@@ -48,12 +48,12 @@ pub enum Event {
         /// The worker.
         worker: WorkerId,
     },
-    /// A worker was heard of.
+    /// A worker was heard of; it executes these nodes, done to so many thousandths.
     Heartbeat {
         /// The worker.
         worker: WorkerId,
-        /// The nodes that it executes.
-        executing: Vec<Executing>,
+        /// The nodes it executes, with their progress.
+        executing: Vec<(NodeId, u16)>,
     },
     /// A worker begins to execute a node.
     Started {
@@ -119,17 +119,6 @@ pub enum Event {
     DeadlinePassed,
 }
 
-/// A node in execution, as its worker tells.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Executing {
-    /// The node.
-    pub node: NodeId,
-    /// The attempt under which the worker got it, perhaps over an earlier connection.
-    pub attempt: u32,
-    /// How much is done, in thousandths.
-    pub permille: u16,
-}
-
 /// Begin a run: let the planner add the first nodes and act upon them.
 ///
 /// # Errors
@@ -159,8 +148,7 @@ pub fn handle(
         Event::WorkerDrains { worker } => membership::drain(core, worker, now, outbox),
         Event::Heartbeat { worker, executing } => {
             membership::renew(core, worker, now);
-            for Executing { node, attempt, permille } in executing {
-                quarantine::absolve(core, node, attempt, now, outbox);
+            for (node, permille) in executing {
                 if core.members.progress(worker, node, permille) {
                     outbox.tell(RunEvent::NodeProgress { node, permille });
                 }

@@ -94,17 +94,14 @@ pub(crate) struct Batch {
 }
 
 impl Batch {
-    /// Take note of what the reactor has said.
-    pub(crate) fn note(&mut self, action: &Action, core: &Core, now: Duration) {
+    /// Take note of what the reactor has said. `output` is what the event brought, if it brought an output; the graph may
+    /// have let it go by now.
+    pub(crate) fn note(&mut self, action: &Action, core: &Core, output: Option<&(NodeId, Blob)>, now: Duration) {
         match action {
             Action::Assign { worker, lease } => self.begin(lease.node, lease.attempt, worker.0, now),
             Action::RunHere { node, attempt } => self.begin(*node, *attempt, HERE, now),
             Action::Cancel { worker, lease } => self.end(lease.node, Some(worker.0), Outcome::Cancelled, now),
-            Action::Keep { node, output } => {
-                let key = core.look(*node).and_then(|record| record.key);
-                self.results.extend(key.map(|key| (key, output.clone())));
-            }
-            Action::Tell(event) => self.note_event(event, core, now),
+            Action::Tell(event) => self.note_event(event, core, output, now),
             Action::Acknowledge { worker, node, .. } => {
                 let has_failed = matches!(core.graph.state(*node), Some(NodeState::Failed(_)));
                 let outcome = if has_failed { Outcome::Failed } else { Outcome::Finished };
@@ -115,7 +112,7 @@ impl Batch {
     }
 
     /// Take note of something that was told without the reactor.
-    pub(crate) fn note_event(&mut self, event: &RunEvent, core: &Core, now: Duration) {
+    pub(crate) fn note_event(&mut self, event: &RunEvent, core: &Core, output: Option<&(NodeId, Blob)>, now: Duration) {
         match event {
             RunEvent::NodeAdded { name } => {
                 self.touch(name.node, core).added = Some((name.kind.clone(), name.label.clone()));
@@ -128,13 +125,16 @@ impl Batch {
                 if *site == Site::Coordinator {
                     self.end(name.node, Some(HERE), Outcome::Finished, now);
                 }
+                let key = core.look(name.node).and_then(|record| record.key);
+                let brought = output.filter(|(node, _)| *node == name.node).map(|(_, output)| output);
+                self.results.extend(key.zip(brought.or_else(|| core.graph.output(name.node)).cloned()));
             }
             RunEvent::NodeFailed { name, reason } => {
                 self.touch(name.node, core).error = Some(reason.to_string());
                 let is_own = matches!(reason, FailureReason::Node(_));
                 self.end(name.node, None, if is_own { Outcome::Failed } else { Outcome::Lost }, now);
             }
-            RunEvent::NodeSuspected { name, .. } | RunEvent::NodeAbsolved { name, .. } => _ = self.touch(name.node, core),
+            RunEvent::NodeSuspected { name, .. } => _ = self.touch(name.node, core),
             RunEvent::NodeRequeued { name, worker, .. } => {
                 self.touch(name.node, core);
                 self.started.retain(|(node, _)| *node != name.node.0);

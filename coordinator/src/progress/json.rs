@@ -109,7 +109,6 @@ fn of_node(event: &RunEvent) -> Option<Value> {
         }
         RunEvent::NodeRecalled { name, bytes } => node("node-recalled", name, json!({ "bytes": bytes })),
         RunEvent::NodeSuspected { name, deaths } => node("node-suspected", name, json!({ "deaths": deaths })),
-        RunEvent::NodeAbsolved { name, deaths } => node("node-absolved", name, json!({ "deaths": deaths })),
         RunEvent::NodeSpeculated { name, worker } => node("node-speculated", name, json!({ "worker": worker.0 })),
         RunEvent::NodeFailed { name, reason } if reason.is_cancellation() => node("node-cancelled", name, json!({})),
         RunEvent::NodeFailed { name, reason } => node("node-failed", name, json!({ "reason": reason.to_string() })),

@@ -174,7 +174,6 @@ fn accept(
             if took > Duration::ZERO {
                 core.pace.note(&name.kind, took);
             }
-            outbox.push(Action::Keep { node, output: result.output });
             outbox.tell(RunEvent::NodeFinished { name, site, bytes, elapsed: took });
         }
         Completion::Duplicate => {

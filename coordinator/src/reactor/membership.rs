@@ -58,7 +58,7 @@ pub(super) fn leave(core: &mut Core, worker: WorkerId, departure: &Departure, no
     // Whoever was asked to end may be ended by force, a time limit later: nobody's fault.
     let was_asked = member.is_draining || *departure == Departure::Goodbye;
     if departure.is_suspicious() && !was_asked {
-        quarantine::count_death(core, &member, departure, now, outbox);
+        quarantine::count_death(core, &member, now, outbox);
     }
     for (node, held) in member.leases {
         core.forget_holder(worker, node);

@@ -7,7 +7,7 @@ use lookalike::graph::{
     WorkerId,
 };
 
-use super::{Event, Executing, handle, start};
+use super::{Event, handle, start};
 use crate::comm::{Action, Departure, Outbox, RunEvent, Site};
 use crate::core::{Core, Policy};
 use crate::policy::Speculation;
@@ -151,10 +151,6 @@ fn finished(site: Site, node: u64, attempt: u32, byte: u8) -> Event {
     Event::Finished { site, node: NodeId(node), attempt, output: Blob::new(vec![byte]) }
 }
 
-fn executing(node: u64, attempt: u32) -> Executing {
-    Executing { node: NodeId(node), attempt, permille: 400 }
-}
-
 /// What matters of an action, in a few words: leases as `node.attempt`.
 fn line(action: &Action) -> Option<String> {
     Some(match action {
@@ -168,10 +164,9 @@ fn line(action: &Action) -> Option<String> {
         Action::Tell(RunEvent::NodeFailed { name, reason }) => format!("{} failed: {reason}", name.label),
         Action::Tell(RunEvent::NodeRequeued { name, crashes, .. }) => format!("{} requeued, {crashes}", name.label),
         Action::Tell(RunEvent::NodeSuspected { name, deaths }) => format!("{} suspected, {deaths}", name.label),
-        Action::Tell(RunEvent::NodeAbsolved { name, deaths }) => format!("{} absolved, {deaths}", name.label),
         Action::Tell(RunEvent::NodeSpeculated { name, worker }) => format!("{} is slow, {worker} helps", name.label),
         Action::Tell(RunEvent::WaitingForWorkers { waited, .. }) => format!("waiting since {} s", waited.as_secs()),
-        Action::Keep { .. } | Action::Tell(_) => return None,
+        Action::Tell(_) => return None,
     })
 }
 
@@ -374,7 +369,7 @@ fn silent_worker_is_lost_after_its_lease_ends_and_any_sign_of_life_renews_it() {
     bench.start(A, 0, 1);
     assert_eq!(bench.core.next_deadline(), Some(Duration::from_secs(5)));
     assert!(bench.pass_time(4).unwrap().is_empty());
-    bench.handle(Event::Heartbeat { worker: A, executing: vec![executing(0, 1)] });
+    bench.handle(Event::Heartbeat { worker: A, executing: vec![(NodeId(0), 400)] });
     assert_eq!(bench.core.next_deadline(), Some(Duration::from_secs(9)));
     assert!(bench.pass_time(4).unwrap().is_empty());
     assert_eq!(bench.pass_time(1).unwrap(), ["worker 1 is thrown out", "n0 requeued, 0"]);

@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use lookalike::graph::{BlobHash, NodeFailure, NodeId, WorkerId};
 use lookalike::protocol::{
-    self, FailureKind, IncomingBlob, LeaseName, PART_BYTES, ToCoordinator, ToWorker, Welcome, bounded_text,
+    FailureKind, IncomingBlob, LeaseName, PART_BYTES, ToCoordinator, ToWorker, Welcome, bounded_text,
 };
 use lookalike_worker::wire::{Incoming, Parcel, Received, WireError};
 use lookalike_worker::world::World;
@@ -21,7 +21,7 @@ use tracing::info;
 use super::mailbox::{Patient, Postman, mailbox};
 use super::{Gate, Greeted, Inbound, Outgoing};
 use crate::comm::{Departure, Site};
-use crate::reactor::{Event, Executing};
+use crate::reactor::Event;
 
 /// How many bytes of small outputs a worker may send before it is asked for how many the reactor has taken (8 MiB).
 const UNASKED_BYTES: u64 = 8 << 20;
@@ -159,9 +159,14 @@ impl<R: AsyncRead + Unpin> Reader<R> {
             ToCoordinator::Heartbeat { executing } if !self.has_reported => {
                 self.has_reported = true;
                 let earlier = executing.iter().map(|node| node.lease).filter(|lease| lease.epoch < self.epoch);
-                return Ok(Some(Inbound::Reported { worker, earlier: earlier.collect(), executing: self.of_today(&executing) }));
+                return Ok(Some(Inbound::Reported { worker, executing: earlier.collect() }));
             }
-            ToCoordinator::Heartbeat { executing } => Event::Heartbeat { worker, executing: self.of_today(&executing) },
+            ToCoordinator::Heartbeat { executing } => {
+                // What was begun for an earlier coordinator has another number there.
+                let executing = executing.iter().filter(|node| node.lease.epoch == self.epoch);
+                let executing = executing.map(|node| (NodeId(node.lease.node), node.permille.min(1000)));
+                Event::Heartbeat { worker, executing: executing.collect() }
+            }
             ToCoordinator::Started(lease) if self.is_ours(lease)? => {
                 Event::Started { worker, node: NodeId(lease.node), attempt: lease.attempt }
             }
@@ -198,17 +203,6 @@ impl<R: AsyncRead + Unpin> Reader<R> {
             return Err(unexpected("a lease of this run", &format!("one of epoch {}", lease.epoch)));
         }
         Ok(lease.epoch == self.epoch)
-    }
-
-    /// What of this was begun for this coordinator. What was begun for an earlier one had another number there.
-    fn of_today(&self, executing: &[protocol::Executing]) -> Vec<Executing> {
-        let of_today = executing.iter().filter(|node| node.lease.epoch == self.epoch);
-        let executing = of_today.map(|protocol::Executing { lease, permille }| Executing {
-            node: NodeId(lease.node),
-            attempt: lease.attempt,
-            permille: (*permille).min(1000),
-        });
-        executing.collect()
     }
 
     fn life(&self) -> Event {

@@ -35,7 +35,7 @@ use self::strangers::{Place, Strangers};
 use crate::comm::RunEvent;
 use crate::limits::Limits;
 use crate::policy::Policy;
-use crate::reactor::{Event, Executing};
+use crate::reactor::Event;
 use crate::tls::accept;
 
 /// The pause after the system refuses to accept a connection, such as for want of file descriptors.
@@ -50,9 +50,9 @@ pub(crate) enum Inbound {
     Ask { lease: LeaseName, answer: oneshot::Sender<bool> },
     /// Something happened.
     Event(Event),
-    /// A worker's first sign of life to a coordinator that has gone on with a run; it executes these for an earlier one, and these
-    /// for this one since an earlier connection. What it had finished for either has come before.
-    Reported { worker: WorkerId, earlier: Vec<LeaseName>, executing: Vec<Executing> },
+    /// A worker's first sign of life to a coordinator that has gone on with a run; it executes these for an earlier one. What it
+    /// had finished for that one has come before.
+    Reported { worker: WorkerId, executing: Vec<LeaseName> },
     /// An answer to a lease of an earlier coordinator of this run: the output, whose hash was verified, or none.
     Late { worker: WorkerId, lease: LeaseName, output: Option<Blob> },
     /// Something to tell the user that the reactor does not care about.

@@ -23,7 +23,7 @@ use std::error::Error as _;
 use std::sync::Arc;
 use std::time::Duration;
 
-use lookalike::graph::{NodeId, Planner, Registry, WorkerId};
+use lookalike::graph::{Blob, NodeId, Planner, Registry, WorkerId};
 use lookalike::protocol::{Assignment, LeaseName, RunName, ToWorker};
 use lookalike_worker::world::{Real, World};
 use tokio::sync::mpsc::{Receiver, UnboundedReceiver, channel, unbounded_channel};
@@ -205,7 +205,7 @@ impl<W: World, P: Planner, O: FnMut(&RunEvent)> Driver<W, P, O> {
         }
         let started = reactor::start(&mut self.core, &mut self.planner, now, &mut self.outbox);
         self.forget_if_wrong(started.as_ref().err(), &mut group);
-        self.collect(&mut group, now);
+        self.collect(&mut group, None, now);
         if started.is_ok() && !self.core.is_finished() {
             let is_new = takeover.is_none();
             let survivors = takeover.as_ref().map(|takeover| takeover.survivors.clone()).unwrap_or_default();
@@ -270,17 +270,23 @@ impl<W: World, P: Planner, O: FnMut(&RunEvent)> Driver<W, P, O> {
         trace!(?event);
         self.here.forget(&event);
         let now = self.now();
+        let output = match &event {
+            Event::Finished { node, output, .. } | Event::Recovered { node, output, .. } => {
+                Some((*node, output.clone()))
+            }
+            _ => None,
+        };
         let outcome = reactor::handle(&mut self.core, &mut self.planner, event, now, &mut self.outbox);
-        self.collect(group, now);
+        self.collect(group, output.as_ref(), now);
         self.forget_if_wrong(outcome.as_ref().err(), group);
         outcome
     }
 
     /// Move what the reactor has said into the group, and tell the journal.
-    fn collect(&mut self, group: &mut Group, now: Duration) {
+    fn collect(&mut self, group: &mut Group, output: Option<&(NodeId, Blob)>, now: Duration) {
         let actions = self.outbox.take();
         if self.memory.is_kept() {
-            actions.iter().for_each(|action| group.batch.note(action, &self.core, now));
+            actions.iter().for_each(|action| group.batch.note(action, &self.core, output, now));
         }
         group.actions.extend(actions);
     }
@@ -323,9 +329,9 @@ impl<W: World, P: Planner, O: FnMut(&RunEvent)> Driver<W, P, O> {
                 }
                 None
             }
-            Inbound::Reported { worker, earlier, executing } => {
-                self.survivors.iter_mut().for_each(|survivors| survivors.reported(worker, earlier.clone()));
-                Some(Event::Heartbeat { worker, executing })
+            Inbound::Reported { worker, executing } => {
+                self.survivors.iter_mut().for_each(|survivors| survivors.reported(worker, executing.clone()));
+                Some(Event::Heartbeat { worker, executing: Vec::new() })
             }
             Inbound::Late { worker, lease, output } => Some(self.memory.late_answer(worker, lease, output, group)),
             Inbound::Ask { lease, answer } => {
@@ -334,7 +340,7 @@ impl<W: World, P: Planner, O: FnMut(&RunEvent)> Driver<W, P, O> {
                 None
             }
             Inbound::Tell(event) => {
-                group.batch.note_event(&event, &self.core, self.now());
+                group.batch.note_event(&event, &self.core, None, self.now());
                 group.actions.push(Action::Tell(event));
                 None
             }
@@ -361,8 +367,6 @@ impl<W: World, P: Planner, O: FnMut(&RunEvent)> Driver<W, P, O> {
                     self.send(worker, ToWorker::Acknowledge(name));
                 }
                 Action::Drop { worker } => self.cluster.iter_mut().for_each(|cluster| cluster.dismiss(worker)),
-                // The journal has it.
-                Action::Keep { .. } => {}
                 Action::RunHere { node, attempt } => self.run_here(node, attempt),
                 Action::Tell(event) => {
                     if let RunEvent::NodeStarted { site: Site::Worker(worker), .. } = &event {

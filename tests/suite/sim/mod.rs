@@ -75,7 +75,9 @@ fn try_seed(seed: u64) -> Result<Ending, String> {
 }
 
 fn replay(seed: u64) -> String {
-    format!("replay it: {SEED}={seed} cargo test -p lookalike-tests --test suite sim::seed_that_is_asked -- --nocapture")
+    format!(
+        "replay it: {SEED}={seed} cargo test -p lookalike-tests --test suite sim::seed_that_is_asked -- --nocapture"
+    )
 }
 
 fn number(name: &str) -> Option<u64> {

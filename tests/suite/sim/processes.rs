@@ -33,10 +33,7 @@ pub(super) fn policy(chance: &mut Chance) -> Policy {
         suspect_after: u32::try_from(chance.between(2, 3)).unwrap_or(2),
         node_crashes: u32::try_from(chance.between(2, 4)).unwrap_or(2),
         suspect_patience: chance.time(100, 2000),
-        speculation: Speculation {
-            factor: chance.happens(0.8).then_some(2.0),
-            after: chance.time(200, 3000),
-        },
+        speculation: Speculation { factor: chance.happens(0.8).then_some(2.0), after: chance.time(200, 3000) },
         verify_fraction: chance.of(&[0.0, 0.0, 0.2, 1.0]),
         drain_time: chance.time(500, 5000),
         // Nobody gives up: whatever is broken is mended some time.
@@ -104,7 +101,8 @@ impl Watcher {
     fn given_out(&self, label: &str) {
         let acknowledged = self.stage.state().finished.get(label).copied();
         if acknowledged.is_some_and(|by| by != self.process) {
-            self.stage.wrong(format!("{label} was given out though an earlier coordinator had acknowledged its output"));
+            self.stage
+                .wrong(format!("{label} was given out though an earlier coordinator had acknowledged its output"));
         }
     }
 

@@ -23,7 +23,7 @@ use super::web::{Web, registry};
 /// A run that goes on for longer hangs: nothing that is done to it lasts nearly as long.
 const LONGEST_RUN: Duration = Duration::from_secs(300);
 
-/// Between the last message to a worker and its end, whatever the network does.
+/// How far apart the ends of a coordinator and of a worker that it has told may be, whatever the network does.
 const LAST_WORDS: Duration = Duration::from_secs(5);
 
 /// How a run came through.
@@ -48,7 +48,7 @@ pub(super) struct Ending {
 pub(super) fn simulate(seed: u64) -> Result<Ending, String> {
     let folder = temporary_folder();
     let mut run = Run::new(seed, &folder);
-    let outcome = run.to_the_end().and_then(|()| run.judge());
+    let outcome = run.go_on().and_then(|()| run.judge());
     outcome.map_err(|wrong| format!("{wrong}\n\n{}\n{wrong}", run.stage.trace()))
 }
 
@@ -107,7 +107,8 @@ impl Run {
         let workers = usize::try_from(chance.between(1, 5)).unwrap_or(1);
         for index in 0..workers {
             let (shared, late) = (Arc::clone(&stage), chance.time(0, 5000));
-            let threads = NonZeroUsize::new(usize::try_from(chance.between(1, 4)).unwrap_or(1)).unwrap_or(NonZeroUsize::MIN);
+            let threads =
+                NonZeroUsize::new(usize::try_from(chance.between(1, 4)).unwrap_or(1)).unwrap_or(NonZeroUsize::MIN);
             sim.host(Place::Worker(index).host(), move || {
                 let stage = Arc::clone(&shared);
                 async move {
@@ -137,7 +138,7 @@ impl Run {
         run
     }
 
-    fn to_the_end(&mut self) -> Result<(), String> {
+    fn go_on(&mut self) -> Result<(), String> {
         loop {
             self.sim.step().map_err(|error| format!("a process has panicked: {error}"))?;
             self.bury();
@@ -166,7 +167,10 @@ impl Run {
         let expected = run_in_process(Web::new(self.stage.seed), &registry(), Execution::Sequential);
         let expected = expected.map_err(|error| format!("the reference has failed: {error}"))?.results;
         if results != expected {
-            return Err(format!("the results are others than those of one process:\n{}", differences(&results, &expected)));
+            return Err(format!(
+                "the results are others than those of one process:\n{}",
+                differences(&results, &expected)
+            ));
         }
         let run_twice = JournalView::of(&self.stage.folder).run_twice();
         if run_twice > 0 {
@@ -184,9 +188,11 @@ impl Run {
     fn end_workers(&mut self) -> Result<(), String> {
         let over = self.sim.elapsed();
         self.coordinators_ended.push(over);
-        let is_told = |when: &Duration| self.coordinators_ended.iter().any(|end| (*when..*when + LAST_WORDS).contains(end));
+        let is_told = |when: &Duration| self.coordinators_ended.iter().any(|end| end.abs_diff(*when) < LAST_WORDS);
         if let Some((index, when)) = self.left_unasked.iter().find(|(_, when)| !is_told(when)) {
-            return Err(format!("worker {index} has ended at {when:?} though the run was not over and nobody had asked it"));
+            return Err(format!(
+                "worker {index} has ended at {when:?} though the run was not over and nobody had asked it"
+            ));
         }
         let state = self.stage.state();
         let told: BTreeSet<u32> = state.joined.difference(&state.harmed).copied().collect();

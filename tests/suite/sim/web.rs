@@ -99,7 +99,8 @@ impl Planner for Web {
         if label.matches('.').count() < DEPTH {
             for child in 0..first % 3 {
                 let root = self.roots[usize::from(second) % self.roots.len()];
-                let mut inputs = vec![Input::OutputOf(node), Input::Blob(self.blobs[usize::from(child) % self.blobs.len()])];
+                let mut inputs =
+                    vec![Input::OutputOf(node), Input::Blob(self.blobs[usize::from(child) % self.blobs.len()])];
                 if second.is_multiple_of(2) {
                     inputs.push(Input::OutputOf(root));
                 }

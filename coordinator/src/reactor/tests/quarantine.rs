@@ -202,27 +202,3 @@ fn worker_that_ends_in_order_costs_its_nodes_no_time() {
         bench.lose(A, Departure::Goodbye);
     }
 }
-
-#[test]
-fn worker_that_goes_on_with_its_node_on_a_new_connection_has_not_died_of_it() {
-    let mut bench = suspected(independent(1));
-    // The connection is lost time and again; each time the same process comes back, computing.
-    for number in 20..40 {
-        let (worker, before) = (WorkerId(number), bench.core.look(NodeId(0)).unwrap().attempts);
-        bench.pass_time(6).unwrap();
-        assert_eq!(bench.join(worker, 1), [format!("{worker} gets 0.{}", before + 1)]);
-        let beat = Event::Heartbeat { worker, executing: vec![executing(0, before)] };
-        assert_eq!(bench.handle(beat)[0], "n0 absolved, 1");
-        bench.start(worker, 0, before + 1);
-        assert!(bench.lose(worker, Departure::Lost).contains(&"n0 requeued, 2".to_owned()));
-    }
-    // Who breaks the protocol is not trusted with that.
-    bench.pass_time(6).unwrap();
-    bench.join(A, 1);
-    let attempt = bench.core.look(NodeId(0)).unwrap().attempts;
-    bench.start(A, 0, attempt);
-    bench.lose(A, Departure::Violation("nonsense".into()));
-    bench.join(B, 1);
-    let beat = Event::Heartbeat { worker: B, executing: vec![executing(0, attempt)] };
-    assert!(!bench.handle(beat).iter().any(|line| line.contains("absolved")));
-}
