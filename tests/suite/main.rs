@@ -20,6 +20,7 @@ mod faults;
 mod fit;
 mod hostile;
 mod network;
+mod overhead;
 mod physics;
 mod program;
 #[cfg(feature = "slow")]

@@ -4,7 +4,9 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use lookalike::graph::{Blob, BlobHash, Registry};
-use lookalike::protocol::{Access, Hello, IncomingBlob, ProofKey, ToCoordinator, ToWorker, TransferError, Welcome};
+use lookalike::protocol::{
+    Access, Hello, IncomingBlob, ProcessName, ProofKey, ToCoordinator, ToWorker, TransferError, Welcome,
+};
 use tokio::io::{AsyncWrite, AsyncWriteExt, ReadHalf, WriteHalf, split};
 use tokio::sync::Notify;
 use tokio::sync::mpsc::{UnboundedReceiver, UnboundedSender, unbounded_channel};
@@ -14,7 +16,7 @@ use tokio_rustls::client::TlsStream;
 use tracing::{debug, info, warn};
 
 use crate::cache::BlobCache;
-use crate::ending::Wishes;
+use crate::ending::{Leash, Wishes};
 use crate::error::WorkerError;
 use crate::execute::{Completed, Executor};
 use crate::options::WorkerOptions;
@@ -47,6 +49,8 @@ pub(crate) async fn run<W: World>(
 ) -> Result<(), WorkerError> {
     let access = read_access(options)?;
     let address = options.address.clone().unwrap_or_else(|| access.address.clone());
+    let mut name = [0; 16];
+    world.fill_random(&mut name).map_err(WorkerError::Runtime)?;
     let (completed_sender, completed) = unbounded_channel();
     let threads = options.threads;
     let pool = world.start_pool(threads)?;
@@ -56,6 +60,8 @@ pub(crate) async fn run<W: World>(
         world,
         address,
         access,
+        name: ProcessName(name),
+        is_local: options.leash != Leash::None,
         threads: threads.get(),
         wishes,
         own_drain_time: options.drain_time,
@@ -87,6 +93,9 @@ struct Session<W: World> {
     world: W,
     address: String,
     access: Access,
+    name: ProcessName,
+    /// A coordinator has started this process.
+    is_local: bool,
     threads: usize,
     wishes: Wishes,
     /// What this worker was told; it wins over what the coordinator says.
@@ -164,10 +173,16 @@ impl<W: World> Session<W> {
         let (outgoing, announced, mut writing) = start_writing(writer);
         let heart = Arc::new(Notify::new());
         let heartbeat = self.world.start_heart(Duration::from_millis(welcome.heartbeat_ms.into()), Arc::clone(&heart));
-        let mut connection = Connection { incoming, outgoing, announced, transfer: None };
+        let silence = Duration::from_millis(welcome.silence_ms.into());
+        let mut connection = Connection { incoming, outgoing, announced, transfer: None, silence };
         self.drain_time = self.own_drain_time.unwrap_or(Duration::from_millis(welcome.drain_ms.into()));
         if self.leave_by.is_some() {
             self.act(&connection, vec![Action::Send(ToCoordinator::Draining)]);
+        }
+        // What has ended meanwhile is an answer by now. It is said before what still executes, which is all that is left then.
+        while let Ok(completed) = self.completed.try_recv() {
+            // Nothing of what follows from it has a connection to go to: `welcomed` says what counts.
+            drop(self.tasks.completed(completed, || self.executor.context()));
         }
         let actions = self.tasks.welcomed(welcome.run);
         self.act(&connection, actions);
@@ -199,7 +214,8 @@ impl<W: World> Session<W> {
         greet_coordinator(&mut stream, &ProofKey::new(&self.access.secret, &channel), nonce).await?;
         let (reader, mut writer) = split(stream);
         let threads = u32::try_from(self.threads).unwrap_or(u32::MAX);
-        let hello = Hello { build: env!("CARGO_PKG_VERSION").into(), threads, process: self.world.process() };
+        let (build, process) = (env!("CARGO_PKG_VERSION").to_owned(), self.world.process());
+        let hello = Hello { build, threads, process, name: self.name, is_local: self.is_local };
         send_message(&mut writer, &ToCoordinator::Hello(hello)).await?;
         let mut incoming = Incoming::new(reader);
         match incoming.message().await? {
@@ -210,19 +226,13 @@ impl<W: World> Session<W> {
 
     async fn serve(&mut self, connection: &mut Connection<W>, heart: &Notify) -> Result<Ended, WireError> {
         let wishes = self.wishes.clone();
+        let mut silent = std::pin::pin!(sleep_until(connection.silent_at()));
         while !self.may_leave() && !wishes.end.is_cancelled() {
             let actions = tokio::select! {
-                // What comes from outside is last: there may be much of it, of the rest there is little.
+                // A node that is there to be cancelled is not begun with: what was said is heard before anything follows from the
+                // rest. It cannot be more than the coordinator has to say without an answer.
                 biased;
-                Some(completed) = self.completed.recv() => self.tasks.completed(completed, || self.executor.context()),
-                Some(serial) = connection.announced.recv() => self.tasks.announced(serial),
                 () = heart.notified() => vec![Action::Send(ToCoordinator::Heartbeat { executing: self.tasks.executing() })],
-                () = wishes.end.cancelled() => Vec::new(),
-                () = wishes.drain.cancelled(), if self.leave_by.is_none() => {
-                    self.begin_to_drain();
-                    vec![Action::Send(ToCoordinator::Draining)]
-                }
-                () = sleep_until_some(self.leave_by) => Vec::new(),
                 received = connection.incoming.next() => match received?.ok_or(WireError::Ended)? {
                     Received::Message(ToWorker::Stop { reason }) => {
                         info!(reason, "the coordinator ends this worker");
@@ -230,6 +240,22 @@ impl<W: World> Session<W> {
                     }
                     received => self.received(connection, received)?,
                 },
+                Some(serial) = connection.announced.recv() => self.tasks.announced(serial),
+                Some(completed) = self.completed.recv() => self.tasks.completed(completed, || self.executor.context()),
+                () = wishes.drain.cancelled(), if self.leave_by.is_none() => {
+                    self.begin_to_drain();
+                    vec![Action::Send(ToCoordinator::Draining)]
+                }
+                () = sleep_until_some(self.leave_by) => Vec::new(),
+                () = wishes.end.cancelled() => Vec::new(),
+                () = &mut silent => {
+                    let silent_at = connection.silent_at();
+                    if silent_at <= Instant::now() {
+                        return Err(WireError::TimedOut);
+                    }
+                    silent.as_mut().reset(silent_at);
+                    Vec::new()
+                }
             };
             self.act(connection, actions);
         }
@@ -250,6 +276,7 @@ impl<W: World> Session<W> {
             }
             Received::Message(ToWorker::Cancel(lease)) => return Ok(self.tasks.cancelled(lease, new_context)),
             Received::Message(ToWorker::Acknowledge(lease)) => self.tasks.acknowledged(lease),
+            Received::Message(ToWorker::Heartbeat) => {}
             Received::Message(ToWorker::Blob { hash, length }) => {
                 if connection.transfer.is_some() {
                     return Err(unexpected("the rest of a blob", "another blob"));
@@ -307,9 +334,16 @@ struct Connection<W: World> {
     outgoing: UnboundedSender<Outgoing>,
     announced: UnboundedReceiver<u64>,
     transfer: Option<IncomingBlob>,
+    /// How long the coordinator may say nothing.
+    silence: Duration,
 }
 
 impl<W: World> Connection<W> {
+    /// When it has been silent for too long, unless a byte comes before.
+    fn silent_at(&self) -> Instant {
+        self.incoming.heard() + self.silence
+    }
+
     fn take_complete(&mut self) -> Result<Option<Blob>, TransferError> {
         self.transfer.take_if(|blob| blob.is_complete()).map(IncomingBlob::finish).transpose()
     }

@@ -16,6 +16,7 @@ use super::error::JournalError;
 use super::schema::node_id;
 use super::status;
 use super::unix_ms;
+use crate::comm::WorkerProcess;
 use crate::core::Deaths;
 
 /// How often `status.json` is written at most.
@@ -99,21 +100,19 @@ impl Writer {
         let mut new = Vec::new();
         let outcome = self.connection.transaction().and_then(|transaction| {
             new = write(&transaction, self.epoch, batch, &self.results)?;
-            if is_much {
-                self.deferred.write(&transaction)?;
-            }
-            transaction.commit()
+            let rows = if is_much { Some(self.deferred.write(&transaction)?) } else { None };
+            transaction.commit()?;
+            Ok(rows)
         });
+        let outcome = outcome.map(|rows| rows.into_iter().for_each(|rows| self.deferred.written(rows)));
         let outcome = match batch.listen {
             Some(_) => outcome.and_then(|()| self.reach_the_disk()),
             None => outcome,
         };
         outcome.map_err(|source| JournalError::writing(&self.options.path, source))?;
-        if is_much {
-            self.deferred.forget();
-        }
         self.results.extend(new);
-        for key in &batch.forgotten {
+        // A node that is added again after its output was released runs again, and its output has to be written again.
+        for key in batch.forgotten.iter().chain(&batch.released) {
             self.results.remove(key);
         }
         Ok(())
@@ -168,11 +167,12 @@ impl Writer {
     /// Write what could wait.
     fn write_deferred(&mut self) {
         let outcome = self.connection.transaction().and_then(|transaction| {
-            self.deferred.write(&transaction)?;
-            transaction.commit()
+            let rows = self.deferred.write(&transaction)?;
+            transaction.commit()?;
+            Ok(rows)
         });
         match outcome {
-            Ok(()) => self.deferred.forget(),
+            Ok(rows) => self.deferred.written(rows),
             Err(error) => warn!(%error, "cannot note in the journal what is under way"),
         }
     }
@@ -216,13 +216,12 @@ fn write(
         }
     }
     let row_of = |key: &NodeKey| new.iter().rev().find(|(other, _)| other == key).map(|(_, id)| *id);
-    for (sql, keys) in [
-        ("UPDATE results SET bytes = NULL WHERE id = ?1", &batch.released),
-        ("DELETE FROM results WHERE id = ?1", &batch.forgotten),
-    ] {
-        for id in keys.iter().filter_map(|key| known.get(key).copied().or_else(|| row_of(key))) {
-            transaction.prepare_cached(sql)?.execute([id])?;
-        }
+    let rows = |key: &NodeKey| known.get(key).copied().or_else(|| row_of(key));
+    for id in batch.released.iter().filter_map(rows) {
+        transaction.prepare_cached("UPDATE results SET bytes = NULL WHERE id = ?1")?.execute([id])?;
+    }
+    for id in batch.forgotten.iter().filter_map(rows) {
+        transaction.prepare_cached("DELETE FROM results WHERE id = ?1")?.execute([id])?;
     }
     write_workers(transaction, epoch, batch)?;
     Ok(new)
@@ -253,11 +252,13 @@ fn write_node(transaction: &Transaction<'_>, id: u64, row: &NodeRow) -> rusqlite
 
 fn write_workers(transaction: &Transaction<'_>, epoch: u64, batch: &Batch) -> rusqlite::Result<()> {
     for row in &batch.workers {
+        let WorkerProcess { id, name, is_local } = row.process;
         transaction
             .prepare_cached(
-                "INSERT INTO workers (epoch, worker, process, threads, joined_ms) VALUES (?1, ?2, ?3, ?4, ?5)",
+                "INSERT INTO workers (epoch, worker, process, name, local, threads, joined_ms)
+                 VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7)",
             )?
-            .execute(params![epoch, row.worker, row.process, row.threads, ms(row.at)])?;
+            .execute(params![epoch, row.worker, id, name.0, is_local, row.threads, ms(row.at)])?;
     }
     for row in &batch.left {
         transaction

@@ -136,7 +136,7 @@ pub(super) fn coordinator_is_killed() -> Result<Value> {
         "node_ms": milliseconds(PAUSE),
         "nodes": NODES,
         "results": results,
-        "finished_before": journal.number("SELECT count(*) FROM nodes WHERE epoch = 1 AND state = 3"),
+        "finished_before": journal.number("SELECT count(*) FROM results WHERE epoch = 1"),
         "finished_nodes_run_twice": journal.run_twice() + finished_twice(folder.path()),
     }))
 }

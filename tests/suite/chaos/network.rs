@@ -73,15 +73,18 @@ fn line_cut_for_longer_than_the_lease_gives_the_node_to_another_and_the_late_res
     namespace.heal();
     // By itself it notices that its connection is dead, comes back with its result, and takes the third node.
     wait_for_worker(&cluster);
+    // No other node has two results yet.
+    cluster.wait_for(|event| matches!(event, RunEvent::DuplicateResult { .. }).then_some(()));
     let third = gate.next();
     assert_eq!(third.process(), worker.id());
-    wait_for_start(&cluster);
     let keeper = gate.keep(Waiting::release);
     [second, third].into_iter().for_each(Waiting::release);
     let (result, summary) = cluster.finish();
     keeper.stop();
     assert_eq!(result, gates_reference(3));
-    assert_eq!((summary.duplicate_results, summary.suspected_nodes), (1, 0), "{summary:?}");
+    // The third node may have been on the other worker, which may begin with it before it hears that it was moved.
+    assert!((1..=2).contains(&summary.duplicate_results), "{summary:?}");
+    assert_eq!((summary.requeued_nodes, summary.suspected_nodes), (1, 0), "{summary:?}");
     for worker in [worker, other] {
         assert_eq!(worker.output().status.code(), Some(0));
     }

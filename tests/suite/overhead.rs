@@ -1,0 +1,30 @@
+//! `lookalike-overhead` measures what it says it does: every node once, none of them twice. How fast is not asserted here.
+
+use std::process::Command;
+
+use serde_json::Value;
+
+const PROGRAM: &str = env!("CARGO_BIN_EXE_lookalike-overhead");
+
+fn measure(arguments: &[&str]) -> Value {
+    let output = Command::new(PROGRAM).args(arguments).output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+#[test]
+fn every_node_is_given_out_once() {
+    let found = measure(&["throughput", "3000"]);
+    assert_eq!((&found["nodes"], &found["attempts_beyond_one"]), (&3000.into(), &0.into()), "{found}");
+    assert!(measure(&["round-trip", "3"])["median_ms"].as_f64().unwrap() > 0.0);
+}
+
+#[test]
+fn killed_workers_lose_what_they_held_and_killed_coordinators_nothing_that_was_finished() {
+    let worker = measure(&["worker-killed"]);
+    assert_eq!((&worker["completed"], &worker["finished_nodes_run_twice"]), (&worker["nodes"], &0.into()), "{worker}");
+    let coordinator = measure(&["coordinator-killed"]);
+    assert_eq!(coordinator["results"], coordinator["nodes"], "{coordinator}");
+    assert_eq!(coordinator["finished_nodes_run_twice"], 0, "{coordinator}");
+    assert!(coordinator["finished_before"].as_u64().unwrap() > 0, "{coordinator}");
+}
