@@ -15,7 +15,7 @@ use tempfile::TempDir;
 use turmoil::{Builder, Sim};
 
 use super::chance::Chance;
-use super::deeds::Deed;
+use super::deeds::{Deed, Link};
 use super::processes::{PORT, coordinate, policy, work};
 use super::stage::{Place, Stage};
 use super::web::{Web, registry};
@@ -72,7 +72,7 @@ pub(super) struct Run {
     /// The longest time between two faults, in milliseconds.
     pub(super) pause_ms: u64,
     /// The workers whose links are not as they should be.
-    pub(super) broken: BTreeSet<usize>,
+    pub(super) broken: BTreeMap<usize, Link>,
     /// Where there is no process.
     pub(super) absent: BTreeSet<Place>,
     /// The workers that have ended though nobody had asked them, and when.
@@ -128,7 +128,7 @@ impl Run {
             planned: 0,
             faults_left,
             pause_ms,
-            broken: BTreeSet::new(),
+            broken: BTreeMap::new(),
             absent: BTreeSet::new(),
             left_unasked: Vec::new(),
             coordinators_ended: Vec::new(),

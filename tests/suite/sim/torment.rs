@@ -54,7 +54,7 @@ impl Run {
         let time = fault.time(&mut self.chance);
         let place = if fault == Fault::KillCoordinator { Place::Coordinator } else { Place::Worker(index) };
         let needs_link = matches!(fault, Fault::Link(_) | Fault::PowerOff);
-        if self.absent.contains(&place) || needs_link && self.broken.contains(&index) {
+        if self.absent.contains(&place) || needs_link && self.broken.contains_key(&index) {
             return false;
         }
         if fault == Fault::KillCoordinator && self.faults.get(fault.name()) == Some(&MOST_COORDINATORS) {
@@ -101,12 +101,40 @@ impl Run {
     }
 
     fn kill(&mut self, place: Place, time: Duration) {
-        self.sim.crash(place.host());
+        self.crash(place);
         if place == Place::Coordinator {
             self.coordinators_ended.push(self.sim.elapsed());
         }
         self.gone(place);
         self.plan(time, Deed::Start(place));
+    }
+
+    /// End a process. In which order its connections end depends on how many tasks there ever were in the test's process, so none
+    /// of their last words may draw a latency of its own: they all arrive at once, or, where a link is cut in one direction, never.
+    fn crash(&mut self, place: Place) {
+        let links = match place {
+            Place::Coordinator => 0..self.workers,
+            Place::Worker(index) => index..index + 1,
+        };
+        let near = Place::Coordinator.host();
+        for index in links.clone() {
+            let far = Place::Worker(index).host();
+            match self.broken.get(&index) {
+                None | Some(Link::Slow) => self.sim.hold(near.as_str(), far),
+                Some(Link::CutDown | Link::CutUp) => self.sim.partition(near.as_str(), far),
+                Some(Link::Held | Link::Cut) => {}
+            }
+        }
+        self.sim.crash(place.host());
+        for index in links {
+            let far = Place::Worker(index).host();
+            match self.broken.get(&index) {
+                None | Some(Link::Slow) => self.sim.release(near.as_str(), far),
+                Some(Link::CutDown) => self.sim.repair_oneway(far, near.as_str()),
+                Some(Link::CutUp) => self.sim.repair_oneway(near.as_str(), far),
+                Some(Link::Held | Link::Cut) => {}
+            }
+        }
     }
 
     /// There is no process in a place any more.
@@ -119,7 +147,7 @@ impl Run {
 
     fn break_link(&mut self, index: usize, link: Link, time: Duration) {
         let (near, far) = (Place::Coordinator.host(), Place::Worker(index).host());
-        self.broken.insert(index);
+        self.broken.insert(index, link);
         match link {
             Link::Held => self.sim.hold(near, far),
             Link::Cut => self.sim.partition(near, far),
