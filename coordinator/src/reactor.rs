@@ -117,6 +117,8 @@ pub enum Event {
     },
     /// The time of [`Core::next_deadline`] has come.
     DeadlinePassed,
+    /// The planner may have more to add, though no node has ended.
+    LookAgain,
 }
 
 /// Begin a run: let the planner add the first nodes and act upon them.
@@ -165,6 +167,7 @@ pub fn handle(
         }
         Event::BlobRequested { worker, hash } => membership::send_blob(core, worker, hash, now, outbox),
         Event::LocalWorkersGivenUp { last_status } => core.given_up = Some(last_status),
+        Event::LookAgain => planner.look_again(&mut GraphEdit::new(&mut core.graph))?,
         Event::DeadlinePassed => {
             while let Some(worker) = core.members.silent(now) {
                 membership::drop_worker(core, worker, &Departure::Silent, now, outbox);
