@@ -11,7 +11,7 @@ use super::error::JournalError;
 use super::place;
 
 /// The format of the tables: `PRAGMA user_version`. A change of any kind is a new number.
-pub(super) const FORMAT: i64 = 1;
+pub(super) const FORMAT: i64 = 2;
 
 /// Marks the file as a journal of this program: `PRAGMA application_id`, the letters `Look`.
 pub(super) const APPLICATION: i64 = 0x4c6f_6f6b;
@@ -81,6 +81,15 @@ CREATE TABLE results (
     hash        BLOB NOT NULL,
     bytes       BLOB
 );
+CREATE TABLE fits (
+    name        TEXT PRIMARY KEY,
+    number      INTEGER NOT NULL,
+    state       TEXT NOT NULL,
+    cssim       REAL,
+    seconds     REAL,
+    error       TEXT,
+    outputs     TEXT
+) WITHOUT ROWID;
 CREATE VIEW node_list AS
     SELECT id >> 32 AS epoch, id & 0xffffffff AS node, kind, label,
            CASE state WHEN 0 THEN 'waiting' WHEN 1 THEN 'ready' WHEN 2 THEN 'running' WHEN 3 THEN 'completed'

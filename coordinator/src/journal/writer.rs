@@ -13,6 +13,7 @@ use super::JournalOptions;
 use super::batch::{Batch, NodeRow};
 use super::deferred::{Deferred, ms};
 use super::error::JournalError;
+use super::fits;
 use super::schema::node_id;
 use super::status;
 use super::unix_ms;
@@ -91,7 +92,9 @@ impl Writer {
             return Ok(());
         }
         let mut new = Vec::new();
+        let fits = self.options.fits.take();
         let outcome = self.connection.transaction().and_then(|transaction| {
+            fits::write(&transaction, &fits)?;
             new = write(&transaction, self.epoch, batch, &self.results)?;
             if is_much {
                 self.deferred.write(&transaction)?;
@@ -102,7 +105,10 @@ impl Writer {
             Some(_) => outcome.and_then(|()| self.reach_the_disk()),
             None => outcome,
         };
-        outcome.map_err(|source| JournalError::writing(&self.options.path, source))?;
+        if let Err(source) = outcome {
+            self.options.fits.put_back(fits);
+            return Err(JournalError::writing(&self.options.path, source));
+        }
         if is_much {
             self.deferred.forget();
         }
@@ -161,13 +167,18 @@ impl Writer {
 
     /// Write what could wait.
     fn write_deferred(&mut self) {
+        let fits = self.options.fits.take();
         let outcome = self.connection.transaction().and_then(|transaction| {
+            fits::write(&transaction, &fits)?;
             self.deferred.write(&transaction)?;
             transaction.commit()
         });
         match outcome {
             Ok(()) => self.deferred.forget(),
-            Err(error) => warn!(%error, "cannot note in the journal what is under way"),
+            Err(error) => {
+                self.options.fits.put_back(fits);
+                warn!(%error, "cannot note in the journal what is under way");
+            }
         }
     }
 
