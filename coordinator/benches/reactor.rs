@@ -7,7 +7,8 @@ use std::time::Duration;
 
 use criterion::{BatchSize, Criterion, criterion_group, criterion_main};
 use lookalike::graph::{Blob, GraphEdit, NodeId, NodeSpec, Placement, PlanError, Planner, WorkerId};
-use lookalike_coordinator::comm::{Action, Outbox, Site};
+use lookalike::protocol::ProcessName;
+use lookalike_coordinator::comm::{Action, Outbox, Site, WorkerProcess};
 use lookalike_coordinator::core::{Core, Policy};
 use lookalike_coordinator::reactor::{Event, handle, start};
 
@@ -49,7 +50,9 @@ impl Run {
         start(&mut core, &mut Independent, Duration::ZERO, &mut outbox).expect("a plan");
         let mut run = Self { core, outbox, now: Duration::ZERO, given: VecDeque::new() };
         for worker in (1..=workers).map(WorkerId) {
-            run.handle(Event::WorkerJoined { worker, threads: 1, process: 0 });
+            let name = ProcessName(u128::from(worker.0).to_le_bytes());
+            let process = WorkerProcess { id: 0, name, is_local: false };
+            run.handle(Event::WorkerJoined { worker, threads: 1, process });
         }
         run
     }

@@ -5,6 +5,7 @@ use std::fmt;
 use std::time::Duration;
 
 use lookalike::graph::{Blob, FailureReason, NodeId, WorkerId};
+use lookalike::protocol::ProcessName;
 
 /// A worker's permission, and duty, to execute a node. It ends with an answer, when it is cancelled, or with its worker's
 /// membership, which lasts as long as the worker is heard of.
@@ -16,6 +17,17 @@ pub struct Lease {
     pub attempt: u32,
     /// Counts the coordinator processes of this run, from 1.
     pub epoch: u64,
+}
+
+/// A worker's process, as its hello describes it. It has one number per connection, and one name for all of them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct WorkerProcess {
+    /// Its process id on its own machine, for people: in containers every worker may have the same.
+    pub id: u32,
+    /// Its name, which no other process has.
+    pub name: ProcessName,
+    /// Whether a coordinator has started it, on its own machine.
+    pub is_local: bool,
 }
 
 /// One thing to do.
@@ -61,6 +73,18 @@ pub enum Action {
         /// The worker.
         worker: WorkerId,
     },
+    /// Keep the output of a node that has just been completed: its run is remembered.
+    Keep {
+        /// The node.
+        node: NodeId,
+        /// Its output.
+        output: Blob,
+    },
+    /// Stop a node that runs in the coordinator's own process: its output is not wanted any more.
+    CancelHere {
+        /// The node.
+        node: NodeId,
+    },
     /// Run this node in the coordinator's own process.
     RunHere {
         /// The node.
@@ -81,6 +105,8 @@ pub enum Departure {
     Silent,
     /// It did not read what was sent to it.
     TooSlow,
+    /// Its process is back on another connection, before anybody noticed that this one is broken.
+    Replaced,
     /// It said goodbye: somebody asked it to end.
     Goodbye,
     /// It broke the protocol.
@@ -94,7 +120,7 @@ impl Departure {
     pub fn is_suspicious(&self) -> bool {
         match self {
             Self::Lost | Self::Violation(_) => true,
-            Self::Silent | Self::TooSlow | Self::Goodbye => false,
+            Self::Silent | Self::TooSlow | Self::Replaced | Self::Goodbye => false,
         }
     }
 }
@@ -107,6 +133,7 @@ impl Departure {
             Self::Lost => "lost",
             Self::Silent => "silent",
             Self::TooSlow => "too-slow",
+            Self::Replaced => "replaced",
             Self::Goodbye => "goodbye",
             Self::Violation(_) => "violation",
         }
@@ -119,6 +146,7 @@ impl fmt::Display for Departure {
             Self::Lost => formatter.write_str("its connection ended"),
             Self::Silent => formatter.write_str("it was not heard of for too long"),
             Self::TooSlow => formatter.write_str("it did not read what was sent to it"),
+            Self::Replaced => formatter.write_str("it came back on another connection"),
             Self::Goodbye => formatter.write_str("it was asked to end"),
             Self::Violation(what) => write!(formatter, "it broke the protocol: {what}"),
         }
@@ -294,6 +322,25 @@ pub enum RunEvent {
         worker: WorkerId,
         /// How many workers have died while they executed it.
         crashes: u32,
+    },
+    /// A worker has died while it executed this node; or one that was thought to have died of it is back, and its death is taken back.
+    DeathsCounted {
+        /// The node.
+        name: NodeName,
+        /// How many workers have died while they executed it.
+        deaths: u32,
+    },
+    /// A node has an output from one site and an error from another: one of the two machines is not to be trusted. What came
+    /// first counts.
+    AnswersDiffer {
+        /// The node.
+        name: NodeName,
+        /// Whose answer counts.
+        first: Site,
+        /// Whose answer came second.
+        second: Site,
+        /// The error of one of them.
+        error: String,
     },
     /// Workers have died while they executed this node, so from now on it runs alone.
     NodeSuspected {

@@ -1,6 +1,7 @@
 //! The coordinator's state: the graph, who holds which node, who is a member. Data and questions; what changes it is in
 //! [`reactor`](crate::reactor).
 
+mod departed;
 mod members;
 mod pace;
 mod waiting;
@@ -9,7 +10,9 @@ use std::collections::VecDeque;
 use std::time::Duration;
 
 use lookalike::graph::{Blob, Graph, NodeId, NodeKey, WorkerId};
+use lookalike::protocol::ProcessName;
 
+pub(crate) use self::departed::{Death, Departed, Lost};
 pub(crate) use self::members::{Held, Member, Members};
 use self::members::{Size, weight};
 use self::pace::Pace;
@@ -53,6 +56,9 @@ pub struct RunSummary {
     pub output_bytes_received: u64,
 }
 
+/// What an assignment takes in memory beside what it points to.
+const ASSIGNMENT_BYTES: usize = 128;
+
 /// The coordinator's state.
 #[derive(Debug)]
 pub struct Core {
@@ -72,8 +78,10 @@ pub struct Core {
     pub(crate) next_patience: Option<Duration>,
     /// The worker that is being cleared for a suspect.
     pub(crate) clearing: Option<WorkerId>,
-    /// The latest deaths of workers that no suspect explains: when, and what they executed.
-    pub(crate) unexplained: VecDeque<(Duration, Vec<NodeId>)>,
+    /// The latest deaths of workers that no suspect explains.
+    pub(crate) unexplained: VecDeque<Unexplained>,
+    /// The processes that have lost their connection and may come back.
+    pub(crate) departed: Departed,
     /// Since when there is work but no worker.
     pub(crate) starving: Option<Starving>,
     /// How the last local worker ended, once none will be started again and no other can join.
@@ -101,7 +109,7 @@ pub(crate) struct Record {
     pub(crate) is_verified: bool,
     /// The first of these two outputs.
     pub(crate) candidate: Option<Box<Candidate>>,
-    /// Where its output came from.
+    /// Where its output, or its error, came from.
     pub(crate) finished_by: Option<Site>,
     /// How often it has lost a worker that executed it, for whatever reason but a drain.
     pub(crate) losses: u32,
@@ -131,9 +139,20 @@ impl Deaths {
 #[derive(Debug)]
 pub(crate) struct Candidate {
     pub(crate) site: Site,
+    /// The process, as far as it was a member when it answered.
+    pub(crate) process: Option<ProcessName>,
     pub(crate) attempt: u32,
     pub(crate) output: Blob,
-    pub(crate) took: Duration,
+    /// How long it ran under this lease; `None` if it is not known to have run under it.
+    pub(crate) took: Option<Duration>,
+}
+
+/// A worker's death that no suspect explains.
+#[derive(Debug)]
+pub(crate) struct Unexplained {
+    pub(crate) when: Duration,
+    pub(crate) process: ProcessName,
+    pub(crate) executed: Vec<NodeId>,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -159,6 +178,7 @@ impl Core {
             next_patience: None,
             clearing: None,
             unexplained: VecDeque::new(),
+            departed: Departed::default(),
             starving: None,
             given_up: None,
             summary: RunSummary::default(),
@@ -253,8 +273,9 @@ impl Core {
         let inputs = self.graph.input_blobs(node).unwrap_or_default();
         let spec = self.graph.spec(node);
         let parameters = spec.map_or(0, |spec| spec.parameters.len());
-        let bytes = parameters + inputs.len() * size_of::<[u8; 32]>();
-        let size = Size { bytes, time: weight(spec.and_then(|spec| self.pace.usual(&spec.kind))) };
+        let named = spec.map_or(0, |spec| spec.kind.len() + spec.label.len());
+        let bytes = ASSIGNMENT_BYTES + parameters + named + inputs.len() * size_of::<[u8; 32]>();
+        let size = Size { bytes, time: weight(spec.and_then(|spec| self.pace.established(&spec.kind))) };
         self.members.change(worker, |member| {
             member.give(node, attempt, size, now);
             member.readable.extend(inputs.iter().map(Blob::hash));

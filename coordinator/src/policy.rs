@@ -137,7 +137,17 @@ pub enum PolicyError {
 /// A worker reads ahead, it does not hoard.
 const MOST_SPARE_LEASES: usize = 1000;
 
+/// After how many times [`lost_after`](Policy::lost_after) a worker takes a silent coordinator for gone: a coordinator has more to do
+/// than to tell that it lives.
+const SILENCES: u32 = 3;
+
 impl Policy {
+    /// How long a worker waits for any word of its coordinator.
+    #[must_use]
+    pub fn silence(&self) -> Duration {
+        SILENCES * self.lost_after
+    }
+
     /// That the policy makes sense.
     ///
     /// # Errors

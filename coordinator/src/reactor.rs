@@ -20,7 +20,7 @@ use lookalike::graph::{
     WorkerId,
 };
 
-use crate::comm::{Action, Departure, Outbox, RunEvent, Site};
+use crate::comm::{Action, Departure, Outbox, RunEvent, Site, WorkerProcess};
 use crate::core::{Core, Record, Starving};
 use crate::runner::RunError;
 
@@ -33,8 +33,8 @@ pub enum Event {
         worker: WorkerId,
         /// How many nodes it executes at a time.
         threads: usize,
-        /// Its process id on its own machine.
-        process: u32,
+        /// Its process, which may have been here before under another number.
+        process: WorkerProcess,
     },
     /// A worker's connection is gone.
     WorkerLeft {
@@ -48,12 +48,12 @@ pub enum Event {
         /// The worker.
         worker: WorkerId,
     },
-    /// A worker was heard of; it executes these nodes, done to so many thousandths.
+    /// A worker was heard of; it executes these nodes.
     Heartbeat {
         /// The worker.
         worker: WorkerId,
-        /// The nodes it executes, with their progress.
-        executing: Vec<(NodeId, u16)>,
+        /// The nodes it executes.
+        executing: Vec<Executing>,
     },
     /// A worker begins to execute a node.
     Started {
@@ -75,8 +75,8 @@ pub enum Event {
         /// The output.
         output: Blob,
     },
-    /// A worker executes a node already: an earlier coordinator of this run gave it. Has to be followed by the
-    /// [`WorkerJoined`](Self::WorkerJoined) of that worker.
+    /// A worker executes a node already: an earlier coordinator of this run gave it. Unless it has joined already, this has to be
+    /// followed by its [`WorkerJoined`](Self::WorkerJoined).
     Continues {
         /// The worker.
         worker: WorkerId,
@@ -121,6 +121,17 @@ pub enum Event {
     LookAgain,
 }
 
+/// A node that a worker says to execute.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Executing {
+    /// The node.
+    pub node: NodeId,
+    /// The attempt under which it was assigned, perhaps on an earlier connection.
+    pub attempt: u32,
+    /// How much of it is done, in thousandths.
+    pub permille: u16,
+}
+
 /// Begin a run: let the planner add the first nodes and act upon them.
 ///
 /// # Errors
@@ -130,16 +141,31 @@ pub fn start(core: &mut Core, planner: &mut impl Planner, now: Duration, outbox:
     settle(core, planner, now, outbox)
 }
 
-/// Act upon an event. `now` is the time since the run began and never goes back.
+/// Act upon an event that has just come. `now` is the time since the run began and never goes back.
 ///
 /// # Errors
-/// What ends the run: an error of the planner, which by default is any failed node; results that differ; no worker for
-/// too long.
+/// As [`handle_arrived`].
 pub fn handle(
     core: &mut Core,
     planner: &mut impl Planner,
     event: Event,
     now: Duration,
+    outbox: &mut Outbox,
+) -> Result<(), RunError> {
+    handle_arrived(core, planner, event, (now, now), outbox)
+}
+
+/// Act upon an event that came some time ago: `arrived`, not after `now`, says how long nodes have taken, and nothing else. Nobody
+/// is late because we are.
+///
+/// # Errors
+/// What ends the run: an error of the planner, which by default is any failed node; results that differ; no worker for
+/// too long.
+pub fn handle_arrived(
+    core: &mut Core,
+    planner: &mut impl Planner,
+    event: Event,
+    (arrived, now): (Duration, Duration),
     outbox: &mut Outbox,
 ) -> Result<(), RunError> {
     match event {
@@ -150,17 +176,21 @@ pub fn handle(
         Event::WorkerDrains { worker } => membership::drain(core, worker, now, outbox),
         Event::Heartbeat { worker, executing } => {
             membership::renew(core, worker, now);
-            for (node, permille) in executing {
-                if core.members.progress(worker, node, permille) {
-                    outbox.tell(RunEvent::NodeProgress { node, permille });
+            for Executing { node, attempt, permille } in executing {
+                match core.members.progress(worker, node, permille) {
+                    Some(true) => outbox.tell(RunEvent::NodeProgress { node, permille }),
+                    Some(false) => {}
+                    None => membership::found(core, worker, (node, attempt), now, outbox),
                 }
             }
         }
-        Event::Started { worker, node, attempt } => answers::started(core, worker, node, attempt, now, outbox),
-        Event::Finished { site, node, attempt, output } => {
-            answers::finished(core, (site, node, attempt), output, now, outbox)?;
+        Event::Started { worker, node, attempt } => {
+            answers::started(core, worker, (node, attempt), (arrived, now), outbox);
         }
-        Event::Continues { worker, node } => membership::reserve(core, worker, node),
+        Event::Finished { site, node, attempt, output } => {
+            answers::finished(core, (site, node, attempt), output, (arrived, now), outbox)?;
+        }
+        Event::Continues { worker, node } => membership::go_on(core, worker, node, now, outbox),
         Event::Recovered { worker, node, output } => answers::recovered(core, worker, node, output, now, outbox)?,
         Event::Failed { site, node, attempt, failure } => {
             answers::failed(core, (site, node, attempt), failure, now, outbox)?;

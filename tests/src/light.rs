@@ -83,7 +83,9 @@ async fn work(access: Access, process: u32) -> Result<(), WireError> {
     let nonce = BlobHash::of(&process.to_le_bytes()).0;
     greet_coordinator(&mut stream, &ProofKey::new(&access.secret, &channel), nonce).await?;
     let (reader, mut writer) = split(stream);
-    let hello = Hello { build: "light".into(), threads: 1, process };
+    let [a, b, c, d] = process.to_le_bytes();
+    let name = ProcessName([a, b, c, d, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]);
+    let hello = Hello { build: "light".into(), threads: 1, process, name, is_local: false };
     send_message(&mut writer, &ToCoordinator::Hello(hello)).await?;
     let mut incoming = Incoming::new(reader);
     match incoming.message().await? {
@@ -136,7 +138,7 @@ impl<S: tokio::io::AsyncRead + tokio::io::AsyncWrite + Unpin> Worker<S> {
                     self.transfer = Some(IncomingBlob::begin(BlobHash(hash), length)?);
                 }
                 Received::Part(part) => self.transfer.iter_mut().try_for_each(|blob| blob.push(&part))?,
-                Received::Message(ToWorker::Acknowledge(_) | ToWorker::Welcome(_)) => {}
+                Received::Message(ToWorker::Acknowledge(_) | ToWorker::Heartbeat | ToWorker::Welcome(_)) => {}
             }
             if let Some(blob) = self.transfer.take_if(|blob| blob.is_complete()) {
                 let blob = blob.finish()?;

@@ -4,10 +4,11 @@
 use std::io::{self, Read, Write};
 use std::net::{SocketAddr, TcpListener, TcpStream};
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU8, Ordering};
 use std::time::{Duration, SystemTime};
 
 use lookalike::protocol::{
-    Access, CHALLENGE_BYTES, Challenge, CodecError, FrameReader, FrameTag, Hello, ProofKey, RESPONSE_BYTES, Response,
+    Access, CHALLENGE_BYTES, Challenge, CodecError, FrameReader, FrameTag, Hello, ProcessName, ProofKey, RESPONSE_BYTES, Response,
     Secret, ToCoordinator, ToWorker, VERDICT_BYTES, Verdict, decode_message, encode_message, frame_header,
 };
 use lookalike_coordinator::access::Identity;
@@ -114,8 +115,16 @@ pub fn join(access: &Access, threads: u32) -> TlsClient {
     let (challenge, response, verdict) = greet(&mut stream, &access.secret, |_| {}).expect("a greeting");
     let key = proof_key(&stream, &access.secret);
     assert_eq!(verdict.check(&challenge, &response, &key), Ok(()));
-    say(&mut stream, &ToCoordinator::Hello(Hello { build: "liar".into(), threads, process: LIAR }));
+    say(&mut stream, &ToCoordinator::Hello(hello(threads)));
     stream
+}
+
+/// The hello of a liar that was never here before.
+#[must_use]
+pub fn hello(threads: u32) -> Hello {
+    static LIARS: AtomicU8 = AtomicU8::new(0);
+    let name = ProcessName([LIARS.fetch_add(1, Ordering::Relaxed); 16]);
+    Hello { build: "liar".into(), threads, process: LIAR, name, is_local: false }
 }
 
 /// Send a message.

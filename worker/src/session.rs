@@ -4,7 +4,9 @@ use std::sync::{Arc, mpsc as blocking};
 use std::time::Duration;
 
 use lookalike::graph::{Blob, BlobHash, Registry};
-use lookalike::protocol::{Access, Hello, IncomingBlob, ProofKey, ToCoordinator, ToWorker, TransferError, Welcome};
+use lookalike::protocol::{
+    Access, Hello, IncomingBlob, ProcessName, ProofKey, ToCoordinator, ToWorker, TransferError, Welcome,
+};
 use tokio::io::{AsyncWriteExt, ReadHalf, WriteHalf, split};
 use tokio::net::TcpStream;
 use tokio::sync::Notify;
@@ -15,7 +17,7 @@ use tokio_rustls::client::TlsStream;
 use tracing::{debug, info, warn};
 
 use crate::cache::BlobCache;
-use crate::ending::{Wishes, watch_for_the_end};
+use crate::ending::{Leash, Wishes, watch_for_the_end};
 use crate::error::WorkerError;
 use crate::execute::{Completed, Executor};
 use crate::options::WorkerOptions;
@@ -43,6 +45,8 @@ pub(crate) async fn run(options: &WorkerOptions, registry: Registry) -> Result<(
     let access = read_access(options)?;
     let address = options.address.clone().unwrap_or_else(|| access.address.clone());
     let wishes = watch_for_the_end(options.leash).map_err(WorkerError::Runtime)?;
+    let mut name = [0; 16];
+    getrandom::fill(&mut name).map_err(std::io::Error::other).map_err(WorkerError::Runtime)?;
     let (completed_sender, completed) = unbounded_channel();
     let threads = options.threads;
     let executor = Executor::new(threads, registry, options.decoded_blob_bytes, completed_sender)?;
@@ -50,6 +54,8 @@ pub(crate) async fn run(options: &WorkerOptions, registry: Registry) -> Result<(
     let mut session = Session {
         address,
         access,
+        name: ProcessName(name),
+        is_local: options.leash != Leash::None,
         threads: threads.get(),
         wishes,
         own_drain_time: options.drain_time,
@@ -80,6 +86,9 @@ enum Ended {
 struct Session {
     address: String,
     access: Access,
+    name: ProcessName,
+    /// A coordinator has started this process.
+    is_local: bool,
     threads: usize,
     wishes: Wishes,
     /// What this worker was told; it wins over what the coordinator says.
@@ -155,10 +164,16 @@ impl Session {
         let (outgoing, announced, mut writing) = start_writing(writer);
         let heart = Arc::new(Notify::new());
         let heartbeat = start_heart(Duration::from_millis(welcome.heartbeat_ms.into()), Arc::clone(&heart));
-        let mut connection = Connection { incoming, outgoing, announced, transfer: None };
+        let silence = Duration::from_millis(welcome.silence_ms.into());
+        let mut connection = Connection { incoming, outgoing, announced, transfer: None, silence };
         self.drain_time = self.own_drain_time.unwrap_or(Duration::from_millis(welcome.drain_ms.into()));
         if self.leave_by.is_some() {
             self.act(&connection, vec![Action::Send(ToCoordinator::Draining)]);
+        }
+        // What has ended meanwhile is an answer by now. It is said before what still executes, which is all that is left then.
+        while let Ok(completed) = self.completed.try_recv() {
+            // Nothing of what follows from it has a connection to go to: `welcomed` says what counts.
+            drop(self.tasks.completed(completed, || self.executor.context()));
         }
         let actions = self.tasks.welcomed(welcome.run);
         self.act(&connection, actions);
@@ -190,7 +205,8 @@ impl Session {
         greet_coordinator(&mut stream, &ProofKey::new(&self.access.secret, &channel), nonce).await?;
         let (reader, mut writer) = split(stream);
         let threads = u32::try_from(self.threads).unwrap_or(u32::MAX);
-        let hello = Hello { build: env!("CARGO_PKG_VERSION").into(), threads, process: std::process::id() };
+        let (build, process) = (env!("CARGO_PKG_VERSION").to_owned(), std::process::id());
+        let hello = Hello { build, threads, process, name: self.name, is_local: self.is_local };
         send_message(&mut writer, &ToCoordinator::Hello(hello)).await?;
         let mut incoming = Incoming::new(reader);
         match incoming.message().await? {
@@ -201,8 +217,13 @@ impl Session {
 
     async fn serve(&mut self, connection: &mut Connection, heart: &Notify) -> Result<Ended, WireError> {
         let wishes = self.wishes.clone();
+        let mut silent = std::pin::pin!(sleep_until(connection.silent_at()));
         while !self.may_leave() && !wishes.end.is_cancelled() {
             let actions = tokio::select! {
+                // A node that is there to be cancelled is not begun with: what was said is heard before anything follows from the
+                // rest. It cannot be more than the coordinator has to say without an answer.
+                biased;
+                () = heart.notified() => vec![Action::Send(ToCoordinator::Heartbeat { executing: self.tasks.executing() })],
                 received = connection.incoming.next() => match received?.ok_or(WireError::Ended)? {
                     Received::Message(ToWorker::Stop { reason }) => {
                         info!(reason, "the coordinator ends this worker");
@@ -212,13 +233,20 @@ impl Session {
                 },
                 Some(serial) = connection.announced.recv() => self.tasks.announced(serial),
                 Some(completed) = self.completed.recv() => self.tasks.completed(completed, || self.executor.context()),
-                () = heart.notified() => vec![Action::Send(ToCoordinator::Heartbeat { executing: self.tasks.executing() })],
                 () = wishes.drain.cancelled(), if self.leave_by.is_none() => {
                     self.begin_to_drain();
                     vec![Action::Send(ToCoordinator::Draining)]
                 }
                 () = sleep_until_some(self.leave_by) => Vec::new(),
                 () = wishes.end.cancelled() => Vec::new(),
+                () = &mut silent => {
+                    let silent_at = connection.silent_at();
+                    if silent_at <= Instant::now() {
+                        return Err(WireError::TimedOut);
+                    }
+                    silent.as_mut().reset(silent_at);
+                    Vec::new()
+                }
             };
             self.act(connection, actions);
         }
@@ -239,6 +267,7 @@ impl Session {
             }
             Received::Message(ToWorker::Cancel(lease)) => return Ok(self.tasks.cancelled(lease, new_context)),
             Received::Message(ToWorker::Acknowledge(lease)) => self.tasks.acknowledged(lease),
+            Received::Message(ToWorker::Heartbeat) => {}
             Received::Message(ToWorker::Blob { hash, length }) => {
                 if connection.transfer.is_some() {
                     return Err(unexpected("the rest of a blob", "another blob"));
@@ -288,9 +317,16 @@ struct Connection {
     outgoing: UnboundedSender<Outgoing>,
     announced: UnboundedReceiver<u64>,
     transfer: Option<IncomingBlob>,
+    /// How long the coordinator may say nothing.
+    silence: Duration,
 }
 
 impl Connection {
+    /// When it has been silent for too long, unless a byte comes before.
+    fn silent_at(&self) -> Instant {
+        self.incoming.heard() + self.silence
+    }
+
     fn take_complete(&mut self) -> Result<Option<Blob>, TransferError> {
         self.transfer.take_if(|blob| blob.is_complete()).map(IncomingBlob::finish).transpose()
     }

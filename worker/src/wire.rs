@@ -12,6 +12,7 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 use thiserror::Error;
 use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt};
+use tokio::time::Instant;
 
 use crate::tls::TlsError;
 
@@ -88,6 +89,7 @@ pub struct Incoming<R> {
     stream: R,
     frames: FrameReader,
     chunk: Vec<u8>,
+    heard: Instant,
 }
 
 impl<R: AsyncRead + Unpin> Incoming<R> {
@@ -98,7 +100,7 @@ impl<R: AsyncRead + Unpin> Incoming<R> {
 
     /// Read frames from `stream`, cut by `frames`: it says how long they may be.
     pub fn with_frames(stream: R, frames: FrameReader) -> Self {
-        Self { stream, frames, chunk: vec![0; READ_BYTES] }
+        Self { stream, frames, chunk: vec![0; READ_BYTES], heard: Instant::now() }
     }
 
     /// The next message or part; `None` when the stream ended between frames. Nothing is lost when the future is dropped.
@@ -107,18 +109,45 @@ impl<R: AsyncRead + Unpin> Incoming<R> {
     /// When the stream fails, ends inside a frame, or holds anything else than frames with messages of type `T` and parts.
     pub async fn next<T: DeserializeOwned>(&mut self) -> Result<Option<Received<T>>, WireError> {
         loop {
-            if let Some(frame) = self.frames.next_frame()? {
-                return Ok(Some(match frame.tag {
-                    FrameTag::Message => Received::Message(decode_message(&frame.body)?),
-                    FrameTag::Part => Received::Part(frame.body),
-                }));
+            if let Some(received) = self.complete()? {
+                return Ok(Some(received));
             }
-            match self.stream.read(&mut self.chunk).await? {
-                0 if self.frames.is_between_frames() => return Ok(None),
-                0 => return Err(WireError::Ended),
-                count => self.frames.push(&self.chunk[..count]),
+            if !self.read().await? {
+                return Ok(None);
             }
         }
+    }
+
+    /// The next message or part, if all of it has been read. Call it until `None` before the next [`read`](Self::read).
+    ///
+    /// # Errors
+    /// As [`next`](Self::next).
+    pub fn complete<T: DeserializeOwned>(&mut self) -> Result<Option<Received<T>>, WireError> {
+        let Some(frame) = self.frames.next_frame()? else { return Ok(None) };
+        Ok(Some(match frame.tag {
+            FrameTag::Message => Received::Message(decode_message(&frame.body)?),
+            FrameTag::Part => Received::Part(frame.body),
+        }))
+    }
+
+    /// Read what there is, at least a byte; `false` when the stream ended between frames. Nothing is lost when the future is dropped.
+    ///
+    /// # Errors
+    /// When the stream fails, or ends inside a frame.
+    pub async fn read(&mut self) -> Result<bool, WireError> {
+        let count = self.stream.read(&mut self.chunk).await?;
+        self.heard = Instant::now();
+        match count {
+            0 if self.frames.is_between_frames() => return Ok(false),
+            0 => return Err(WireError::Ended),
+            count => self.frames.push(&self.chunk[..count]),
+        }
+        Ok(true)
+    }
+
+    /// When something was read last: every byte is a sign of life, however long the frame is that it belongs to.
+    pub fn heard(&self) -> Instant {
+        self.heard
     }
 
     /// The next thing, which has to be a message.

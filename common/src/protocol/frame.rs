@@ -7,8 +7,8 @@
 use thiserror::Error;
 
 /// The largest `length` of a frame, tag included (2 MiB): a node's parameters (1 MiB) with 4096 inputs, or a part of a
-/// blob (1 MiB). Large blobs travel in many parts, so that no frame is large, a heartbeat never waits long behind one,
-/// and a stranger can make nobody allocate more than this.
+/// blob (1 MiB). Large blobs travel in many parts, so that no frame is large and a stranger can make nobody
+/// allocate more than this. Messages do wait behind a whole blob; whoever reads takes every byte for a sign of life.
 pub const MAX_FRAME_BYTES: usize = 2 << 20;
 
 /// Length and tag.

@@ -10,6 +10,11 @@ pub const MAX_MESSAGE_TEXT_BYTES: usize = 16 << 10;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct RunName(pub [u8; 16]);
 
+/// Names a worker process: random, made when it starts, so that one that has lost its connection is known when it comes back.
+/// Its process id would not do: in containers every worker may have the same.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+pub struct ProcessName(pub [u8; 16]);
+
 /// Names a lease. A worker answers with the name under which it was assigned the node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct LeaseName {
@@ -28,8 +33,12 @@ pub struct Hello {
     pub build: String,
     /// How many nodes it executes at a time; at least 1.
     pub threads: u32,
-    /// Its process id, for messages.
+    /// Its process id, for messages; that of a local worker also tells its coordinator which one it is.
     pub process: u32,
+    /// The same on every connection of this process.
+    pub name: ProcessName,
+    /// Whether a coordinator has started it, on its own machine.
+    pub is_local: bool,
 }
 
 /// The coordinator's answer to [`Hello`].
@@ -43,6 +52,8 @@ pub struct Welcome {
     pub epoch: u64,
     /// How often the worker shall tell that it lives, in milliseconds.
     pub heartbeat_ms: u32,
+    /// A worker that has not read a byte for this long, in milliseconds, shall take the connection for broken.
+    pub silence_ms: u32,
     /// How long it may take to finish what it executes when it is asked to end, in milliseconds, unless it was told
     /// otherwise.
     pub drain_ms: u32,
@@ -90,6 +101,8 @@ pub enum ToWorker {
     },
     /// Your answer for this lease has arrived; forget it.
     Acknowledge(LeaseName),
+    /// I live. Comes as often as a worker shall tell the same.
+    Heartbeat,
     /// The run is over; end.
     Stop {
         /// Why, for messages.

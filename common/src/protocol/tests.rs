@@ -7,7 +7,7 @@ use crate::graph::{BlobHash, MAX_BLOB_BYTES};
 const LEASE: LeaseName = LeaseName { node: 300, attempt: 2, epoch: 1 };
 
 fn to_worker() -> Vec<ToWorker> {
-    let welcome = Welcome { worker: 7, run: RunName([9; 16]), epoch: 1, heartbeat_ms: 1000, drain_ms: 30_000 };
+    let welcome = Welcome { worker: 7, run: RunName([9; 16]), epoch: 1, heartbeat_ms: 1000, silence_ms: 15_000, drain_ms: 30_000 };
     let assignment = Assignment {
         lease: LEASE,
         kind: "search".into(),
@@ -21,13 +21,18 @@ fn to_worker() -> Vec<ToWorker> {
         ToWorker::Cancel(LEASE),
         ToWorker::Blob { hash: [5; 32], length: 70_000 },
         ToWorker::Acknowledge(LEASE),
+        ToWorker::Heartbeat,
         ToWorker::Stop { reason: "the run is over".into() },
     ]
 }
 
+fn hello() -> Hello {
+    Hello { build: "0.1.0".into(), threads: 4, process: 4711, name: ProcessName([3; 16]), is_local: true }
+}
+
 fn to_coordinator() -> Vec<ToCoordinator> {
     vec![
-        ToCoordinator::Hello(Hello { build: "0.1.0".into(), threads: 4, process: 4711 }),
+        ToCoordinator::Hello(hello()),
         ToCoordinator::Heartbeat { executing: vec![Executing { lease: LEASE, permille: 500 }] },
         ToCoordinator::Started(LEASE),
         ToCoordinator::Fetch { hash: [5; 32] },
@@ -72,9 +77,9 @@ fn message_bytes_belong_to_this_protocol_version() {
 
 #[test]
 fn lease_and_hello_have_their_golden_bytes() {
-    let hello = ToCoordinator::Hello(Hello { build: "0.1.0".into(), threads: 4, process: 4711 });
-    // Variant 0; five characters; 4; 251 announces two bytes of 4711.
-    assert_eq!(hex(&encode_message(&hello).unwrap()), "0005302e312e3004fb6712");
+    let hello = ToCoordinator::Hello(hello());
+    // Variant 0; five characters; 4; 251 announces two bytes of 4711; the name; true.
+    assert_eq!(hex(&encode_message(&hello).unwrap()), "0005302e312e3004fb67120303030303030303030303030303030301");
     assert_eq!(hex(&encode_message(&ToWorker::Cancel(LEASE)).unwrap()), "02fb2c010201");
     assert_eq!(hex(&frame_header(FrameTag::Part, 259).unwrap()), "0401000001");
 }
@@ -100,7 +105,7 @@ fn every_message_survives_the_wire_and_no_cut_one_is_accepted() {
 fn hostile_lengths_inside_a_message_are_refused_before_allocation() {
     // `Stop` with a text of 2^64 - 1 bytes, `Assign` with as many parameters, an unknown variant.
     for hostile in
-        [[vec![5, 253], vec![255; 8]].concat(), [vec![1, 1, 1, 1, 0, 0, 253], vec![255; 8]].concat(), vec![99], vec![]]
+        [[vec![6, 253], vec![255; 8]].concat(), [vec![1, 1, 1, 1, 0, 0, 253], vec![255; 8]].concat(), vec![99], vec![]]
     {
         assert!(matches!(decode_message::<ToWorker>(&hostile), Err(CodecError::Decode { .. })), "{hostile:?}");
     }

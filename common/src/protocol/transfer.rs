@@ -4,8 +4,8 @@ use thiserror::Error;
 
 use crate::graph::{Blob, BlobHash, HashMismatch, MAX_BLOB_BYTES};
 
-/// How many bytes of a blob go into one frame (1 MiB): large enough that framing costs nothing, small enough that other
-/// messages do not wait for long.
+/// How many bytes of a blob go into one frame (1 MiB): large enough that framing costs nothing, small enough that
+/// memory follows what has come.
 pub const PART_BYTES: usize = 1 << 20;
 
 /// A transfer that went wrong. The connection cannot be used any more.

@@ -6,6 +6,10 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
 use lookalike::graph::{BlobHash, NodeId, WorkerId};
+use lookalike::protocol::ProcessName;
+
+use super::Lost;
+use crate::comm::WorkerProcess;
 
 /// How many bytes of assignments a worker may have been given that it has not begun with. What waits in its queue stays as
 /// small as this, and one assignment.
@@ -35,6 +39,7 @@ pub(crate) fn weight(usual: Option<Duration>) -> Duration {
 /// A worker that has joined.
 #[derive(Clone, Debug)]
 pub(crate) struct Member {
+    pub(crate) process: WorkerProcess,
     pub(crate) threads: usize,
     pub(crate) leases: BTreeMap<NodeId, Held>,
     /// The leases that it has not begun with.
@@ -52,7 +57,9 @@ pub(crate) struct Member {
     pub(crate) is_clearing: bool,
     /// The suspect that has it for itself.
     pub(crate) alone_with: Option<NodeId>,
-    /// It has executed nothing yet.
+    /// The attempts of its process on connections that were lost: it may still be at them.
+    pub(crate) earlier: BTreeMap<NodeId, u32>,
+    /// Its process has executed nothing yet.
     is_fresh: bool,
     /// When it last got, began or ended something.
     last_move: Duration,
@@ -78,8 +85,9 @@ pub(crate) struct Size {
 }
 
 impl Member {
-    fn new(threads: usize, deadline: Duration, now: Duration) -> Self {
+    fn new(process: WorkerProcess, threads: usize, deadline: Duration, now: Duration) -> Self {
         Self {
+            process,
             threads: threads.max(1),
             leases: BTreeMap::new(),
             waiting: BTreeSet::new(),
@@ -90,9 +98,23 @@ impl Member {
             is_draining: false,
             is_clearing: false,
             alone_with: None,
+            earlier: BTreeMap::new(),
             is_fresh: true,
             last_move: now,
         }
+    }
+
+    /// Its process was here before.
+    pub(crate) fn resume(&mut self, lost: Lost) {
+        self.is_fresh &= lost.was_fresh;
+        self.earlier = lost.attempts;
+    }
+
+    /// What is to be known of it should its process come back.
+    pub(crate) fn into_lost(self) -> Lost {
+        let mut attempts = self.earlier;
+        attempts.extend(self.leases.iter().map(|(node, held)| (*node, held.attempt)));
+        Lost { was_fresh: self.is_fresh, attempts, deaths: Vec::new() }
     }
 
     /// A lease begins.
@@ -105,12 +127,12 @@ impl Member {
     }
 
     /// The worker begins to execute a node that it has not begun with yet; `false` if there is no such lease.
-    pub(crate) fn begin(&mut self, node: NodeId, attempt: u32, now: Duration) -> bool {
+    pub(crate) fn begin(&mut self, node: NodeId, attempt: u32, (arrived, now): (Duration, Duration)) -> bool {
         let Some(held) = self.leases.get_mut(&node).filter(|held| held.attempt == attempt) else { return false };
         if !self.waiting.remove(&node) {
             return false;
         }
-        held.started_at = Some(now);
+        held.started_at = Some(arrived);
         self.waiting_bytes -= held.assignment.bytes;
         self.waiting_time -= held.assignment.time;
         self.is_fresh = false;
@@ -144,6 +166,13 @@ impl Member {
     /// would be begun with here before anybody there hears of it.
     pub(crate) fn movable_at(&self) -> Duration {
         if self.waiting_time > self.enough() + SHORT { Duration::ZERO } else { self.last_move + STANDSTILL }
+    }
+
+    /// The last of the nodes that it has not begun with, if it has enough without that one.
+    pub(crate) fn excess(&self, spare_leases: usize) -> Option<NodeId> {
+        let last = *self.waiting.last()?;
+        let rest = self.waiting_time - self.leases.get(&last)?.assignment.time;
+        (self.leases.len() > self.threads + spare_leases && rest >= self.enough()).then_some(last)
     }
 
     /// Whether it was given something though it had enough.
@@ -225,6 +254,7 @@ impl Eq for Load {}
 pub(crate) struct Members {
     spare_leases: usize,
     by_id: BTreeMap<WorkerId, Member>,
+    by_process: BTreeMap<ProcessName, WorkerId>,
     /// Those that get leases like any other.
     ranking: BTreeSet<Rank>,
     /// Those of them that have executed nothing and hold nothing.
@@ -241,6 +271,7 @@ impl Members {
         Self {
             spare_leases,
             by_id: BTreeMap::new(),
+            by_process: BTreeMap::new(),
             ranking: BTreeSet::new(),
             fresh: BTreeSet::new(),
             surplus: BTreeSet::new(),
@@ -257,8 +288,21 @@ impl Members {
         self.by_id.get(&worker)
     }
 
-    pub(crate) fn join(&mut self, worker: WorkerId, threads: usize, deadline: Duration, now: Duration) {
-        let member = Member::new(threads, deadline, now);
+    /// The member that is this process.
+    pub(crate) fn of_process(&self, name: ProcessName) -> Option<WorkerId> {
+        self.by_process.get(&name).copied()
+    }
+
+    pub(crate) fn join(
+        &mut self,
+        worker: WorkerId,
+        process: WorkerProcess,
+        threads: usize,
+        deadline: Duration,
+        now: Duration,
+    ) {
+        let member = Member::new(process, threads, deadline, now);
+        self.by_process.insert(process.name, worker);
         self.enter(&member.keys(worker, self.spare_leases), worker);
         self.deadlines.insert((deadline, worker));
         self.by_id.insert(worker, member);
@@ -268,6 +312,7 @@ impl Members {
         let member = self.by_id.remove(&worker)?;
         self.leave(&member.keys(worker, self.spare_leases), worker);
         self.deadlines.remove(&(member.deadline, worker));
+        self.by_process.remove(&member.process.name);
         Some(member)
     }
 
@@ -293,10 +338,10 @@ impl Members {
         }
     }
 
-    /// What a worker said of the progress of a node that it executes; `true` if that is news.
-    pub(crate) fn progress(&mut self, worker: WorkerId, node: NodeId, permille: u16) -> bool {
-        let held = self.by_id.get_mut(&worker).and_then(|member| member.leases.get_mut(&node));
-        held.is_some_and(|held| std::mem::replace(&mut held.permille, permille) != permille)
+    /// What a worker said of the progress of a node that it executes: whether that is news; `None` if it has no lease of it.
+    pub(crate) fn progress(&mut self, worker: WorkerId, node: NodeId, permille: u16) -> Option<bool> {
+        let held = self.by_id.get_mut(&worker).and_then(|member| member.leases.get_mut(&node))?;
+        Some(std::mem::replace(&mut held.permille, permille) != permille)
     }
 
     /// When the first member is lost if nothing is heard.
@@ -368,12 +413,14 @@ impl Members {
         for (worker, member) in &self.by_id {
             anew.enter(&member.keys(*worker, self.spare_leases), *worker);
             anew.deadlines.insert((member.deadline, *worker));
+            anew.by_process.insert(member.process.name, *worker);
         }
         assert!(self.ranking.iter().eq(&anew.ranking), "{:?}", self.ranking);
         assert_eq!(self.fresh, anew.fresh);
         assert_eq!(self.surplus, anew.surplus);
         assert_eq!(self.stalled, anew.stalled);
         assert_eq!(self.deadlines, anew.deadlines);
+        assert_eq!(self.by_process, anew.by_process);
     }
 
     fn enter(&mut self, keys: &Keys, worker: WorkerId) {

@@ -10,6 +10,9 @@ use crate::policy::Speculation;
 /// How many of the latest nodes of a kind say what is usual.
 const RECENT: usize = 63;
 
+/// Of how many nodes of a kind it has to be known how long they took before it is known of the kind.
+pub(crate) const ESTABLISHED: usize = 8;
+
 /// The pace of every kind.
 #[derive(Debug, Default)]
 pub(crate) struct Pace {
@@ -41,9 +44,10 @@ impl Pace {
         pace.sorted.insert(place, took);
     }
 
-    /// How long nodes of a kind have usually taken lately; `None` while nobody knows.
-    pub(crate) fn usual(&self, kind: &str) -> Option<Duration> {
-        self.kinds.get(kind)?.usual()
+    /// How long nodes of a kind have usually taken lately, once it is known of so many that one cannot be meant for all: a busy coordinator may hear of the begin and the end of
+    /// a node at the same time.
+    pub(crate) fn established(&self, kind: &str) -> Option<Duration> {
+        self.kinds.get(kind).filter(|pace| pace.sorted.len() >= ESTABLISHED)?.usual()
     }
 
     /// A node runs since then, and may be run on a second worker.

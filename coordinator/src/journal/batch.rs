@@ -1,11 +1,11 @@
 //! What a group of events has changed: the rows of one transaction.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
 use lookalike::graph::{Blob, FailureReason, NodeId, NodeKey, NodeState, WorkerId};
 
-use crate::comm::{Action, RunEvent, Site};
+use crate::comm::{Action, RunEvent, Site, WorkerProcess};
 use crate::core::{Core, Deaths, Record};
 
 /// The worker's number of what runs in the coordinator itself. Workers count from 1.
@@ -56,7 +56,7 @@ pub(super) enum AttemptChange {
 #[derive(Debug)]
 pub(super) struct WorkerRow {
     pub(super) worker: u64,
-    pub(super) process: u32,
+    pub(super) process: WorkerProcess,
     pub(super) threads: usize,
     pub(super) at: Duration,
 }
@@ -89,30 +89,33 @@ pub(crate) struct Batch {
     /// Results that turned out to be wrong.
     pub(super) forgotten: Vec<NodeKey>,
     /// Results whose bytes nobody needs any more.
-    pub(super) released: Vec<NodeKey>,
+    pub(super) released: BTreeSet<NodeKey>,
     pub(super) listen: Option<String>,
 }
 
 impl Batch {
-    /// Take note of what the reactor has said. `output` is what the event brought, if it brought an output; the graph may
-    /// have let it go by now.
-    pub(crate) fn note(&mut self, action: &Action, core: &Core, output: Option<&(NodeId, Blob)>, now: Duration) {
+    /// Take note of what the reactor has said.
+    pub(crate) fn note(&mut self, action: &Action, core: &Core, now: Duration) {
         match action {
             Action::Assign { worker, lease } => self.begin(lease.node, lease.attempt, worker.0, now),
             Action::RunHere { node, attempt } => self.begin(*node, *attempt, HERE, now),
             Action::Cancel { worker, lease } => self.end(lease.node, Some(worker.0), Outcome::Cancelled, now),
-            Action::Tell(event) => self.note_event(event, core, output, now),
+            Action::Tell(event) => self.note_event(event, core, now),
+            Action::Keep { node, output } => {
+                let key = core.look(*node).and_then(|record| record.key);
+                key.into_iter().for_each(|key| self.keep(key, output.clone()));
+            }
             Action::Acknowledge { worker, node, .. } => {
                 let has_failed = matches!(core.graph.state(*node), Some(NodeState::Failed(_)));
                 let outcome = if has_failed { Outcome::Failed } else { Outcome::Finished };
                 self.end(*node, Some(worker.0), outcome, now);
             }
-            Action::SendBlob { .. } | Action::ForgoBlob { .. } | Action::Drop { .. } => {}
+            Action::SendBlob { .. } | Action::ForgoBlob { .. } | Action::CancelHere { .. } | Action::Drop { .. } => {}
         }
     }
 
     /// Take note of something that was told without the reactor.
-    pub(crate) fn note_event(&mut self, event: &RunEvent, core: &Core, output: Option<&(NodeId, Blob)>, now: Duration) {
+    pub(crate) fn note_event(&mut self, event: &RunEvent, core: &Core, now: Duration) {
         match event {
             RunEvent::NodeAdded { name } => {
                 self.touch(name.node, core).added = Some((name.kind.clone(), name.label.clone()));
@@ -125,16 +128,15 @@ impl Batch {
                 if *site == Site::Coordinator {
                     self.end(name.node, Some(HERE), Outcome::Finished, now);
                 }
-                let key = core.look(name.node).and_then(|record| record.key);
-                let brought = output.filter(|(node, _)| *node == name.node).map(|(_, output)| output);
-                self.results.extend(key.zip(brought.or_else(|| core.graph.output(name.node)).cloned()));
             }
             RunEvent::NodeFailed { name, reason } => {
                 self.touch(name.node, core).error = Some(reason.to_string());
                 let is_own = matches!(reason, FailureReason::Node(_));
                 self.end(name.node, None, if is_own { Outcome::Failed } else { Outcome::Lost }, now);
             }
-            RunEvent::NodeSuspected { name, .. } => _ = self.touch(name.node, core),
+            RunEvent::DeathsCounted { name, .. } | RunEvent::NodeSuspected { name, .. } => {
+                self.touch(name.node, core);
+            }
             RunEvent::NodeRequeued { name, worker, .. } => {
                 self.touch(name.node, core);
                 self.started.retain(|(node, _)| *node != name.node.0);
@@ -144,8 +146,10 @@ impl Batch {
             RunEvent::NodeReleased { name } => {
                 self.released.extend(core.look(name.node).and_then(|record| record.key));
             }
-            RunEvent::WorkerJoined { worker, threads, process } => {
-                self.workers.push(WorkerRow { worker: worker.0, process: *process, threads: *threads, at: now });
+            RunEvent::WorkerJoined { worker, threads, .. } => {
+                if let Some(process) = core.members.get(*worker).map(|member| member.process) {
+                    self.workers.push(WorkerRow { worker: worker.0, process, threads: *threads, at: now });
+                }
             }
             RunEvent::WorkerLeft { worker, departure } => {
                 self.left.push(LeftRow { worker: worker.0, why: departure.to_string(), at: now });
@@ -155,8 +159,9 @@ impl Batch {
         }
     }
 
-    /// Keep a result of a node that has no number today.
+    /// Keep the result of a node. What was released before is wanted again.
     pub(crate) fn keep(&mut self, key: NodeKey, output: Blob) {
+        self.released.remove(&key);
         self.results.push((key, output));
     }
 

@@ -24,6 +24,9 @@ pub(super) struct Deferred {
     states: BTreeMap<u64, (State, u32)>,
 }
 
+/// Where open attempts are written, by node and worker.
+pub(super) type Rows = Vec<((u64, u64), i64)>;
+
 #[derive(Clone, Copy, Debug)]
 struct Attempt {
     attempt: u32,
@@ -62,8 +65,8 @@ impl Deferred {
         self.ended.len() + self.states.len() > MOST_ROWS
     }
 
-    /// Write it.
-    pub(super) fn write(&mut self, connection: &Connection) -> rusqlite::Result<()> {
+    /// Write it. The rows of the attempts that are open: theirs once the transaction is committed, and nobody's otherwise.
+    pub(super) fn write(&self, connection: &Connection) -> rusqlite::Result<Rows> {
         let epoch = self.epoch;
         let mut update = connection.prepare_cached("UPDATE nodes SET state = ?2, attempts = ?3 WHERE id = ?1")?;
         for (node, (state, attempts)) in &self.states {
@@ -76,14 +79,15 @@ impl Deferred {
                 None => _ = insert(connection, epoch, *key, *attempt, Some((*outcome, *at)))?,
             }
         }
-        for (key, attempt) in self.open.iter_mut().filter(|(_, attempt)| attempt.row.is_none()) {
-            attempt.row = Some(insert(connection, epoch, *key, *attempt, None)?);
-        }
-        Ok(())
+        let new = self.open.iter().filter(|(_, attempt)| attempt.row.is_none());
+        new.map(|(key, attempt)| Ok((*key, insert(connection, epoch, *key, *attempt, None)?))).collect()
     }
 
-    /// It is written.
-    pub(super) fn forget(&mut self) {
+    /// It is written, and committed.
+    pub(super) fn written(&mut self, rows: Rows) {
+        for (key, row) in rows {
+            self.open.entry(key).and_modify(|attempt| attempt.row = Some(row));
+        }
         self.states.clear();
         self.ended.clear();
     }
@@ -139,12 +143,12 @@ mod tests {
     #[test]
     fn every_attempt_is_written_once_with_its_outcome() {
         let folder = tempfile::tempdir().unwrap();
-        let connection = schema::create(&folder.path().join("run.sqlite")).unwrap();
+        let connection = schema::create(&folder.path().join("run.sqlite"), |_| Ok(())).unwrap();
         let mut deferred = Deferred::new(1);
         let mut write = |attempts: Vec<AttemptChange>| -> Vec<(u64, u64, u32, Option<u8>)> {
             deferred.take(&Batch { attempts, ..Batch::default() });
-            deferred.write(&connection).unwrap();
-            deferred.forget();
+            let rows = deferred.write(&connection).unwrap();
+            deferred.written(rows);
             let sql = "SELECT node, worker, attempt, outcome FROM attempts ORDER BY node, attempt";
             let mut statement = connection.prepare(sql).unwrap();
             let rows = statement.query_map([], |row| Ok((row.get(0)?, row.get(1)?, row.get(2)?, row.get(3)?))).unwrap();
@@ -158,6 +162,23 @@ mod tests {
         let both = [(7, 2, 1, Some(3)), (7, 2, 2, Some(1)), (7, 4, 3, Some(1)), (8, 4, 1, None)];
         assert_eq!(write(vec![begun(7, 3, 4), begun(8, 1, 4), ended(7, None, Outcome::Failed)]), both);
         assert_eq!(write(vec![ended(7, Some(2), Outcome::Finished)]), both);
+    }
+
+    #[test]
+    fn what_a_transaction_has_not_kept_is_written_by_the_next() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut connection = schema::create(&folder.path().join("run.sqlite"), |_| Ok(())).unwrap();
+        let mut deferred = Deferred::new(1);
+        deferred.take(&Batch { attempts: vec![begun(7, 1, 2)], ..Batch::default() });
+        let transaction = connection.transaction().unwrap();
+        deferred.write(&transaction).unwrap();
+        transaction.rollback().unwrap();
+        deferred.take(&Batch { attempts: vec![ended(7, Some(2), Outcome::Finished)], ..Batch::default() });
+        deferred.written(deferred.write(&connection).unwrap());
+        let finished: u64 = connection
+            .query_row("SELECT count(*) FROM attempts WHERE outcome = 0", [], |row| row.get(0))
+            .unwrap();
+        assert_eq!(finished, 1);
     }
 
     #[test]

@@ -82,6 +82,15 @@ pub enum JournalError {
         /// What SQLite says.
         source: rusqlite::Error,
     },
+    /// The thread that writes the journal is gone: a mistake of this program.
+    #[error(
+        "nothing writes the journal {} any more: its thread has ended with a panic; go on with --resume, and please report this",
+        path.display()
+    )]
+    Thread {
+        /// The journal.
+        path: PathBuf,
+    },
     /// The journal's file cannot be made.
     #[error("cannot make the journal {}", path.display())]
     Create {
@@ -93,11 +102,28 @@ pub enum JournalError {
 }
 
 impl JournalError {
+    /// The same of another file: one under its name for the time being has none of its own.
+    pub(super) fn about(mut self, other: &Path) -> Self {
+        match &mut self {
+            Self::Exists { path }
+            | Self::NotAJournal { path }
+            | Self::Version { path, .. }
+            | Self::AnotherRun { path, .. }
+            | Self::Busy { path }
+            | Self::DiskFull { path }
+            | Self::Write { path, .. }
+            | Self::Open { path, .. }
+            | Self::Create { path, .. }
+            | Self::Thread { path } => other.clone_into(path),
+        }
+        self
+    }
+
     /// The exit code of the program: 2 for a journal that does not fit, 3 when the system fails us.
     #[must_use]
     pub fn exit_code(&self) -> u8 {
         match self {
-            Self::Busy { .. } | Self::DiskFull { .. } | Self::Write { .. } => 3,
+            Self::Busy { .. } | Self::DiskFull { .. } | Self::Write { .. } | Self::Thread { .. } => 3,
             _ => 2,
         }
     }

@@ -159,7 +159,7 @@ impl Journal {
 
     /// Wait until the earliest batch that was not told of is written.
     pub(crate) async fn committed(&mut self) -> Result<(), JournalError> {
-        let gone = || JournalError::Busy { path: self.path.clone() };
+        let gone = || JournalError::Thread { path: self.path.clone() };
         self.committed.recv().await.unwrap_or_else(|| Err(gone()))
     }
 
@@ -178,7 +178,11 @@ impl Journal {
     pub(crate) fn close(mut self, ended: Option<String>) -> Result<(), JournalError> {
         let _ = self.commands.send(Command::Close(ended));
         let thread = self.thread.take().map(JoinHandle::join);
-        thread.and_then(Result::ok).unwrap_or(Ok(()))
+        match thread {
+            Some(Err(_)) => Err(JournalError::Thread { path: self.path.clone() }),
+            Some(Ok(closed)) => closed,
+            None => Ok(()),
+        }
     }
 
     /// Undo the beginning of a run that could not begin.

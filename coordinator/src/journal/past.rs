@@ -5,13 +5,14 @@ use std::net::SocketAddr;
 use std::path::Path;
 
 use lookalike::graph::NodeKey;
-use lookalike::protocol::RunName;
-use rusqlite::{Connection, OptionalExtension, params};
+use lookalike::protocol::{ProcessName, RunName};
+use rusqlite::{Connection, OptionalExtension, Row, params};
 
 use super::error::JournalError;
 use super::identity::RunIdentity;
 use super::lock::host;
 use super::{Loaded, schema, unix_ms};
+use crate::comm::WorkerProcess;
 use crate::core::Deaths;
 
 /// What earlier epochs have left.
@@ -23,10 +24,10 @@ pub(crate) struct Past {
     pub(crate) deaths: HashMap<NodeKey, Deaths>,
     /// Where the last one listened.
     pub(crate) listen: Option<SocketAddr>,
-    /// The processes that were started as local workers; most of them are gone.
+    /// The process ids of those that were started as local workers of this machine; most of them are gone.
     pub(crate) local_workers: Vec<u32>,
-    /// The processes of the workers that were connected when their coordinator died, and may still be there.
-    pub(crate) workers: Vec<u32>,
+    /// The workers that were connected when their coordinator died, and may still be there.
+    pub(crate) workers: Vec<WorkerProcess>,
     /// How many nodes have a result.
     pub(crate) results: usize,
 }
@@ -36,15 +37,13 @@ const LONGEST_WAIT_MS: i64 = 10 * 60 * 1000;
 
 /// Begin a new journal.
 pub(super) fn begin(path: &Path, identity: &RunIdentity, run: RunName) -> Result<(Connection, Loaded), JournalError> {
-    let connection = schema::create(path)?;
-    let write = || -> rusqlite::Result<()> {
+    let connection = schema::create(path, |connection| {
         connection.execute(
             "INSERT INTO run (id, name, identity, started_ms) VALUES (1, ?1, ?2, ?3)",
             params![run.0, identity.to_json(), unix_ms()],
         )?;
-        add_epoch(&connection, 1)
-    };
-    write().map_err(|source| JournalError::writing(path, source))?;
+        add_epoch(connection, 1)
+    })?;
     Ok((connection, Loaded { run, epoch: 1, results: HashMap::new(), past: Past::default() }))
 }
 
@@ -112,14 +111,20 @@ fn past(connection: &Connection, results: usize) -> rusqlite::Result<Past> {
         |row| row.get::<_, String>(0),
     );
     past.listen = listen.optional()?.and_then(|listen| listen.parse().ok());
-    let mut statement = connection.prepare("SELECT DISTINCT process FROM local_workers ORDER BY process")?;
-    past.local_workers = statement.query_map([], |row| row.get(0))?.collect::<rusqlite::Result<_>>()?;
+    // Elsewhere the same numbers are those of other processes.
+    let mut statement = connection.prepare(
+        "SELECT DISTINCT local_workers.process FROM local_workers JOIN epochs USING (epoch) WHERE host = ?1 ORDER BY 1",
+    )?;
+    past.local_workers = statement.query_map([host()], |row| row.get(0))?.collect::<rusqlite::Result<_>>()?;
     // An epoch that ended in order has told its workers to end.
     let mut statement = connection.prepare(
-        "SELECT DISTINCT workers.process FROM workers JOIN epochs USING (epoch)
+        "SELECT DISTINCT workers.process, name, local FROM workers JOIN epochs USING (epoch)
          WHERE ended_ms IS NULL AND left_ms IS NULL AND seen_ms > ?1 ORDER BY 1",
     )?;
     let since = unix_ms() - LONGEST_WAIT_MS;
-    past.workers = statement.query_map([since], |row| row.get(0))?.collect::<rusqlite::Result<_>>()?;
+    let worker = |row: &Row<'_>| {
+        Ok(WorkerProcess { id: row.get(0)?, name: ProcessName(row.get(1)?), is_local: row.get(2)? })
+    };
+    past.workers = statement.query_map([since], worker)?.collect::<rusqlite::Result<_>>()?;
     Ok(past)
 }

@@ -63,6 +63,8 @@ CREATE TABLE workers (
     epoch       INTEGER NOT NULL,
     worker      INTEGER NOT NULL,
     process     INTEGER NOT NULL,
+    name        BLOB NOT NULL,
+    local       INTEGER NOT NULL,
     threads     INTEGER NOT NULL,
     joined_ms   INTEGER NOT NULL,
     left_ms     INTEGER,
@@ -118,11 +120,13 @@ pub(super) fn node_id(epoch: u64, node: u64) -> u64 {
 
 /// The files of a journal: itself, its log, their index, and the log of the older kind.
 pub(crate) fn files(path: &Path) -> [PathBuf; 4] {
-    ["", "-wal", "-shm", "-journal"].map(|suffix| {
-        let mut name = path.as_os_str().to_owned();
-        name.push(suffix);
-        name.into()
-    })
+    ["", "-wal", "-shm", "-journal"].map(|suffix| beside(path, suffix))
+}
+
+fn beside(path: &Path, suffix: &str) -> PathBuf {
+    let mut name = path.as_os_str().to_owned();
+    name.push(suffix);
+    name.into()
 }
 
 /// Remove a journal, if there is one. Itself last: a log without its journal is worth nothing, and harmless.
@@ -139,8 +143,30 @@ pub(crate) fn remove(path: &Path) -> io::Result<()> {
     Ok(())
 }
 
-/// Make a journal where none is, readable by its owner alone, and open it.
-pub(super) fn create(path: &Path) -> Result<Connection, JournalError> {
+/// Make a journal where none is, readable by its owner alone, and open it. It is there with all its tables and what `begin` writes, or
+/// not at all, whatever ends the process or fills the disk meanwhile.
+pub(super) fn create(
+    path: &Path,
+    begin: impl FnOnce(&Connection) -> rusqlite::Result<()>,
+) -> Result<Connection, JournalError> {
+    let creating = |source| JournalError::Create { path: path.to_owned(), source };
+    let unfinished = beside(path, ".new");
+    // What an earlier attempt has left.
+    remove(&unfinished).map_err(creating)?;
+    let made = make(&unfinished, begin).map_err(|error| error.about(path));
+    if made.is_err() {
+        // The next attempt would do it.
+        let _ = remove(&unfinished);
+    }
+    made?;
+    std::fs::rename(&unfinished, path).map_err(creating)?;
+    // A file system that cannot synchronise a folder has its own way to keep names.
+    let _ = path.parent().map(std::fs::File::open).transpose().and_then(|folder| folder.map_or(Ok(()), |it| it.sync_all()));
+    connect(path, is_shared(path))
+}
+
+/// Write a new journal, in one transaction and one file.
+fn make(path: &Path, begin: impl FnOnce(&Connection) -> rusqlite::Result<()>) -> Result<(), JournalError> {
     let mut options = OpenOptions::new();
     options.write(true).create_new(true);
     #[cfg(unix)]
@@ -149,14 +175,18 @@ pub(super) fn create(path: &Path) -> Result<Connection, JournalError> {
         io::ErrorKind::AlreadyExists => JournalError::Exists { path: path.to_owned() },
         _ => JournalError::Create { path: path.to_owned(), source },
     })?;
-    let writing = |source| JournalError::writing(path, source);
-    let connection = connect(path, is_shared(path))?;
-    connection
-        .execute_batch(&format!(
-            "BEGIN; {TABLES} PRAGMA application_id = {APPLICATION}; PRAGMA user_version = {FORMAT}; COMMIT;"
-        ))
-        .map_err(writing)?;
-    Ok(connection)
+    let write = || -> rusqlite::Result<()> {
+        let mut connection = Connection::open_with_flags(path, OpenFlags::SQLITE_OPEN_READ_WRITE)?;
+        connection.pragma_update(None, "synchronous", "FULL")?;
+        let transaction = connection.transaction()?;
+        transaction.execute_batch(TABLES)?;
+        transaction.pragma_update(None, "application_id", APPLICATION)?;
+        transaction.pragma_update(None, "user_version", FORMAT)?;
+        begin(&transaction)?;
+        transaction.commit()?;
+        connection.close().map_err(|(_, error)| error)
+    };
+    write().map_err(|source| JournalError::writing(path, source))
 }
 
 /// Open a journal that is there, to go on with it.

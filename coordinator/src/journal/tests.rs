@@ -5,13 +5,14 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use lookalike::graph::{Blob, NodeKey};
-use lookalike::protocol::RunName;
+use lookalike::protocol::{ProcessName, RunName};
 use rusqlite::Connection;
 use tempfile::TempDir;
 
 use super::batch::{NodeRow, State, WorkerRow};
 use super::status::{RunState, Status};
 use super::*;
+use crate::comm::WorkerProcess;
 
 const NAME: RunName = RunName([7; 16]);
 const DEATHS: Deaths = Deaths { in_company: 2, alone: 1, excused: 3 };
@@ -160,7 +161,7 @@ fn wrong_results_are_forgotten_and_released_ones_keep_their_hash() {
     wrong.forget(key(1));
     let mut later = Batch::default();
     later.forget(key(2));
-    later.released.push(key(3));
+    later.released.insert(key(3));
     write(&mut journal, [wrong, completed(2), completed(3), later]);
     journal.close(None).unwrap();
     let connection = Connection::open(folder.path().join(JOURNAL_FILE)).unwrap();
@@ -172,6 +173,67 @@ fn wrong_results_are_forgotten_and_released_ones_keep_their_hash() {
         .collect::<Result<_, _>>()
         .unwrap();
     assert_eq!(rows, [(output(3).hash().0.to_vec(), None)]);
+}
+
+#[test]
+fn output_that_is_computed_again_after_its_release_is_written_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut journal = begun(&folder);
+    let released = |byte| {
+        let mut batch = Batch::default();
+        batch.released.insert(key(byte));
+        batch
+    };
+    // Released, and asked for again: by a later group, and by the same one.
+    write(&mut journal, [completed(1), released(1)]);
+    let mut again = Batch::default();
+    again.keep(key(1), output(1));
+    let mut both = released(2);
+    both.keep(key(2), output(2));
+    write(&mut journal, [again, completed(2), both]);
+    let copy = copied(&folder);
+    let mut recall = Journal::open(&options(&copy), NAME).unwrap().recall();
+    assert_eq!(recall.recall(key(1)).output, Some(output(1)));
+    assert_eq!(recall.recall(key(2)).output, Some(output(2)));
+}
+
+#[test]
+fn journal_is_there_as_a_whole_or_not_at_all() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join(JOURNAL_FILE);
+    let full = |_: &Connection| Err(rusqlite::Error::InvalidQuery);
+    let error = schema::create(&path, full).unwrap_err().to_string();
+    assert!(error.contains("run.sqlite;"), "{error}");
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
+    // Killed in the middle of it: what is left is no run, to go on with or to be spared.
+    fs::write(folder.path().join("run.sqlite.new"), "half of a journal").unwrap();
+    fs::write(folder.path().join("run.sqlite.new-journal"), "more of it").unwrap();
+    let fresh = JournalOptions { resume: false, ..options(&folder) };
+    let journal = Journal::open(&fresh, NAME).unwrap();
+    assert_eq!((journal.epoch, journal.past.results), (1, 0));
+    journal.close(None).unwrap();
+    assert!(!folder.path().join("run.sqlite.new").exists());
+    assert_eq!(begun(&folder).epoch, 2);
+}
+
+#[test]
+fn survivors_are_known_by_name_and_local_ones_by_their_machine() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut journal = begun(&folder);
+    let mut batch = Batch { local_workers: vec![1, 4711], ..Batch::default() };
+    // In containers every process has the number 1.
+    for (worker, is_local) in [(1, true), (2, false), (3, false)] {
+        let process = WorkerProcess { id: 1, name: ProcessName([worker; 16]), is_local };
+        batch.workers.push(WorkerRow { worker: worker.into(), process, threads: 1, at: Duration::ZERO });
+    }
+    write(&mut journal, [batch]);
+    let copy = copied(&folder);
+    let past = Journal::open(&options(&copy), NAME).unwrap().past;
+    let names: Vec<_> = past.workers.iter().map(|worker| (worker.name.0[0], worker.is_local)).collect();
+    assert_eq!(names, [(1, true), (2, false), (3, false)]);
+    assert_eq!(past.local_workers, [1, 4711]);
+    sql(&copy, "UPDATE epochs SET host = 'elsewhere'");
+    assert_eq!(Journal::open(&options(&copy), NAME).unwrap().past.local_workers, [0; 0]);
 }
 
 #[test]
@@ -250,7 +312,8 @@ fn status_tells_counts_workers_and_whether_somebody_is_at_work() {
     let failed =
         NodeRow { state: State::Failed, error: Some("black".into()), ..completed(2).nodes.remove(&2).unwrap() };
     batch.nodes.insert(2, failed);
-    batch.workers.push(WorkerRow { worker: 1, process: 99, threads: 4, at: Duration::ZERO });
+    let process = WorkerProcess { id: 99, name: ProcessName([9; 16]), is_local: true };
+    batch.workers.push(WorkerRow { worker: 1, process, threads: 4, at: Duration::ZERO });
     write(&mut journal, [batch]);
     let running = Status::of(folder.path()).unwrap();
     assert_eq!((running.state, running.epoch, running.error), (RunState::Running, 1, None));

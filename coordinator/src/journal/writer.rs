@@ -17,6 +17,7 @@ use super::fits;
 use super::schema::node_id;
 use super::status;
 use super::unix_ms;
+use crate::comm::WorkerProcess;
 use crate::core::Deaths;
 
 /// How often `status.json` is written at most.
@@ -96,11 +97,11 @@ impl Writer {
         let outcome = self.connection.transaction().and_then(|transaction| {
             fits::write(&transaction, &fits)?;
             new = write(&transaction, self.epoch, batch, &self.results)?;
-            if is_much {
-                self.deferred.write(&transaction)?;
-            }
-            transaction.commit()
+            let rows = if is_much { Some(self.deferred.write(&transaction)?) } else { None };
+            transaction.commit()?;
+            Ok(rows)
         });
+        let outcome = outcome.map(|rows| rows.into_iter().for_each(|rows| self.deferred.written(rows)));
         let outcome = match batch.listen {
             Some(_) => outcome.and_then(|()| self.reach_the_disk()),
             None => outcome,
@@ -109,11 +110,9 @@ impl Writer {
             self.options.fits.put_back(fits);
             return Err(JournalError::writing(&self.options.path, source));
         }
-        if is_much {
-            self.deferred.forget();
-        }
         self.results.extend(new);
-        for key in &batch.forgotten {
+        // A node that is added again after its output was released runs again, and its output has to be written again.
+        for key in batch.forgotten.iter().chain(&batch.released) {
             self.results.remove(key);
         }
         Ok(())
@@ -170,11 +169,12 @@ impl Writer {
         let fits = self.options.fits.take();
         let outcome = self.connection.transaction().and_then(|transaction| {
             fits::write(&transaction, &fits)?;
-            self.deferred.write(&transaction)?;
-            transaction.commit()
+            let rows = self.deferred.write(&transaction)?;
+            transaction.commit()?;
+            Ok(rows)
         });
         match outcome {
-            Ok(()) => self.deferred.forget(),
+            Ok(rows) => self.deferred.written(rows),
             Err(error) => {
                 self.options.fits.put_back(fits);
                 warn!(%error, "cannot note in the journal what is under way");
@@ -221,13 +221,12 @@ fn write(
         }
     }
     let row_of = |key: &NodeKey| new.iter().rev().find(|(other, _)| other == key).map(|(_, id)| *id);
-    for (sql, keys) in [
-        ("UPDATE results SET bytes = NULL WHERE id = ?1", &batch.released),
-        ("DELETE FROM results WHERE id = ?1", &batch.forgotten),
-    ] {
-        for id in keys.iter().filter_map(|key| known.get(key).copied().or_else(|| row_of(key))) {
-            transaction.prepare_cached(sql)?.execute([id])?;
-        }
+    let rows = |key: &NodeKey| known.get(key).copied().or_else(|| row_of(key));
+    for id in batch.released.iter().filter_map(rows) {
+        transaction.prepare_cached("UPDATE results SET bytes = NULL WHERE id = ?1")?.execute([id])?;
+    }
+    for id in batch.forgotten.iter().filter_map(rows) {
+        transaction.prepare_cached("DELETE FROM results WHERE id = ?1")?.execute([id])?;
     }
     write_workers(transaction, epoch, batch)?;
     Ok(new)
@@ -258,11 +257,13 @@ fn write_node(transaction: &Transaction<'_>, id: u64, row: &NodeRow) -> rusqlite
 
 fn write_workers(transaction: &Transaction<'_>, epoch: u64, batch: &Batch) -> rusqlite::Result<()> {
     for row in &batch.workers {
+        let WorkerProcess { id, name, is_local } = row.process;
         transaction
             .prepare_cached(
-                "INSERT INTO workers (epoch, worker, process, threads, joined_ms) VALUES (?1, ?2, ?3, ?4, ?5)",
+                "INSERT INTO workers (epoch, worker, process, name, local, threads, joined_ms)
+                 VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7)",
             )?
-            .execute(params![epoch, row.worker, row.process, row.threads, ms(row.at)])?;
+            .execute(params![epoch, row.worker, id, name.0, is_local, row.threads, ms(row.at)])?;
     }
     for row in &batch.left {
         transaction

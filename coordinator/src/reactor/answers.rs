@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use lookalike::graph::{Blob, BlobHash, Completion, FailureReason, NodeFailure, NodeId, NodeSpec, NodeState, WorkerId};
+use lookalike::protocol::ProcessName;
 
 use super::{membership, schedule};
 use crate::comm::{Action, Departure, Outbox, RunEvent, Site};
@@ -15,14 +16,13 @@ pub(super) type Answer = (Site, NodeId, u32);
 pub(super) fn started(
     core: &mut Core,
     worker: WorkerId,
-    node: NodeId,
-    attempt: u32,
-    now: Duration,
+    (node, attempt): (NodeId, u32),
+    (arrived, now): (Duration, Duration),
     outbox: &mut Outbox,
 ) {
     membership::renew(core, worker, now);
     // A lease that has ended or changed meanwhile: the message crossed ours.
-    if core.members.change(worker, |member| member.begin(node, attempt, now)) == Some(true) {
+    if core.members.change(worker, |member| member.begin(node, attempt, (arrived, now))) == Some(true) {
         core.watch(node);
         outbox.tell(RunEvent::NodeStarted { name: core.name(node), site: Site::Worker(worker) });
     }
@@ -32,17 +32,24 @@ pub(super) fn finished(
     core: &mut Core,
     answer: Answer,
     output: Blob,
-    now: Duration,
+    (arrived, now): (Duration, Duration),
     outbox: &mut Outbox,
 ) -> Result<(), RunError> {
     let (site, node, attempt) = answer;
-    let Some(took) = answered(core, answer, now, outbox) else {
+    let process = process_of(core, site);
+    let Some(since) = answered(core, answer, now, outbox) else {
         return Ok(());
     };
+    let took = since.map(|since| arrived.saturating_sub(since));
     if matches!(site, Site::Worker(_)) {
         core.summary.output_bytes_received += output.len() as u64;
     }
-    take(core, node, Candidate { site, attempt, output, took }, now, outbox)
+    take(core, node, Candidate { site, process, attempt, output, took }, now, outbox)
+}
+
+fn process_of(core: &Core, site: Site) -> Option<ProcessName> {
+    let Site::Worker(worker) = site else { return None };
+    core.members.get(worker).map(|member| member.process.name)
 }
 
 /// Take an output, or keep it until a second one has come.
@@ -66,7 +73,8 @@ pub(super) fn recovered(
     membership::renew(core, worker, now);
     core.summary.output_bytes_received += output.len() as u64;
     // No attempt of today has this number: a second computation is another one.
-    let result = Candidate { site: Site::Worker(worker), attempt: 0, output, took: Duration::ZERO };
+    let site = Site::Worker(worker);
+    let result = Candidate { site, process: process_of(core, site), attempt: 0, output, took: None };
     take(core, node, result, now, outbox)
 }
 
@@ -78,7 +86,15 @@ pub(super) fn failed(
     outbox: &mut Outbox,
 ) -> Result<(), RunError> {
     let (second_site, node, _) = answer;
-    if answered(core, answer, now, outbox).is_none() || !core.graph.is_open(node) {
+    if answered(core, answer, now, outbox).is_none() {
+        return Ok(());
+    }
+    if !core.graph.is_open(node) {
+        let has_output = matches!(core.graph.state(node), Some(NodeState::Completed(_)));
+        // What was stopped because nobody wants it has no opinion.
+        if has_output && failure != NodeFailure::Cancelled {
+            tell_difference(core, node, second_site, failure.to_string(), outbox);
+        }
         return Ok(());
     }
     if let Some(first) = core.record(node).and_then(|record| record.candidate.take()) {
@@ -87,13 +103,20 @@ pub(super) fn failed(
         let name = Box::new(core.name(node));
         return Err(RunError::ResultsDiffer { name, first_site: first.site, first: first_answer, second_site, second });
     }
+    core.record(node).into_iter().for_each(|record| record.finished_by = Some(second_site));
     core.graph.fail(node, FailureReason::Node(failure));
     Ok(())
 }
 
-/// An answer has come: its lease ends. How long the node has run, as far as it is known; `None` if nobody asked for this
+/// A node has an output and an error. Whoever acted upon the first one cannot take that back.
+fn tell_difference(core: &Core, node: NodeId, second: Site, error: String, outbox: &mut Outbox) {
+    let first = core.look(node).and_then(|record| record.finished_by).unwrap_or(Site::Coordinator);
+    outbox.tell(RunEvent::AnswersDiffer { name: core.name(node), first, second, error });
+}
+
+/// An answer has come: its lease ends. Since when the node has run under it, as far as it is known; `None` if nobody asked for this
 /// answer. What worker gives one to nothing is thrown out.
-fn answered(core: &mut Core, answer: Answer, now: Duration, outbox: &mut Outbox) -> Option<Duration> {
+fn answered(core: &mut Core, answer: Answer, now: Duration, outbox: &mut Outbox) -> Option<Option<Duration>> {
     let (site, node, attempt) = answer;
     let was_asked = core.was_given_out(node, attempt);
     let since = match site {
@@ -117,7 +140,7 @@ fn answered(core: &mut Core, answer: Answer, now: Duration, outbox: &mut Outbox)
             None
         }
     };
-    was_asked.then(|| since.map_or(Duration::ZERO, |since| now.saturating_sub(since)))
+    was_asked.then_some(since)
 }
 
 /// An output of a node whose output has to come twice: keep the first, compare the second.
@@ -137,11 +160,11 @@ fn verify(
         Some(first) if first.output != result.output => {
             return Err(differ(core, node, (first.site, first.output.hash()), &result));
         }
-        Some(first) if first.attempt != result.attempt => {
+        Some(first) if is_second_computation(&first, &result) => {
             core.summary.verified_nodes += 1;
             return accept(core, node, *first, now, outbox);
         }
-        // Sent again by a worker that did not hear our thanks: no second computation.
+        // Sent again by a worker that did not hear our thanks.
         Some(first) => *first,
     };
     record.candidate = Some(Box::new(first));
@@ -149,6 +172,13 @@ fn verify(
         schedule::await_now(core, node, now);
     }
     Ok(())
+}
+
+/// Whether an output was computed anew. A process that has lost its connection may send one and the same output under two leases; but
+/// one that it began with it has not answered before.
+fn is_second_computation(first: &Candidate, second: &Candidate) -> bool {
+    let is_another = first.process.is_some() && second.process.is_some() && first.process != second.process;
+    first.attempt != second.attempt && (is_another || second.took.is_some())
 }
 
 /// Take the output of a node that is waiting for its verification as it is; `false` if there is none.
@@ -171,17 +201,23 @@ fn accept(
             retract(core, node, now, outbox);
             core.record(node).into_iter().for_each(|record| record.finished_by = Some(site));
             let name = core.name(node);
-            if took > Duration::ZERO {
-                core.pace.note(&name.kind, took);
+            took.filter(|took| !took.is_zero()).into_iter().for_each(|took| core.pace.note(&name.kind, took));
+            if core.recall.is_some() {
+                outbox.push(Action::Keep { node, output: result.output });
             }
-            outbox.tell(RunEvent::NodeFinished { name, site, bytes, elapsed: took });
+            outbox.tell(RunEvent::NodeFinished { name, site, bytes, elapsed: took.unwrap_or_default() });
         }
         Completion::Duplicate => {
             core.summary.duplicate_results += 1;
             outbox.tell(RunEvent::DuplicateResult { node, site });
         }
         // The node has failed before; the planner knows it, and nothing can be taken back.
-        Completion::Refused => {}
+        Completion::Refused => {
+            if let Some(NodeState::Failed(FailureReason::Node(failure))) = core.graph.state(node) {
+                let error = failure.to_string();
+                tell_difference(core, node, site, error, outbox);
+            }
+        }
         Completion::Different { first } => {
             let site = core.look(node).and_then(|record| record.finished_by).unwrap_or(Site::Coordinator);
             return Err(differ(core, node, (site, first), &result));
@@ -205,6 +241,9 @@ pub(super) fn retract(core: &mut Core, node: NodeId, now: Duration, outbox: &mut
     core.put(node, Place::Nowhere);
     let Some(record) = core.record(node) else { return };
     record.candidate = None;
+    if record.here_since.is_some() {
+        outbox.push(Action::CancelHere { node });
+    }
     for worker in std::mem::take(&mut record.holders) {
         schedule::take_back(core, worker, node, now, outbox);
     }

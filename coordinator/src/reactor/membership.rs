@@ -2,11 +2,11 @@
 
 use std::time::Duration;
 
-use lookalike::graph::{BlobHash, FailureReason, NodeId, WorkerId};
+use lookalike::graph::{BlobHash, FailureReason, NodeId, NodeState, WorkerId};
 
 use super::{answers, quarantine, schedule};
-use crate::comm::{Action, Departure, Outbox, RunEvent};
-use crate::core::{Core, Place};
+use crate::comm::{Action, Departure, Lease, Outbox, RunEvent, WorkerProcess};
+use crate::core::{Core, Lost, Place};
 
 /// The pause after a node in execution has lost its worker for the second time; each further one is twice as long.
 const FIRST_DELAY: Duration = Duration::from_millis(100);
@@ -14,9 +14,14 @@ const FIRST_DELAY: Duration = Duration::from_millis(100);
 /// The longest of these pauses.
 const LONGEST_DELAY: Duration = Duration::from_secs(5);
 
-/// Keep a node for the worker that executes it and is about to join. Whoever has to run alone begins anew.
-pub(super) fn reserve(core: &mut Core, worker: WorkerId, node: NodeId) {
-    if core.look(node).is_some_and(|record| matches!(record.place, Place::Queue(_))) {
+/// A worker executes a node for an earlier coordinator: keep it for that one if it is about to join. Whoever has to run alone
+/// begins anew.
+pub(super) fn go_on(core: &mut Core, worker: WorkerId, node: NodeId, now: Duration, outbox: &mut Outbox) {
+    if core.members.get(worker).is_some() {
+        if may_go_on(core, worker, node) {
+            adopt(core, worker, node, now, outbox);
+        }
+    } else if core.look(node).is_some_and(|record| matches!(record.place, Place::Queue(_))) {
         core.put(node, Place::Nowhere);
         core.continued.push((worker, node));
     }
@@ -26,20 +31,78 @@ pub(super) fn join(
     core: &mut Core,
     worker: WorkerId,
     threads: usize,
-    process: u32,
+    process: WorkerProcess,
     now: Duration,
     outbox: &mut Outbox,
 ) {
-    core.members.join(worker, threads, now + core.policy.lost_after, now);
+    if let Some(before) = core.members.of_process(process.name) {
+        drop_worker(core, before, &Departure::Replaced, now, outbox);
+    }
+    core.members.join(worker, process, threads, now + core.policy.lost_after, now);
     core.summary.workers_joined += 1;
-    outbox.tell(RunEvent::WorkerJoined { worker, threads, process });
+    outbox.tell(RunEvent::WorkerJoined { worker, threads, process: process.id });
+    if let Some(mut lost) = core.departed.remove(process.name) {
+        quarantine::take_back_death(core, process.name, &std::mem::take(&mut lost.deaths), now, outbox);
+        core.members.change(worker, |member| member.resume(lost));
+    }
     for (_, node) in core.continued.extract_if(.., |(continuing, _)| *continuing == worker).collect::<Vec<_>>() {
         // Its output may have come meanwhile.
         if core.graph.is_open(node) {
             schedule::assign(core, worker, node, now, outbox);
             // It has begun: nobody else shall get it for having idle threads.
             let attempt = core.look(node).map_or(0, |record| record.attempts);
-            answers::started(core, worker, node, attempt, now, outbox);
+            answers::started(core, worker, (node, attempt), (now, now), outbox);
+        }
+    }
+}
+
+/// A worker executes a node of which it has no lease, under one that it had before it lost its connection: it goes on with it, or
+/// has to be told that nobody wants it.
+pub(super) fn found(
+    core: &mut Core,
+    worker: WorkerId,
+    (node, attempt): (NodeId, u32),
+    now: Duration,
+    outbox: &mut Outbox,
+) {
+    let earlier = core.members.get(worker).and_then(|member| member.earlier.get(&node));
+    // What was taken back on this connection it has been told already.
+    if earlier != Some(&attempt) {
+        return;
+    }
+    if may_go_on(core, worker, node) {
+        adopt(core, worker, node, now, outbox);
+    } else {
+        let lease = Lease { node, attempt, epoch: core.epoch };
+        outbox.push(Action::Cancel { worker, lease });
+    }
+}
+
+/// Whether a worker may have a node that it executes: it is not done, not to be run alone, and at most one other one executes it.
+fn may_go_on(core: &Core, worker: WorkerId, node: NodeId) -> bool {
+    let (Some(member), Some(record)) = (core.members.get(worker), core.look(node)) else { return false };
+    let is_begun = |holder: &&WorkerId| core.members.get(**holder).is_some_and(|holder| !holder.waiting.contains(&node));
+    let is_free = !member.leases.contains_key(&node) && member.alone_with.is_none();
+    let is_wanted = core.graph.state(node) == Some(&NodeState::Ready) && !core.is_suspect(node);
+    let is_other = !schedule::is_origin(core, node, worker);
+    is_free && is_wanted && is_other && record.holders.iter().filter(is_begun).count() < 2
+}
+
+/// Give a worker the lease of a node that it executes. Who has not begun with it need not, nor with what is too much for this one.
+fn adopt(core: &mut Core, worker: WorkerId, node: NodeId, now: Duration, outbox: &mut Outbox) {
+    for holder in core.look(node).map(|record| record.holders.clone()).unwrap_or_default() {
+        if core.members.get(holder).is_some_and(|holder| holder.waiting.contains(&node)) {
+            schedule::take_back(core, holder, node, now, outbox);
+        }
+    }
+    schedule::assign(core, worker, node, now, outbox);
+    let attempt = core.look(node).map_or(0, |record| record.attempts);
+    answers::started(core, worker, (node, attempt), (now, now), outbox);
+    let spare_leases = core.policy.spare_leases;
+    while let Some(excess) = core.members.get(worker).and_then(|member| member.excess(spare_leases)) {
+        schedule::take_back(core, worker, excess, now, outbox);
+        if core.look(excess).is_some_and(|record| record.holders.is_empty()) {
+            schedule::await_now(core, excess, now);
         }
     }
 }
@@ -57,10 +120,13 @@ pub(super) fn leave(core: &mut Core, worker: WorkerId, departure: &Departure, no
     outbox.tell(RunEvent::WorkerLeft { worker, departure: departure.clone() });
     // Whoever was asked to end may be ended by force, a time limit later: nobody's fault.
     let was_asked = member.is_draining || *departure == Departure::Goodbye;
-    if departure.is_suspicious() && !was_asked {
-        quarantine::count_death(core, &member, now, outbox);
+    let counts = departure.is_suspicious() && !was_asked;
+    let deaths = if counts { quarantine::count_death(core, &member, now, outbox) } else { Vec::new() };
+    let (process, leases) = (member.process.name, member.leases.clone());
+    if *departure != Departure::Goodbye {
+        core.departed.insert(process, Lost { deaths, ..member.into_lost() });
     }
-    for (node, held) in member.leases {
+    for (node, held) in leases {
         core.forget_holder(worker, node);
         if let Some(record) = core.record(node) {
             record.losses += u32::from(!was_asked && held.started_at.is_some());

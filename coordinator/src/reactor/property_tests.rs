@@ -7,7 +7,7 @@ use std::time::Duration;
 use lookalike::graph::{Blob, BlobHash, Input, NodeFailure, NodeId, NodeState, Placement, WorkerId};
 use proptest::prelude::*;
 
-use super::tests::{Script, node};
+use super::tests::{Script, node, process};
 use super::{Event, handle, start};
 use crate::comm::{Action, Departure, Outbox, Site};
 use crate::core::{Core, Policy};
@@ -152,7 +152,12 @@ impl World {
                 }
                 Action::Drop { worker } => self.disconnect(worker),
                 Action::RunHere { node, attempt } => assert!(self.here.insert((node, attempt))),
-                Action::SendBlob { .. } | Action::ForgoBlob { .. } | Action::Acknowledge { .. } | Action::Tell(_) => {}
+                Action::CancelHere { .. }
+                | Action::Keep { .. }
+                | Action::SendBlob { .. }
+                | Action::ForgoBlob { .. }
+                | Action::Acknowledge { .. }
+                | Action::Tell(_) => {}
             }
         }
     }
@@ -244,7 +249,7 @@ impl World {
         let worker = WorkerId(self.next_worker);
         self.next_worker += 1;
         self.connected.insert(worker, BTreeMap::new());
-        self.tell(Event::WorkerJoined { worker, threads, process: 0 });
+        self.tell(Event::WorkerJoined { worker, threads, process: process(worker.0) });
     }
 
     fn act(&mut self, deed: Deed) {

@@ -7,13 +7,17 @@
 //!
 //! Somebody who kills workers from outside may hit a suspect's worker as well. What tells the two apart is whom else they
 //! hit: as long as workers die whose deaths no suspect explains, a suspect is excused, though not for ever.
+//!
+//! A connection that breaks looks like a death, too. When its process comes back, what was counted is taken back.
 
 use std::time::Duration;
 
 use lookalike::graph::NodeId;
+use lookalike::protocol::ProcessName;
 
+use super::schedule;
 use crate::comm::{Outbox, RunEvent};
-use crate::core::{Core, Member};
+use crate::core::{Core, Death, Deaths, Member, Place, Unexplained};
 
 /// How many deaths of a suspect's workers are excused for one that would count: where a machine fails all the time, a node that
 /// kills its workers has to fail in the end.
@@ -22,42 +26,83 @@ const EXCUSES_PER_CRASH: u32 = 10;
 /// How many unexplained deaths are remembered.
 const REMEMBERED: usize = 8;
 
-/// A worker has died: count it against the nodes that it executed.
-pub(super) fn count_death(core: &mut Core, member: &Member, now: Duration, outbox: &mut Outbox) {
+/// A worker has died, it seems: count it against the nodes that it executed. What was counted.
+pub(super) fn count_death(
+    core: &mut Core,
+    member: &Member,
+    now: Duration,
+    outbox: &mut Outbox,
+) -> Vec<(NodeId, Death)> {
     let executing: Vec<(NodeId, Duration)> =
         member.leases.iter().filter_map(|(node, held)| Some((*node, held.started_at?))).collect();
     if let Some((suspect, since)) = executing.iter().find(|(node, _)| member.alone_with == Some(*node)) {
-        return count_death_alone(core, *suspect, *since);
+        let death = judge_death_alone(core, *suspect, *since);
+        return count(core, &[*suspect], death, outbox);
     }
     if !executing.iter().any(|(node, _)| core.is_suspect(*node)) {
-        core.unexplained.push_back((now, executing.iter().map(|(node, _)| *node).collect()));
+        let executed = executing.iter().map(|(node, _)| *node).collect();
+        core.unexplained.push_back(Unexplained { when: now, process: member.process.name, executed });
         if core.unexplained.len() > REMEMBERED {
             core.unexplained.pop_front();
         }
     }
+    let executed: Vec<NodeId> = executing.iter().map(|(node, _)| *node).collect();
+    count(core, &executed, Death::InCompany, outbox)
+}
+
+fn count(core: &mut Core, nodes: &[NodeId], death: Death, outbox: &mut Outbox) -> Vec<(NodeId, Death)> {
     let limit = core.policy.suspect_after;
-    for (node, _) in executing {
-        let Some(record) = core.record(node) else { continue };
-        record.deaths.in_company += 1;
-        let deaths = record.deaths.total();
-        if record.deaths.in_company == limit {
+    for node in nodes {
+        let Some(record) = core.record(*node) else { continue };
+        *of(&mut record.deaths, death) += 1;
+        let (in_company, deaths) = (record.deaths.in_company, record.deaths.total());
+        outbox.tell(RunEvent::DeathsCounted { name: core.name(*node), deaths });
+        if death == Death::InCompany && in_company == limit {
             core.summary.suspected_nodes += 1;
-            outbox.tell(RunEvent::NodeSuspected { name: core.name(node), deaths });
+            outbox.tell(RunEvent::NodeSuspected { name: core.name(*node), deaths });
         }
         // Another worker may run it too; a third shall not.
-        core.watch(node);
+        core.watch(*node);
+    }
+    nodes.iter().map(|node| (*node, death)).collect()
+}
+
+/// A process is back that was thought to have died: its nodes have killed nobody.
+pub(super) fn take_back_death(
+    core: &mut Core,
+    process: ProcessName,
+    counted: &[(NodeId, Death)],
+    now: Duration,
+    outbox: &mut Outbox,
+) {
+    core.unexplained.retain(|death| death.process != process);
+    for (node, death) in counted {
+        let Some(record) = core.record(*node) else { continue };
+        let count = of(&mut record.deaths, *death);
+        *count = count.saturating_sub(1);
+        let (deaths, place) = (record.deaths.total(), record.place);
+        outbox.tell(RunEvent::DeathsCounted { name: core.name(*node), deaths });
+        if matches!(place, Place::Suspects(_)) && !core.is_suspect(*node) {
+            schedule::await_now(core, *node, now);
+        }
+        core.watch(*node);
     }
 }
 
-/// A suspect's worker has died, which it had for itself since then.
-fn count_death_alone(core: &mut Core, suspect: NodeId, since: Duration) {
-    let lately = since.saturating_sub(core.policy.lost_after);
-    let others_die = core.unexplained.iter().any(|(when, executed)| *when >= lately && !executed.contains(&suspect));
-    let most_excuses = core.policy.node_crashes.saturating_mul(EXCUSES_PER_CRASH);
-    let Some(record) = core.record(suspect) else { return };
-    if others_die && record.deaths.excused < most_excuses {
-        record.deaths.excused += 1;
-    } else {
-        record.deaths.alone += 1;
+fn of(deaths: &mut Deaths, death: Death) -> &mut u32 {
+    match death {
+        Death::InCompany => &mut deaths.in_company,
+        Death::Alone => &mut deaths.alone,
+        Death::Excused => &mut deaths.excused,
     }
+}
+
+/// What the death of a suspect's worker is, which it had for itself since then.
+fn judge_death_alone(core: &Core, suspect: NodeId, since: Duration) -> Death {
+    let lately = since.saturating_sub(core.policy.lost_after);
+    let is_other = |death: &Unexplained| death.when >= lately && !death.executed.contains(&suspect);
+    let others_die = core.unexplained.iter().any(is_other);
+    let most_excuses = core.policy.node_crashes.saturating_mul(EXCUSES_PER_CRASH);
+    let excused = core.look(suspect).map_or(0, |record| record.deaths.excused);
+    if others_die && excused < most_excuses { Death::Excused } else { Death::Alone }
 }

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use lookalike::graph::{Blob, Graph, Input, NodeId, NodeKey, NodeSpec, Placement, WorkerId};
 
-use super::tests::{Script, node};
+use super::tests::{Script, node, process};
 use super::{Event, handle, start};
 use crate::comm::{Action, Departure, Outbox, RunEvent};
 use crate::core::{Core, Deaths, Policy};
@@ -67,7 +67,7 @@ impl Bench {
     }
 
     fn join(&mut self, worker: WorkerId) -> Vec<String> {
-        self.handle(Event::WorkerJoined { worker, threads: 1, process: 0 }).unwrap()
+        self.handle(Event::WorkerJoined { worker, threads: 1, process: process(worker.0) }).unwrap()
     }
 
     fn said(&mut self) -> Vec<String> {

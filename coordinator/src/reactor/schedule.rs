@@ -107,10 +107,13 @@ fn give_checks(core: &mut Core, now: Duration, outbox: &mut Outbox) {
     }
 }
 
-/// Whether the output that is to be verified came from this worker.
+/// Whether the output that is to be verified came from this worker, under whatever number.
 pub(super) fn is_origin(core: &Core, node: NodeId, worker: WorkerId) -> bool {
     let candidate = core.look(node).and_then(|record| record.candidate.as_ref());
-    candidate.is_some_and(|candidate| candidate.site == Site::Worker(worker))
+    let process = core.members.get(worker).map(|member| member.process.name);
+    candidate.is_some_and(|candidate| {
+        candidate.site == Site::Worker(worker) || (process.is_some() && candidate.process == process)
+    })
 }
 
 /// Move nodes that merely wait on one worker to a worker with an idle thread.

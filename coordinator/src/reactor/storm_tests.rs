@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use lookalike::graph::{Blob, FailureReason, NodeId, Placement, WorkerId};
 
-use super::tests::{Script, node};
+use super::tests::{Script, node, process};
 use super::{Event, handle, start};
 use crate::comm::{Action, Departure, Outbox, Site};
 use crate::core::{Core, Policy};
@@ -135,7 +135,7 @@ impl Storm {
                 self.joined += 1;
                 let worker = WorkerId(self.joined);
                 self.workers.insert(worker, Vec::new());
-                self.tell(Event::WorkerJoined { worker, threads: 1, process: 0 });
+                self.tell(Event::WorkerJoined { worker, threads: 1, process: process(worker.0) });
             }
             Happening::Strikes => {
                 let count = self.workers.len().max(1) as u64;

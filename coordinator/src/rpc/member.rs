@@ -8,19 +8,19 @@ use std::time::Duration;
 
 use lookalike::graph::{BlobHash, NodeFailure, NodeId, WorkerId};
 use lookalike::protocol::{
-    FailureKind, IncomingBlob, LeaseName, PART_BYTES, ToCoordinator, ToWorker, Welcome, bounded_text,
+    self as protocol, FailureKind, IncomingBlob, LeaseName, PART_BYTES, ToCoordinator, ToWorker, Welcome, bounded_text,
 };
 use lookalike_worker::wire::{Incoming, Parcel, Received, WireError};
 use tokio::io::{AsyncWriteExt, ReadHalf, WriteHalf};
 use tokio::sync::mpsc::Sender;
 use tokio::sync::oneshot;
-use tokio::time::timeout;
+use tokio::time::{Instant, MissedTickBehavior, interval_at, timeout};
 use tracing::info;
 
 use super::mailbox::{Patient, Postman, mailbox};
 use super::{Connection, Gate, Greeted, Inbound, Outgoing};
 use crate::comm::{Departure, Site};
-use crate::reactor::Event;
+use crate::reactor::{Event, Executing};
 
 /// How many bytes of small outputs a worker may send before it is asked for how many the reactor has taken (8 MiB).
 const UNASKED_BYTES: u64 = 8 << 20;
@@ -31,7 +31,8 @@ pub(super) async fn serve(greeted: Greeted, worker: WorkerId, peer: SocketAddr, 
     info!(%worker, %peer, process = hello.process, build = bounded_text(&hello.build), "joined");
     let (mailbox, postman) = mailbox(gate.limits.queued_bytes);
     let (heartbeat_ms, drain_ms) = (milliseconds(gate.policy.heartbeat), milliseconds(gate.policy.drain_time));
-    let welcome = Welcome { worker: worker.0, run: gate.run, epoch: gate.epoch, heartbeat_ms, drain_ms };
+    let silence_ms = milliseconds(gate.policy.silence());
+    let welcome = Welcome { worker: worker.0, run: gate.run, epoch: gate.epoch, heartbeat_ms, silence_ms, drain_ms };
     mailbox.send(Outgoing::Message(ToWorker::Welcome(welcome)));
     if gate.inbound.send(Inbound::Joined { worker, hello, mailbox }).await.is_err() {
         return;
@@ -41,11 +42,13 @@ pub(super) async fn serve(greeted: Greeted, worker: WorkerId, peer: SocketAddr, 
         worker,
         epoch: gate.epoch,
         has_reported: gate.epoch == 1,
-        incoming,
         output: None,
         unasked_bytes: 0,
         pending_blobs: Arc::clone(&pending_blobs),
         max_pending_blobs: gate.limits.pending_blobs,
+        heartbeat: gate.policy.heartbeat,
+        told: incoming.heard(),
+        incoming,
         inbound: gate.inbound.clone(),
     };
     let mut reading = std::pin::pin!(reader.read_to_the_end());
@@ -56,7 +59,7 @@ pub(super) async fn serve(greeted: Greeted, worker: WorkerId, peer: SocketAddr, 
         () = overflowing => Departure::TooSlow,
         // Thrown out: whoever did it knows.
         () = closed => return,
-        written = write(writer, postman, &pending_blobs) => match written {
+        written = write(writer, postman, gate.policy.heartbeat, &pending_blobs) => match written {
             // We have said our last word: let the worker say its own, so that closing does not destroy ours.
             Ok(()) => timeout(gate.limits.farewell_time, reading).await.unwrap_or(Departure::Lost),
             Err(WireError::Stream(error)) if error.kind() == io::ErrorKind::TimedOut => Departure::TooSlow,
@@ -72,10 +75,22 @@ pub(super) async fn serve(greeted: Greeted, worker: WorkerId, peer: SocketAddr, 
 async fn write(
     mut writer: Patient<WriteHalf<Connection>>,
     mut postman: Postman,
+    heartbeat: Duration,
     pending_blobs: &AtomicUsize,
 ) -> Result<(), WireError> {
     let (mut together, mut parcel) = (Vec::new(), Parcel::default());
-    while postman.take(&mut together).await {
+    // So that a worker notices when nobody is there any more, whatever it waits for.
+    let mut heart = interval_at(Instant::now() + heartbeat, heartbeat);
+    heart.set_missed_tick_behavior(MissedTickBehavior::Delay);
+    loop {
+        tokio::select! {
+            biased;
+            is_open = postman.take(&mut together) => match is_open {
+                true => {}
+                false => break,
+            },
+            _ = heart.tick() => parcel.add(&ToWorker::Heartbeat)?,
+        }
         for next in together.drain(..) {
             match next {
                 Outgoing::Message(message) => parcel.add(&message)?,
@@ -118,13 +133,16 @@ struct Reader {
     unasked_bytes: u64,
     pending_blobs: Arc<AtomicUsize>,
     max_pending_blobs: usize,
+    heartbeat: Duration,
+    /// When the reactor was told of a sign of life: what came no later is known.
+    told: Instant,
     inbound: Sender<Inbound>,
 }
 
 impl Reader {
     async fn read_to_the_end(&mut self) -> Departure {
         loop {
-            let event = match self.incoming.next().await {
+            let event = match self.next().await {
                 Ok(None) => return Departure::Lost,
                 Ok(Some(Received::Message(ToCoordinator::Goodbye))) => return Departure::Goodbye,
                 Ok(Some(received)) => self.event(received).await,
@@ -133,10 +151,30 @@ impl Reader {
             match event {
                 // When nobody listens any more the run is over. Then we still read until the worker has closed its end:
                 // closing over unread bytes would destroy our last word to it.
-                Ok(Some(event)) => _ = self.inbound.send(event).await,
+                Ok(Some(event)) => {
+                    self.told = self.incoming.heard();
+                    _ = self.inbound.send(event).await;
+                }
                 // Its first part follows.
                 Ok(None) => {}
                 Err(error) => return departure_of(&error),
+            }
+        }
+    }
+
+    /// The next message or part. While a long one comes slowly, its bytes are signs of life.
+    async fn next(&mut self) -> Result<Option<Received<ToCoordinator>>, WireError> {
+        loop {
+            if let Some(received) = self.incoming.complete()? {
+                return Ok(Some(received));
+            }
+            if self.incoming.heard() >= self.told + self.heartbeat {
+                self.told = self.incoming.heard();
+                // When nobody listens any more the run is over.
+                _ = self.inbound.send(Inbound::Event(self.life())).await;
+            }
+            if !self.incoming.read().await? {
+                return Ok(None);
             }
         }
     }
@@ -157,16 +195,15 @@ impl Reader {
             ToCoordinator::Heartbeat { executing } if !self.has_reported => {
                 self.has_reported = true;
                 let earlier = executing.iter().map(|node| node.lease).filter(|lease| lease.epoch < self.epoch);
-                return Ok(Some(Inbound::Reported { worker, executing: earlier.collect() }));
+                let (executing, ours) = (earlier.collect(), self.ours(&executing));
+                return Ok(Some(Inbound::Reported { worker, executing, ours }));
             }
             ToCoordinator::Heartbeat { executing } => {
-                // What was begun for an earlier coordinator has another number there.
-                let executing = executing.iter().filter(|node| node.lease.epoch == self.epoch);
-                let executing = executing.map(|node| (NodeId(node.lease.node), node.permille.min(1000)));
-                Event::Heartbeat { worker, executing: executing.collect() }
+                Event::Heartbeat { worker, executing: self.ours(&executing) }
             }
             ToCoordinator::Started(lease) if self.is_ours(lease)? => {
-                Event::Started { worker, node: NodeId(lease.node), attempt: lease.attempt }
+                let event = Event::Started { worker, node: NodeId(lease.node), attempt: lease.attempt };
+                return Ok(Some(Inbound::Timed { arrived: self.incoming.heard(), event }));
             }
             ToCoordinator::Started(_) => self.life(),
             ToCoordinator::Fetch { hash } => {
@@ -201,6 +238,17 @@ impl Reader {
             return Err(unexpected("a lease of this run", &format!("one of epoch {}", lease.epoch)));
         }
         Ok(lease.epoch == self.epoch)
+    }
+
+    /// What a worker executes for this coordinator. What was begun for an earlier one has another number there.
+    fn ours(&self, executing: &[protocol::Executing]) -> Vec<Executing> {
+        let ours = executing.iter().filter(|node| node.lease.epoch == self.epoch);
+        let known = ours.map(|protocol::Executing { lease, permille }| Executing {
+            node: NodeId(lease.node),
+            attempt: lease.attempt,
+            permille: (*permille).min(1000),
+        });
+        known.collect()
     }
 
     fn life(&self) -> Event {
@@ -241,7 +289,8 @@ impl Reader {
             return Ok(Some(Inbound::Late { worker, lease, output: Some(output) }));
         }
         let (site, node, attempt) = (Site::Worker(worker), NodeId(lease.node), lease.attempt);
-        Ok(Some(Inbound::Event(Event::Finished { site, node, attempt, output })))
+        let event = Event::Finished { site, node, attempt, output };
+        Ok(Some(Inbound::Timed { arrived: self.incoming.heard(), event }))
     }
 }
 

@@ -25,7 +25,7 @@ use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::mpsc::Sender;
 use tokio::sync::oneshot;
 use tokio::task::JoinSet;
-use tokio::time::{sleep, timeout};
+use tokio::time::{Instant, sleep, timeout};
 use tokio_rustls::{TlsAcceptor, server::TlsStream};
 use tokio_util::sync::CancellationToken;
 use tracing::{debug, warn};
@@ -35,7 +35,7 @@ use self::strangers::{Place, Strangers};
 use crate::comm::RunEvent;
 use crate::limits::Limits;
 use crate::policy::Policy;
-use crate::reactor::Event;
+use crate::reactor::{Event, Executing};
 use crate::tls::accept;
 
 /// The pause after the system refuses to accept a connection, such as for want of file descriptors.
@@ -50,9 +50,11 @@ pub(crate) enum Inbound {
     Ask { lease: LeaseName, answer: oneshot::Sender<bool> },
     /// Something happened.
     Event(Event),
-    /// A worker's first sign of life to a coordinator that has gone on with a run; it executes these for an earlier one. What it
-    /// had finished for that one has come before.
-    Reported { worker: WorkerId, executing: Vec<LeaseName> },
+    /// Something happened at this time, which matters, though it may be looked at later.
+    Timed { arrived: Instant, event: Event },
+    /// A worker's first sign of life to a coordinator that has gone on with a run: it executes these for an earlier one, and `ours` for
+    /// this one. What it had finished has come before.
+    Reported { worker: WorkerId, executing: Vec<LeaseName>, ours: Vec<Executing> },
     /// An answer to a lease of an earlier coordinator of this run: the output, whose hash was verified, or none.
     Late { worker: WorkerId, lease: LeaseName, output: Option<Blob> },
     /// Something to tell the user that the reactor does not care about.

@@ -3,11 +3,12 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::io;
 use std::net::SocketAddr;
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::SystemTime;
 
 use lookalike::graph::WorkerId;
-use lookalike::protocol::{RunName, ToWorker};
+use lookalike::protocol::{ProcessName, RunName, ToWorker};
 use tokio::net::TcpListener;
 use tokio::sync::mpsc::Sender;
 use tokio::sync::watch;
@@ -17,6 +18,7 @@ use tokio_util::sync::CancellationToken;
 
 use super::{RunError, RunnerOptions};
 use crate::access::{Credentials, CredentialsError};
+use crate::comm::WorkerProcess;
 use crate::journal::Past;
 use crate::rpc::{Gate, Inbound, Mailbox, Outgoing, serve_forever};
 use crate::spawn::{LocalWorkers, Worked, WorkerCommand, is_worker_alive, threads_per_worker};
@@ -30,11 +32,11 @@ pub(crate) struct Cluster {
     /// Where the coordinator listens.
     pub(crate) bound: SocketAddr,
     /// The processes and mailboxes of the members.
-    members: BTreeMap<WorkerId, (u32, Mailbox)>,
+    members: BTreeMap<WorkerId, (WorkerProcess, Mailbox)>,
     worked: Worked,
-    /// The processes of the members.
+    /// The process ids of the local members.
     present: watch::Sender<BTreeSet<u32>>,
-    /// Workers of an earlier coordinator that are not wanted any more.
+    /// Local workers of an earlier coordinator that are not wanted any more.
     surplus: BTreeSet<u32>,
     stop: CancellationToken,
     serving: JoinHandle<()>,
@@ -48,20 +50,21 @@ pub(crate) struct Takeover {
     listen: Option<SocketAddr>,
     /// Its local workers that are still alive.
     orphans: Vec<u32>,
-    /// The processes of its workers that may come back, from wherever.
-    pub(crate) survivors: Vec<u32>,
+    /// Those of its workers that may come back, from wherever.
+    pub(crate) survivors: Vec<ProcessName>,
     /// How many nodes have their results already.
     pub(crate) results: usize,
 }
 
 impl Takeover {
     /// What there is to be taken over.
-    pub(crate) fn of(past: &Past) -> Self {
-        let is_local = |process: &u32| past.local_workers.contains(process);
-        let orphans =
-            past.local_workers.iter().copied().filter(|process| is_worker_alive(*process)).collect::<Vec<_>>();
-        let survivors = past.workers.iter().copied().filter(|process| !is_local(process) || orphans.contains(process));
-        Self { listen: past.listen, survivors: survivors.collect(), orphans, results: past.results }
+    pub(crate) fn of(past: &Past, options: &RunnerOptions) -> Self {
+        let access = access_path(options);
+        let local = past.local_workers.iter().copied();
+        let orphans = local.filter(|process| is_worker_alive(*process, access)).collect::<Vec<_>>();
+        let may_come = |worker: &&WorkerProcess| !worker.is_local || orphans.contains(&worker.id);
+        let survivors = past.workers.iter().filter(may_come).map(|worker| worker.name).collect();
+        Self { listen: past.listen, survivors, orphans, results: past.results }
     }
 }
 
@@ -100,20 +103,22 @@ impl Cluster {
 
     /// A worker can be sent to from now on. Whether it is wanted: one that an earlier coordinator had started, and that is one too
     /// many now, is told to end.
-    pub(crate) fn admit(&mut self, worker: WorkerId, process: u32, mailbox: Mailbox) -> bool {
-        if self.surplus.contains(&process) {
+    pub(crate) fn admit(&mut self, worker: WorkerId, process: WorkerProcess, mailbox: Mailbox) -> bool {
+        if process.is_local && self.surplus.contains(&process.id) {
             mailbox.send(Outgoing::Message(ToWorker::Stop { reason: "fewer workers are wanted now".into() }));
             return false;
         }
         self.members.insert(worker, (process, mailbox));
-        self.present.send_modify(|present| _ = present.insert(process));
+        if process.is_local {
+            self.present.send_modify(|present| _ = present.insert(process.id));
+        }
         true
     }
 
     /// A worker executes a node.
     pub(crate) fn note_work(&self, worker: WorkerId) {
-        if let Some((process, _)) = self.members.get(&worker) {
-            self.worked.note(*process);
+        if let Some((process, _)) = self.members.get(&worker).filter(|(process, _)| process.is_local) {
+            self.worked.note(process.id);
         }
     }
 
@@ -128,9 +133,9 @@ impl Cluster {
     pub(crate) fn dismiss(&mut self, worker: WorkerId) {
         if let Some((process, member)) = self.members.remove(&worker) {
             member.close();
-            let is_back = self.members.values().any(|(other, _)| *other == process);
-            if !is_back {
-                self.present.send_modify(|present| _ = present.remove(&process));
+            let is_back = self.members.values().any(|(other, _)| other.name == process.name);
+            if process.is_local && !is_back {
+                self.present.send_modify(|present| _ = present.remove(&process.id));
             }
         }
     }
@@ -214,13 +219,18 @@ fn new_credentials(options: &RunnerOptions, bound: SocketAddr, now: SystemTime) 
     Ok(credentials)
 }
 
+/// The access file that local workers read.
+fn access_path(options: &RunnerOptions) -> &PathBuf {
+    options.access.as_ref().unwrap_or(&options.access_file)
+}
+
 fn local_workers(options: &RunnerOptions, address: String) -> Result<LocalWorkers, RunError> {
     let command = options.worker_command.clone().map_or_else(WorkerCommand::this_program, Ok);
     let unknown_program = |source| RunError::Spawn { program: "this program".into(), source };
     Ok(LocalWorkers {
         count: options.workers,
         command: command.map_err(unknown_program)?,
-        access: options.access.as_ref().unwrap_or(&options.access_file).clone(),
+        access: access_path(options).clone(),
         log: options.log.clone(),
         address,
         threads: options.threads_per_worker.unwrap_or_else(|| threads_per_worker(options.workers)),

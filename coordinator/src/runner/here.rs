@@ -68,6 +68,11 @@ impl Here {
         }
     }
 
+    /// Ask a node to stop. It answers all the same.
+    pub(super) fn cancel_one(&self, node: NodeId) {
+        self.contexts.get(&node).into_iter().for_each(|(context, _)| context.cancel());
+    }
+
     /// Ask all nodes to stop.
     pub(super) fn cancel(&self) {
         self.contexts.values().for_each(|(context, _)| context.cancel());

@@ -7,6 +7,7 @@ use lookalike::protocol::LeaseName;
 
 use super::RunError;
 use crate::comm::Action;
+use crate::core::Policy;
 use crate::journal::{Batch, Journal};
 use crate::reactor::Event;
 
@@ -30,13 +31,16 @@ pub(super) struct Memory {
     journal: Option<Journal>,
     /// What nodes of today compute, where there were earlier epochs.
     today: HashMap<NodeKey, NodeId>,
+    /// Whether outputs are believed as they are: none waits for a second computation.
+    keeps_early: bool,
     waiting: VecDeque<Group>,
 }
 
 impl Memory {
     /// The memory of a run with a journal, or without.
-    pub(super) fn new(journal: Option<Journal>) -> Self {
-        Self { journal, today: HashMap::new(), waiting: VecDeque::new() }
+    pub(super) fn new(journal: Option<Journal>, policy: &Policy) -> Self {
+        let keeps_early = policy.verify_fraction <= 0.0;
+        Self { journal, today: HashMap::new(), keeps_early, waiting: VecDeque::new() }
     }
 
     /// Whether there is a journal to tell.
@@ -101,13 +105,13 @@ impl Memory {
         let key = self.journal.as_ref().and_then(|journal| journal.past.keys.get(&(lease.epoch, lease.node))).copied();
         match (key.map(|key| (key, self.today.get(&key))), output) {
             (Some((_, Some(node))), Some(output)) => return Event::Recovered { worker, node: *node, output },
-            // Its node has not been planned today. It will be: the plan is the same.
-            (Some((key, None)), Some(output)) => {
+            // Its node has not been planned today. It will be: the plan is the same. Where outputs are verified it may have to be, too.
+            (Some((key, None)), Some(output)) if self.keeps_early => {
                 group.batch.keep(key, output);
                 self.journal.iter().for_each(|journal| journal.learn(key));
             }
             // An error that its node would have again, or a node that was lost with the machine: it runs again.
-            (_, None) | (None, _) => {}
+            _ => {}
         }
         Event::Heartbeat { worker, executing: Vec::new() }
     }

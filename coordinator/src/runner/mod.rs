@@ -24,7 +24,7 @@ use std::error::Error as _;
 use std::sync::Arc;
 use std::time::Duration;
 
-use lookalike::graph::{Blob, NodeId, Planner, Registry, WorkerId};
+use lookalike::graph::{NodeId, Planner, Registry, WorkerId};
 use lookalike::protocol::{Assignment, LeaseName, RunName, ToWorker};
 use tokio::sync::Notify;
 use tokio::sync::mpsc::{Receiver, UnboundedReceiver, channel, unbounded_channel};
@@ -40,7 +40,7 @@ use self::memory::{Group, Memory};
 pub use self::options::RunnerOptions;
 pub use self::pulse::Pulse;
 use self::survivors::{Arrival, Survivors};
-use crate::comm::{Action, Lease, Outbox, RunEvent, Site};
+use crate::comm::{Action, Lease, Outbox, RunEvent, Site, WorkerProcess};
 use crate::core::{Core, RunSummary};
 use crate::journal::Journal;
 use crate::reactor::{self, Event};
@@ -80,7 +80,8 @@ pub async fn run<P: Planner>(
     getrandom::fill(&mut name).map_err(RunError::Randomness)?;
     let journal = options.journal.as_ref().map(|options| Journal::open(options, RunName(name))).transpose()?;
     let (run, epoch) = journal.as_ref().map_or((RunName(name), FIRST_EPOCH), |journal| (journal.run, journal.epoch));
-    let takeover = journal.as_ref().filter(|_| epoch > FIRST_EPOCH).map(|journal| Takeover::of(&journal.past));
+    let earlier = journal.as_ref().filter(|_| epoch > FIRST_EPOCH);
+    let takeover = earlier.map(|journal| Takeover::of(&journal.past, &options));
     let core = Core::new(options.policy, epoch);
     let core = match &journal {
         Some(journal) => core.with_recall(journal.recall()),
@@ -94,7 +95,7 @@ pub async fn run<P: Planner>(
         cluster: None,
         observer,
         here: Here::new(registry, results_sender),
-        memory: Memory::new(journal),
+        memory: Memory::new(journal, &options.policy),
         survivors: None,
         began: Instant::now(),
     };
@@ -175,9 +176,13 @@ impl<P: Planner, O: FnMut(&RunEvent)> Driver<P, O> {
                 () = told(wake.as_deref()), if may_act => events.push(Inbound::Event(Event::LookAgain)),
                 _ = beat.tick(), if pulse.is_some() => continue,
                 () = sleep_or_wait(return_time), if may_act => {}
-                () = sleep_or_wait(deadline), if may_act => events.push(Inbound::Event(Event::DeadlinePassed)),
+                () = sleep_or_wait(deadline), if may_act => {}
             }
             more(&mut inbound, &mut events);
+            // Where events never cease to come, the time is looked at after them.
+            if deadline.is_some_and(|deadline| deadline <= Instant::now()) {
+                events.push(Inbound::Event(Event::DeadlinePassed));
+            }
             failure = self.handle_all(&mut events).err();
         }
     }
@@ -196,7 +201,7 @@ impl<P: Planner, O: FnMut(&RunEvent)> Driver<P, O> {
         }
         let started = reactor::start(&mut self.core, &mut self.planner, now, &mut self.outbox);
         self.forget_if_wrong(started.as_ref().err(), &mut group);
-        self.collect(&mut group, None, now);
+        self.collect(&mut group, now);
         if started.is_ok() && !self.core.is_finished() {
             let is_new = takeover.is_none();
             let survivors = takeover.as_ref().map(|takeover| takeover.survivors.clone()).unwrap_or_default();
@@ -228,8 +233,12 @@ impl<P: Planner, O: FnMut(&RunEvent)> Driver<P, O> {
         let mut group = Group::default();
         let mut handle_all = || {
             for inbound in events.drain(..) {
-                if let Some(event) = self.event(inbound, &mut group) {
-                    self.handle(event, &mut group)?;
+                let arrived = match &inbound {
+                    Inbound::Timed { arrived, .. } => Some(*arrived),
+                    _ => None,
+                };
+                if let Some(event) = self.event(inbound, &mut group)? {
+                    self.handle_arrived(event, arrived, &mut group)?;
                 }
             }
             let back = self.survivors.take_if(|survivors| survivors.are_complete(Instant::now()));
@@ -257,26 +266,26 @@ impl<P: Planner, O: FnMut(&RunEvent)> Driver<P, O> {
     }
 
     fn handle(&mut self, event: Event, group: &mut Group) -> Result<(), RunError> {
+        self.handle_arrived(event, None, group)
+    }
+
+    fn handle_arrived(&mut self, event: Event, arrived: Option<Instant>, group: &mut Group) -> Result<(), RunError> {
         trace!(?event);
         self.here.forget(&event);
         let now = self.now();
-        let output = match &event {
-            Event::Finished { node, output, .. } | Event::Recovered { node, output, .. } => {
-                Some((*node, output.clone()))
-            }
-            _ => None,
-        };
-        let outcome = reactor::handle(&mut self.core, &mut self.planner, event, now, &mut self.outbox);
-        self.collect(group, output.as_ref(), now);
+        let arrived = arrived.map_or(now, |arrived| arrived.saturating_duration_since(self.began).min(now));
+        let outcome =
+            reactor::handle_arrived(&mut self.core, &mut self.planner, event, (arrived, now), &mut self.outbox);
+        self.collect(group, now);
         self.forget_if_wrong(outcome.as_ref().err(), group);
         outcome
     }
 
     /// Move what the reactor has said into the group, and tell the journal.
-    fn collect(&mut self, group: &mut Group, output: Option<&(NodeId, Blob)>, now: Duration) {
+    fn collect(&mut self, group: &mut Group, now: Duration) {
         let actions = self.outbox.take();
         if self.memory.is_kept() {
-            actions.iter().for_each(|action| group.batch.note(action, &self.core, output, now));
+            actions.iter().for_each(|action| group.batch.note(action, &self.core, now));
         }
         group.actions.extend(actions);
     }
@@ -296,9 +305,9 @@ impl<P: Planner, O: FnMut(&RunEvent)> Driver<P, O> {
         }
     }
 
-    fn event(&mut self, inbound: Inbound, group: &mut Group) -> Option<Event> {
-        match inbound {
-            Inbound::Event(event) => {
+    fn event(&mut self, inbound: Inbound, group: &mut Group) -> Result<Option<Event>, RunError> {
+        Ok(match inbound {
+            Inbound::Event(event) | Inbound::Timed { event, .. } => {
                 if let Event::WorkerLeft { worker, .. } = &event {
                     self.cluster.iter_mut().for_each(|cluster| cluster.dismiss(*worker));
                 }
@@ -309,19 +318,23 @@ impl<P: Planner, O: FnMut(&RunEvent)> Driver<P, O> {
                 Some(event)
             }
             Inbound::Joined { worker, hello, mailbox } => {
-                let (process, cluster) = (hello.process, self.cluster.as_mut()?);
+                let Some(cluster) = self.cluster.as_mut() else { return Ok(None) };
+                let process = WorkerProcess { id: hello.process, name: hello.name, is_local: hello.is_local };
                 let threads = usize::try_from(hello.threads).unwrap_or(usize::MAX).clamp(1, MAX_THREADS);
                 let is_wanted = cluster.admit(worker, process, mailbox);
                 match &mut self.survivors {
                     Some(survivors) if is_wanted => survivors.joined(worker, threads, process),
-                    Some(survivors) => survivors.dismissed(process),
-                    None => return is_wanted.then_some(Event::WorkerJoined { worker, threads, process }),
+                    Some(survivors) => survivors.dismissed(process.name),
+                    None => return Ok(is_wanted.then_some(Event::WorkerJoined { worker, threads, process })),
                 }
                 None
             }
-            Inbound::Reported { worker, executing } => {
-                self.survivors.iter_mut().for_each(|survivors| survivors.reported(worker, executing.clone()));
-                Some(Event::Heartbeat { worker, executing: Vec::new() })
+            Inbound::Reported { worker, executing, ours } => {
+                match &mut self.survivors {
+                    Some(survivors) => survivors.reported(worker, executing),
+                    None => self.go_on(worker, &executing, group)?,
+                }
+                Some(Event::Heartbeat { worker, executing: ours })
             }
             Inbound::Late { worker, lease, output } => Some(self.memory.late_answer(worker, lease, output, group)),
             Inbound::Ask { lease, answer } => {
@@ -330,11 +343,17 @@ impl<P: Planner, O: FnMut(&RunEvent)> Driver<P, O> {
                 None
             }
             Inbound::Tell(event) => {
-                group.batch.note_event(&event, &self.core, None, self.now());
+                group.batch.note_event(&event, &self.core, self.now());
                 group.actions.push(Action::Tell(event));
                 None
             }
-        }
+        })
+    }
+
+    /// A worker that nobody waited for any more goes on with what an earlier coordinator gave it.
+    fn go_on(&mut self, worker: WorkerId, executing: &[LeaseName], group: &mut Group) -> Result<(), RunError> {
+        let today: Vec<_> = executing.iter().filter_map(|lease| self.memory.today(*lease)).collect();
+        today.into_iter().try_for_each(|node| self.handle(Event::Continues { worker, node }, group))
     }
 
     /// Do what a group asks for.
@@ -358,6 +377,9 @@ impl<P: Planner, O: FnMut(&RunEvent)> Driver<P, O> {
                 }
                 Action::Drop { worker } => self.cluster.iter_mut().for_each(|cluster| cluster.dismiss(worker)),
                 Action::RunHere { node, attempt } => self.run_here(node, attempt),
+                Action::CancelHere { node } => self.here.cancel_one(node),
+                // It is in the journal by now.
+                Action::Keep { .. } => {}
                 Action::Tell(event) => {
                     if let RunEvent::NodeStarted { site: Site::Worker(worker), .. } = &event {
                         self.cluster.iter().for_each(|cluster| cluster.note_work(*worker));

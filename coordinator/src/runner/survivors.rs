@@ -4,8 +4,10 @@
 use std::time::Duration;
 
 use lookalike::graph::WorkerId;
-use lookalike::protocol::LeaseName;
+use lookalike::protocol::{LeaseName, ProcessName};
 use tokio::time::Instant;
+
+use crate::comm::WorkerProcess;
 
 /// How long to wait for them: their longest pause between two attempts to connect, and a little more.
 const RETURN_TIME: Duration = Duration::from_secs(6);
@@ -15,7 +17,7 @@ const RETURN_TIME: Duration = Duration::from_secs(6);
 pub(super) struct Arrival {
     pub(super) worker: WorkerId,
     pub(super) threads: usize,
-    pub(super) process: u32,
+    pub(super) process: WorkerProcess,
     /// What it executes for an earlier coordinator, once it has said so.
     pub(super) executing: Option<Vec<LeaseName>>,
 }
@@ -23,19 +25,19 @@ pub(super) struct Arrival {
 /// Who is waited for, and who has come meanwhile.
 #[derive(Debug)]
 pub(super) struct Survivors {
-    expected: Vec<u32>,
+    expected: Vec<ProcessName>,
     arrivals: Vec<Arrival>,
     pub(super) until: Instant,
 }
 
 impl Survivors {
     /// Wait for these processes; `None` if there are none.
-    pub(super) fn expect(expected: Vec<u32>, now: Instant) -> Option<Self> {
+    pub(super) fn expect(expected: Vec<ProcessName>, now: Instant) -> Option<Self> {
         (!expected.is_empty()).then(|| Self { expected, arrivals: Vec::new(), until: now + RETURN_TIME })
     }
 
     /// A worker has joined.
-    pub(super) fn joined(&mut self, worker: WorkerId, threads: usize, process: u32) {
+    pub(super) fn joined(&mut self, worker: WorkerId, threads: usize, process: WorkerProcess) {
         self.arrivals.push(Arrival { worker, threads, process, executing: None });
     }
 
@@ -51,13 +53,15 @@ impl Survivors {
     }
 
     /// This process is not waited for any more.
-    pub(super) fn dismissed(&mut self, process: u32) {
+    pub(super) fn dismissed(&mut self, process: ProcessName) {
         self.expected.retain(|expected| *expected != process);
     }
 
     /// Whether all are there, or had the time.
     pub(super) fn are_complete(&self, now: Instant) -> bool {
-        let is_here = |process: &u32| self.arrivals.iter().any(|a| a.process == *process && a.executing.is_some());
+        let has_reported =
+            |arrival: &Arrival, name: &ProcessName| arrival.process.name == *name && arrival.executing.is_some();
+        let is_here = |name: &ProcessName| self.arrivals.iter().any(|arrival| has_reported(arrival, name));
         now >= self.until || self.expected.iter().all(is_here)
     }
 
@@ -71,17 +75,26 @@ impl Survivors {
 mod tests {
     use super::*;
 
+    fn name(byte: u8) -> ProcessName {
+        ProcessName([byte; 16])
+    }
+
+    /// As in containers, where every process has the same number.
+    fn process(byte: u8) -> WorkerProcess {
+        WorkerProcess { id: 1, name: name(byte), is_local: false }
+    }
+
     #[test]
     fn waiting_ends_when_all_have_reported_or_had_the_time() {
         let now = Instant::now();
         assert!(Survivors::expect(Vec::new(), now).is_none());
-        let mut survivors = Survivors::expect(vec![11, 12, 13], now).unwrap();
+        let mut survivors = Survivors::expect(vec![11, 12, 13].into_iter().map(name).collect(), now).unwrap();
         let [a, b, stranger] = [1, 2, 3].map(WorkerId);
-        survivors.joined(a, 1, 11);
-        survivors.joined(stranger, 4, 99);
-        survivors.joined(b, 1, 12);
+        survivors.joined(a, 1, process(11));
+        survivors.joined(stranger, 4, process(99));
+        survivors.joined(b, 1, process(12));
         survivors.reported(a, vec![LeaseName { node: 5, attempt: 1, epoch: 1 }]);
-        survivors.dismissed(13);
+        survivors.dismissed(name(13));
         assert!(!survivors.are_complete(now) && survivors.are_complete(now + RETURN_TIME));
         survivors.reported(b, Vec::new());
         assert!(survivors.are_complete(now));

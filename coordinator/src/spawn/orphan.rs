@@ -1,6 +1,7 @@
 //! Local workers that have outlived the coordinator that started them, and work for the next one of the run.
 
 use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use nix::sys::signal::{Signal, kill};
@@ -19,6 +20,8 @@ const GLANCE: Duration = Duration::from_millis(50);
 /// A worker process of an earlier coordinator.
 pub(super) struct Orphan {
     pub(super) process: u32,
+    /// The access file that it was started with.
+    pub(super) access: PathBuf,
     /// The processes that are connected.
     pub(super) present: watch::Receiver<BTreeSet<u32>>,
 }
@@ -34,7 +37,7 @@ impl Orphan {
                 if timeout(GLANCE, self.present.wait_for(|present| present.contains(&process))).await.is_ok() {
                     break;
                 }
-                if Instant::now() >= until || !is_worker_alive(process) {
+                if Instant::now() >= until || !is_worker_alive(process, &self.access) {
                     return was_here;
                 }
             }
@@ -49,7 +52,7 @@ impl Orphan {
     /// Wait for its end; it has been told. When this returns there is no process.
     pub(super) async fn end(self) {
         let until = Instant::now() + FAREWELL_TIME;
-        while is_worker_alive(self.process) {
+        while is_worker_alive(self.process, &self.access) {
             if Instant::now() >= until {
                 warn!(
                     process = self.process,
@@ -64,14 +67,22 @@ impl Orphan {
     }
 }
 
-/// Whether a process lives and is a local worker: numbers of processes are used again.
-pub(crate) fn is_worker_alive(process: u32) -> bool {
+/// Whether a process lives and is a local worker of the run with this access file: numbers of processes are used again, perhaps for a
+/// worker of somebody else.
+pub(crate) fn is_worker_alive(process: u32, access: &Path) -> bool {
     if pid(process).is_none_or(|pid| kill(pid, None).is_err()) {
         return false;
     }
     // Where there is no such file nobody can tell. A process that has ended and was not waited for has an empty one.
     let line = std::fs::read(format!("/proc/{process}/cmdline"));
-    line.map_or(cfg!(not(target_os = "linux")), |line| line.split(|byte| *byte == 0).any(|word| word == b"--leash"))
+    line.map_or(cfg!(not(target_os = "linux")), |line| is_worker(&line, access))
+}
+
+/// Whether this is the command line of a local worker with this access file.
+fn is_worker(line: &[u8], access: &Path) -> bool {
+    let words: Vec<&[u8]> = line.split(|byte| *byte == 0).collect();
+    let has_access = words.windows(2).any(|pair| pair[0] == b"--access" && pair[1] == access.as_os_str().as_encoded_bytes());
+    has_access && words.contains(&b"--leash".as_slice())
 }
 
 fn pid(process: u32) -> Option<Pid> {
@@ -84,8 +95,19 @@ mod tests {
 
     #[test]
     fn only_a_living_worker_is_taken_for_one() {
-        assert!(!is_worker_alive(0) && !is_worker_alive(1) && !is_worker_alive(u32::MAX));
+        let access = Path::new("out/access.json");
+        assert!([0, 1, u32::MAX].into_iter().all(|process| !is_worker_alive(process, access)));
         // Alive, but no worker.
-        assert_eq!(is_worker_alive(std::process::id()), cfg!(not(target_os = "linux")));
+        assert_eq!(is_worker_alive(std::process::id(), access), cfg!(not(target_os = "linux")));
+    }
+
+    #[test]
+    fn worker_of_another_run_is_not_ours() {
+        let line = |access: &str| format!("/bin/lookalike\0worker\0--access\0{access}\0--threads\02\0--leash\0").into_bytes();
+        let ours = Path::new("out/access.json");
+        assert!(is_worker(&line("out/access.json"), ours));
+        assert!(!is_worker(&line("other/access.json"), ours));
+        assert!(!is_worker(b"/bin/lookalike\0worker\0--access\0out/access.json\0", ours), "one that somebody else started");
+        assert!(!is_worker(b"", ours));
     }
 }

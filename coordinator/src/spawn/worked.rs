@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// The processes of local and other workers that have executed a node.
+/// The processes of local workers that have executed a node.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Worked(Arc<Mutex<BTreeSet<u32>>>);
 

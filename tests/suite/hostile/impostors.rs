@@ -15,7 +15,7 @@ use lookalike_tests::gate::{Gate, Waiting};
 use lookalike_tests::plan::{Leaves, TestPlanner};
 use lookalike_tests::process::{Process, stderr};
 use lookalike_tests::proxy::Proxy;
-use lookalike_tests::stranger::{TlsClient, connect, connect_tls, greet, hear, join, read_to_the_end, say, say_frame};
+use lookalike_tests::stranger::{TlsClient, connect, connect_tls, greet, hear, hello, join, read_to_the_end, say, say_frame};
 
 use super::{PROGRAM, run_at_the_gate, run_within, worker};
 
@@ -157,7 +157,7 @@ fn words_without_end_are_cut_or_refused() {
     let mut loud = connect_tls(&access).unwrap();
     greet(&mut loud, &access.secret, |_| {}).unwrap();
     let build = "x".repeat(2_000_000);
-    say(&mut loud, &ToCoordinator::Hello(Hello { build, threads: u32::MAX, process: u32::MAX }));
+    say(&mut loud, &ToCoordinator::Hello(Hello { build, process: u32::MAX, ..hello(u32::MAX) }));
     let joined = cluster.wait_for(|event| match event {
         RunEvent::WorkerJoined { threads, process: u32::MAX, .. } => Some(*threads),
         _ => None,

@@ -1,15 +1,49 @@
 use super::*;
 
-/// Worker 1 with one thread, which has done the first five nodes, each in so long.
+/// Worker 1 with one thread, which has done the first ten nodes, each in so long: eight to know it, and two that were given before.
 fn practised(nodes: usize, took: Duration) -> Bench {
     let mut bench = Bench::new(independent(nodes));
     bench.join(A, 1);
-    for node in 0..5 {
+    for node in 0..10 {
         bench.start(A, node, 1);
         bench.now += took;
         bench.finish(A, node, 1, 0);
     }
     bench
+}
+
+#[test]
+fn one_short_node_does_not_make_its_kind_short() {
+    let mut bench = Bench::new(independent(1000));
+    bench.join(A, 1);
+    for node in 0..7 {
+        bench.start(A, node, 1);
+        bench.now += Duration::from_micros(50);
+        bench.finish(A, node, 1, 0);
+        assert_eq!(held(&bench, A), 3);
+    }
+}
+
+#[test]
+fn node_that_is_heard_of_late_has_taken_as_long_as_it_has() {
+    let mut bench = Bench::new(independent(1000));
+    bench.join(A, 1);
+    for node in 0..20 {
+        // The reactor was busy: begin and end are looked at back to back.
+        let (began, ended) = (bench.now, bench.now + Duration::from_secs(2));
+        bench.now += Duration::from_secs(3);
+        let start = Event::Started { worker: A, node: NodeId(node), attempt: 1 };
+        for (arrived, event) in [(began, start), (ended, finished(Site::Worker(A), node, 1, 0))] {
+            let times = (arrived, bench.now);
+            handle_arrived(&mut bench.core, &mut bench.planner, event, times, &mut bench.outbox).unwrap();
+        }
+        let took = bench.outbox.take().into_iter().find_map(|action| match action {
+            Action::Tell(RunEvent::NodeFinished { elapsed, .. }) => Some(elapsed),
+            _ => None,
+        });
+        assert_eq!(took, Some(Duration::from_secs(2)));
+        assert_eq!(held(&bench, A), 3);
+    }
 }
 
 fn held(bench: &Bench, worker: WorkerId) -> usize {
@@ -28,8 +62,8 @@ fn short_nodes_are_given_out_many_at_a_time_and_long_ones_few() {
 #[test]
 fn short_nodes_are_moved_only_from_a_worker_that_does_not_get_on() {
     let mut bench = practised(50, Duration::from_micros(50));
-    bench.start(A, 5, 1);
-    assert_eq!(held(&bench, A), 45);
+    bench.start(A, 10, 1);
+    assert_eq!(held(&bench, A), 40);
     assert!(bench.join(B, 1).is_empty());
     let due = bench.now + Duration::from_millis(50);
     assert_eq!(bench.core.next_deadline(), Some(due));

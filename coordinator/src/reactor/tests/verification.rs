@@ -103,3 +103,42 @@ fn planner_that_checks_outputs_itself_has_none_verified() {
     bench.finish(A, 0, 1, 5);
     assert!(bench.core.is_finished());
 }
+
+#[test]
+fn one_computation_that_is_answered_under_two_leases_verifies_nothing() {
+    let mut bench = Bench::with(independent(1), all());
+    bench.join_as(A, 1, process(7));
+    bench.start(A, 0, 1);
+    // It has finished when its connection falls silent, and comes back with the answer.
+    bench.lose(A, Departure::Silent);
+    assert_eq!(bench.join_as(B, 1, process(7)), ["worker 2 gets 0.2"]);
+    bench.finish(B, 0, 1, 5);
+    bench.finish(B, 0, 2, 5);
+    assert!(!bench.core.is_finished());
+    assert_eq!(bench.core.summary().verified_nodes, 0);
+    // Computed anew, which begins with a word.
+    let attempt = bench.core.look(NodeId(0)).unwrap().attempts;
+    bench.start(B, 0, attempt);
+    bench.finish(B, 0, attempt, 5);
+    assert!(bench.core.is_finished());
+    assert_eq!(bench.core.summary().verified_nodes, 1);
+}
+
+#[test]
+fn process_is_not_another_one_for_being_back_under_another_number() {
+    let mut bench = Bench::with(independent(1), all());
+    bench.join_as(A, 1, process(7));
+    bench.start(A, 0, 1);
+    bench.finish(A, 0, 1, 5);
+    bench.lose(A, Departure::Silent);
+    bench.join_as(B, 1, process(8));
+    bench.lose(B, Departure::Goodbye);
+    bench.join_as(C, 1, process(7));
+    bench.join_as(WorkerId(4), 1, process(9));
+    let origin_holds = bench.core.members.get(C).unwrap().leases.len();
+    let other_holds = bench.core.members.get(WorkerId(4)).unwrap().leases.len();
+    assert_eq!((origin_holds, other_holds), (1, 0), "the only one there began");
+    bench.lose(C, Departure::Silent);
+    bench.join_as(WorkerId(5), 1, process(7));
+    assert_eq!(bench.core.members.get(WorkerId(4)).unwrap().leases.len(), 1);
+}
