@@ -111,6 +111,10 @@ pub(crate) fn run(settings: BatchSettings) -> anyhow::Result<ExitCode> {
 /// Tells the journal what has come after it was closed: fits whose results were written last, and how all of it ended.
 fn close(out: &OutFolder, board: &Board, ledger: &FitLedger, is_whole: bool, fits: &[BatchFit]) -> anyhow::Result<()> {
     let path = out.file(JOURNAL_FILE);
+    if !path.exists() {
+        // The run could not begin.
+        return Ok(());
+    }
     let ended = board.problem().filter(|_| is_whole);
     journal::settle(&path, ledger, ended.as_deref()).map_err(journal_failed)?;
     if is_whole && ended.is_none() {

@@ -143,8 +143,10 @@ fn run_shown(
         attempts: summary.attempts,
         requeued: summary.requeued_nodes,
     };
-    let pictures = write_results(&job.out, &record(job, method, &outcome, &notes), &timing)?;
-    let finished = journal::Finished { outputs: job.out.results()? };
+    // A disk that is full may have room later, and then nothing is computed again.
+    let pictures = write_results(&job.out, &record(job, method, &outcome, &notes), &timing);
+    let pictures = pictures.context(Exit::ClusterFailed)?;
+    let finished = journal::Finished { outputs: job.out.results().context(Exit::ClusterFailed)? };
     journal::finish(&job.out.file(JOURNAL_FILE), &finished).map_err(journal_failed)?;
     Ok(Some(Done { outcome, pictures, timing, notes }))
 }

@@ -198,9 +198,7 @@ impl Reader {
                 let (executing, ours) = (earlier.collect(), self.ours(&executing));
                 return Ok(Some(Inbound::Reported { worker, executing, ours }));
             }
-            ToCoordinator::Heartbeat { executing } => {
-                Event::Heartbeat { worker, executing: self.ours(&executing) }
-            }
+            ToCoordinator::Heartbeat { executing } => Event::Heartbeat { worker, executing: self.ours(&executing) },
             ToCoordinator::Started(lease) if self.is_ours(lease)? => {
                 let event = Event::Started { worker, node: NodeId(lease.node), attempt: lease.attempt };
                 return Ok(Some(Inbound::Timed { arrived: self.incoming.heard(), event }));

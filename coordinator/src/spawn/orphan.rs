@@ -81,7 +81,8 @@ pub(crate) fn is_worker_alive(process: u32, access: &Path) -> bool {
 /// Whether this is the command line of a local worker with this access file.
 fn is_worker(line: &[u8], access: &Path) -> bool {
     let words: Vec<&[u8]> = line.split(|byte| *byte == 0).collect();
-    let has_access = words.windows(2).any(|pair| pair[0] == b"--access" && pair[1] == access.as_os_str().as_encoded_bytes());
+    let has_access =
+        words.windows(2).any(|pair| pair[0] == b"--access" && pair[1] == access.as_os_str().as_encoded_bytes());
     has_access && words.contains(&b"--leash".as_slice())
 }
 
@@ -103,11 +104,15 @@ mod tests {
 
     #[test]
     fn worker_of_another_run_is_not_ours() {
-        let line = |access: &str| format!("/bin/lookalike\0worker\0--access\0{access}\0--threads\02\0--leash\0").into_bytes();
+        let line =
+            |access: &str| format!("/bin/lookalike\0worker\0--access\0{access}\0--threads\02\0--leash\0").into_bytes();
         let ours = Path::new("out/access.json");
         assert!(is_worker(&line("out/access.json"), ours));
         assert!(!is_worker(&line("other/access.json"), ours));
-        assert!(!is_worker(b"/bin/lookalike\0worker\0--access\0out/access.json\0", ours), "one that somebody else started");
+        assert!(
+            !is_worker(b"/bin/lookalike\0worker\0--access\0out/access.json\0", ours),
+            "one that somebody else started"
+        );
         assert!(!is_worker(b"", ours));
     }
 }

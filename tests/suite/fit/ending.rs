@@ -36,6 +36,19 @@ fn stream_says_finished_when_all_is_written() {
 }
 
 #[test]
+fn results_that_cannot_be_written_are_code_three_and_come_with_resume() {
+    let folder = folder();
+    let blocked = folder.path().join("out/match.exr.partial");
+    fs::create_dir_all(&blocked).unwrap();
+    let answer = fit(folder.path(), "out", QUICK);
+    assert_eq!(answer.code, Some(3), "{}", answer.stderr);
+    assert!(answer.stderr.contains("cannot write out/match.exr: is the disk full?"), "{}", answer.stderr);
+    fs::remove_dir(blocked).unwrap();
+    fit(folder.path(), "out", &format!("{QUICK} --resume")).done();
+    assert!(folder.path().join("out/fit.json").exists());
+}
+
+#[test]
 fn folder_of_a_finished_fit_is_left_alone() {
     let folder = folder();
     fs::create_dir(folder.path().join("out")).unwrap();
