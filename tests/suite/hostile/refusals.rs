@@ -218,3 +218,34 @@ fn worker_that_cannot_reach_its_coordinator_tries_until_it_can() {
     let output = worker.output();
     assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
 }
+
+#[test]
+fn coordinator_that_falls_silent_is_left_and_called_again() {
+    let (folder, coordinator) = (tempfile::tempdir().unwrap(), FalseCoordinator::new());
+    let known = identity(SystemTime::now());
+    let address = coordinator.address().to_string();
+    let access = Access { address, certificate: known.pin(), secret: Secret::from_bytes([7; 32]) };
+    let _worker = start(&folder, &access);
+    let mut names = Vec::new();
+    for _ in 0..2 {
+        let mut stream = coordinator.next_tls(&tls_of(&known)).unwrap();
+        let asked = Challenge::new([1; 32]);
+        let judge = |response: &Response, stream: &TlsServer| {
+            response.judge(&asked, &ProofKey::new(&access.secret, &channel_binding(&stream.conn).unwrap()))
+        };
+        challenge(&mut stream, &asked, judge).unwrap();
+        let hello = read_message(&mut stream);
+        let ToCoordinator::Hello(hello) = hello else { panic!("expected a hello, found {hello:?}") };
+        names.push(hello.name);
+        let run = RunName([1; 16]);
+        let welcome = Welcome { worker: 1, run, epoch: 1, heartbeat_ms: 50, silence_ms: 300, drain_ms: 0 };
+        tell(&mut stream, &ToWorker::Welcome(welcome));
+        // Signs of life keep it, though it hears nothing else; then, as of a machine without power, there is not even an end.
+        for _ in 0..20 {
+            tell(&mut stream, &ToWorker::Heartbeat);
+            while !matches!(read_message(&mut stream), ToCoordinator::Heartbeat { .. }) {}
+        }
+        std::mem::forget(stream);
+    }
+    assert_eq!(names[0], names[1], "it is the same process");
+}
