@@ -117,7 +117,8 @@ impl Study {
 
     fn stage_one(&self, table: &TransportTable) -> Vec<Candidate> {
         let method = Method::default();
-        let search = |gamma: &f64| search_gamma(&method, *gamma, table, &self.subset, &self.photo, self.mean_radiance);
+        let search =
+            |gamma: &f64| search_gamma(&method, *gamma, table, &self.subset, &self.photo, self.mean_radiance, None);
         method.gammas.par_iter().map(|gamma| search(gamma).expect("the searches succeed")).collect()
     }
 }

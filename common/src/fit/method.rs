@@ -15,6 +15,18 @@ pub enum SearchKind {
     LeastSquares,
 }
 
+/// How stage one renders its pixels.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Integration {
+    /// By a transport table, which is integrated once.
+    Tables,
+    /// By the direct integrator, for every evaluation, as in the paper.
+    Direct {
+        /// Samples per pixel.
+        samples: u32,
+    },
+}
+
 /// Where a search starts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Start {
@@ -57,6 +69,8 @@ pub struct Method {
     pub subsets: u32,
     /// How Eq. 1 is minimised.
     pub search: SearchKind,
+    /// How its pixels are rendered.
+    pub integration: Integration,
     /// Where searches start.
     pub start: Start,
     /// Compression at and below zero.
@@ -78,6 +92,7 @@ impl Default for Method {
             sampling: Sampling::Importance,
             subsets: 1,
             search: SearchKind::LeastSquares,
+            integration: Integration::Tables,
             start: Start::Scan,
             at_zero: AtZero::Tangent,
             polish: true,
@@ -114,6 +129,11 @@ pub enum MethodError {
         /// The number of subsets.
         subsets: u32,
     },
+    /// The direct integrator gives no derivatives.
+    #[error(
+        "the direct integrator (--integrator direct) has no derivatives, which least squares needs: use --search pattern"
+    )]
+    NoDerivatives,
     /// Gammas times subsets.
     #[error("{found} searches (gammas times subsets) are more than the {MOST_SEARCHES} that one fit may have")]
     TooManySearches {
@@ -141,6 +161,9 @@ impl Method {
         }
         if self.samples == SampleCount::Full && self.subsets > 1 {
             return Err(MethodError::SameSubsets { subsets: self.subsets });
+        }
+        if self.search == SearchKind::LeastSquares && self.integration != Integration::Tables {
+            return Err(MethodError::NoDerivatives);
         }
         let searches = self.gammas.len() * self.subsets as usize;
         if searches > MOST_SEARCHES {

@@ -9,6 +9,7 @@
 
 mod best;
 mod candidate;
+mod direct;
 mod method;
 pub mod nodes;
 mod objective;
@@ -22,7 +23,8 @@ mod wire;
 
 pub use best::BestScore;
 pub use candidate::{Candidate, SAME, distinct, needed_span};
-pub use method::{AtZero, JudgedBy, MOST_SEARCHES, Method, MethodError, SearchKind, Start, gamma_range};
+pub use direct::DirectPixels;
+pub use method::{AtZero, Integration, JudgedBy, MOST_SEARCHES, Method, MethodError, SearchKind, Start, gamma_range};
 pub use objective::Objective;
 pub use plan::{FitError, FitOutcome, FitPlanner, encode_light};
 pub use polish::{INITIAL_MESH, MAX_EVALUATIONS, Polished, polish};

@@ -1,5 +1,6 @@
 //! Eq. 1 for one gamma as a function of the parameters, by the transport table of the pixel subset.
 
+use super::direct::DirectPixels;
 use crate::{
     brdf::{Model, Role, flat_len, term_count},
     math::Rgb,
@@ -16,6 +17,7 @@ use crate::{
 pub struct Objective<'a> {
     model: &'static dyn Model,
     table: &'a TransportTable,
+    direct: Option<DirectPixels<'a>>,
     weights: &'a [f64],
     compression: Compression,
     /// The photo, compressed.
@@ -44,6 +46,7 @@ impl<'a> Objective<'a> {
         Self {
             model,
             table,
+            direct: None,
             weights: &subset.weights,
             compression,
             reference: std::array::from_fn(compress),
@@ -53,9 +56,22 @@ impl<'a> Objective<'a> {
         }
     }
 
+    /// The same cost, its pixels rendered by the direct integrator. Derivatives remain those of the table.
+    ///
+    /// # Panics
+    /// When it is about another number of pixels.
+    #[must_use]
+    pub fn rendered_by(self, direct: DirectPixels<'a>) -> Self {
+        assert_eq!(direct.pixels.len(), self.table.pixels, "table and direct integrator differ");
+        Self { direct: Some(direct), ..self }
+    }
+
     /// `C(A, B, gamma)` at a flat parameter vector.
     pub fn cost(&mut self, parameters: &[f64]) -> f64 {
-        self.table.radiance(self.model, parameters, &mut self.radiance);
+        match &self.direct {
+            None => self.table.radiance(self.model, parameters, &mut self.radiance),
+            Some(direct) => direct.radiance(self.model, parameters, &mut self.radiance),
+        }
         cost(&self.compression, self.weights, &self.reference, &self.radiance)
     }
 

@@ -6,6 +6,7 @@
 //!
 //! The graph depends on the inputs alone, never on the number of workers or the order in which nodes finish.
 
+mod direct;
 mod limits;
 mod pictures;
 mod pixels;
@@ -36,7 +37,7 @@ use crate::{
     brdf::flat_bounds,
     graph::{Blob, BlobHash, GraphEdit, Input, NodeFailure, NodeId, NodeSpec, Placement, PlanError, Planner},
     image::Image,
-    light::Environment,
+    light::{Environment, LightDistribution},
     metric::ErrorMap,
     render::{
         subset::PixelSubset,
@@ -89,6 +90,8 @@ pub struct FitPlanner {
     /// The encoded light, if somebody else has encoded it.
     light: Option<Blob>,
     environment: Option<BlobHash>,
+    /// The light for the direct integrator, once something was checked by it.
+    distribution: Option<Arc<LightDistribution>>,
     view: Option<BlobHash>,
     searches: BTreeMap<NodeId, usize>,
     /// The parts of tables that have not come yet.
@@ -155,6 +158,7 @@ impl FitPlanner {
             stage_two: Placement::Coordinator,
             light: None,
             environment: None,
+            distribution: None,
             view: None,
             shards: BTreeMap::new(),
             searches: BTreeMap::new(),
@@ -217,6 +221,7 @@ impl FitPlanner {
 
     fn add_searches(&mut self, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
         let model = self.method.model;
+        let (direct, of_scene) = self.direct_searches(graph)?;
         for (s, subset) in self.subsets.clone().into_iter().enumerate() {
             let list = add(graph, "list of pixels", &subset.pixels)?;
             let photo = photo_at(&self.capture, &subset);
@@ -227,6 +232,7 @@ impl FitPlanner {
                 (subset.pixels.len(), if subset.pixels.len() > 4096 { FULL_SHARD } else { SUBSET_SHARD });
             let knots = stage_one_knots(&self.method);
             inputs.extend(self.add_transport(graph, &what, (list, count, shard), knots, Accuracy::SUBSET)?);
+            inputs.extend(of_scene.iter().copied());
             for (g, &gamma) in self.method.gammas.iter().enumerate() {
                 let parameters = SearchParameters {
                     model: model.name().to_owned(),
@@ -236,6 +242,7 @@ impl FitPlanner {
                     pattern: self.method.search == SearchKind::Pattern,
                     paper_start: self.method.start == Start::Paper,
                     clamp_at_zero: self.method.at_zero == AtZero::Clamp,
+                    direct: direct.clone(),
                 };
                 let of_subset = if self.subsets.len() == 1 { String::new() } else { format!(", subset {s}") };
                 let node = graph.add_node(NodeSpec {
@@ -324,10 +331,20 @@ impl FitPlanner {
         use_it: impl FnOnce(&mut Objective<'_>) -> T,
     ) -> Result<T, PlanError> {
         let s = candidate.subset as usize;
+        let light = self.distribution();
+        let mut tables = std::mem::take(&mut self.tables_of_subsets);
         let (subset, search) = (&self.subsets[s], self.search_of_subset[s]);
-        let table = self.tables_of_subsets.get(s, self.method.model, search, graph)?;
+        let table = tables.get(s, self.method.model, search, graph);
         let photo = photo_at(&self.capture, subset);
-        Ok(use_it(&mut objective_of(&self.method, candidate.gamma, table, subset, &photo, self.mean_radiance)))
+        let used = table.map(|table| {
+            let mut objective = objective_of(&self.method, candidate.gamma, table, subset, &photo, self.mean_radiance);
+            if let Some(direct) = self.direct_pixels(light.as_deref(), &subset.pixels) {
+                objective = objective.rendered_by(direct);
+            }
+            use_it(&mut objective)
+        });
+        self.tables_of_subsets = tables;
+        used
     }
 
     fn searched(&mut self, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {

@@ -2,6 +2,7 @@
 
 use super::{
     candidate::Candidate,
+    direct::DirectPixels,
     method::{AtZero, Method, SearchKind, Start},
     objective::{Objective, flat_roles},
     scan::scan,
@@ -40,7 +41,8 @@ pub enum SearchFailure {
 }
 
 /// Minimises `C(A, B, gamma)` over the parameters. `photo` holds the subset's pixels, `mean_radiance` the photo's mean
-/// luminance over all usable pixels (it places the knee of the compression, the same for every gamma and subset).
+/// luminance over all usable pixels (it places the knee of the compression, the same for every gamma and subset). With `direct` the
+/// cost is that of direct renderings, and the table says only where to start.
 ///
 /// # Errors
 /// When no search from any start succeeds.
@@ -51,10 +53,14 @@ pub fn search_gamma(
     subset: &PixelSubset,
     photo: &[[f32; 3]],
     mean_radiance: f64,
+    direct: Option<DirectPixels<'_>>,
 ) -> Result<Candidate, SearchFailure> {
     let fail = |source| SearchFailure::Search { gamma, source };
     let bounds = search_bounds(method.model, method.search).map_err(fail)?;
     let mut objective = objective_of(method, gamma, table, subset, photo, mean_radiance);
+    if let Some(direct) = direct {
+        objective = objective.rendered_by(direct);
+    }
     let starts = match method.start {
         Start::Paper => vec![paper_start(method.model)],
         Start::Scan => scan(method.model, table, &subset.weights, photo),

@@ -51,6 +51,7 @@ impl FitIdentity<'_> {
             ("--sampling", name_of(&settings.sampling)),
             ("--subsets", settings.subsets.to_string()),
             ("--search", name_of(&settings.search)),
+            ("--integrator", settings.integrator.to_string()),
             ("the start of the searches (--preset)", format!("{:?}", settings.start).to_lowercase()),
             ("compression at zero (--preset)", format!("{:?}", settings.compress_at_zero).to_lowercase()),
             ("--polish", if settings.polish { "on" } else { "off" }.to_owned()),

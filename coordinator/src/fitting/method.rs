@@ -4,7 +4,7 @@ use crate::settings::{self, MethodSettings};
 use anyhow::Context;
 use lookalike::{
     brdf,
-    fit::{AtZero, JudgedBy, Method, SearchKind, Start},
+    fit::{AtZero, Integration, JudgedBy, Method, SearchKind, Start},
     render::subset::{SampleCount, Sampling},
 };
 
@@ -28,6 +28,10 @@ pub(crate) fn method(settings: &MethodSettings) -> anyhow::Result<Method> {
         search: match settings.search {
             settings::SearchKind::LeastSquares => SearchKind::LeastSquares,
             settings::SearchKind::Pattern => SearchKind::Pattern,
+        },
+        integration: match settings.integrator {
+            settings::Integrator::Tables => Integration::Tables,
+            settings::Integrator::Direct(samples) => Integration::Direct { samples: samples.get() },
         },
         start: match settings.start {
             settings::Start::Scan => Start::Scan,

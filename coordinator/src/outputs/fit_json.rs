@@ -87,6 +87,7 @@ impl FitRecord<'_> {
             "subsets": self.method.subsets,
             "seed": self.method.seed,
             "search": name_of(&self.settings.search),
+            "integrator": self.settings.integrator.to_string(),
             "start": format!("{:?}", self.method.start).to_lowercase(),
             "at_zero": format!("{:?}", self.method.at_zero).to_lowercase(),
             "gammas": self.method.gammas,

@@ -1,8 +1,8 @@
 //! The settings of `lookalike fit`.
 
 use super::{
-    Circle, ClusterSettings, CompressAtZero, DisplayExposure, EnvironmentSettings, Gammas, Judge, MetricsAddress,
-    ModelName, Preset, ProgressKind, Samples, Sampling, SearchKind, Start, ViewSettings,
+    Circle, ClusterSettings, CompressAtZero, DisplayExposure, EnvironmentSettings, Gammas, Integrator, Judge,
+    MetricsAddress, ModelName, Preset, ProgressKind, Samples, Sampling, SearchKind, Start, ViewSettings,
 };
 use std::{num::NonZeroUsize, path::PathBuf};
 
@@ -54,6 +54,8 @@ pub struct MethodSettings {
     pub subsets: NonZeroUsize,
     /// How the cost is minimised.
     pub search: SearchKind,
+    /// How the searches render their pixels.
+    pub integrator: Integrator,
     /// Where the searches start.
     pub start: Start,
     /// What compression does near zero.
@@ -77,6 +79,7 @@ impl Default for MethodSettings {
             sampling: Sampling::default(),
             subsets: NonZeroUsize::MIN,
             search: SearchKind::default(),
+            integrator: Integrator::default(),
             start: Start::default(),
             compress_at_zero: CompressAtZero::default(),
             polish: true,

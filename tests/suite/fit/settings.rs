@@ -62,6 +62,17 @@ fn pattern_search_finds_about_the_minimum_of_least_squares_with_many_more_evalua
 }
 
 #[test]
+fn direct_integrator_is_searched_by_pattern_only() {
+    let flags = "--preset paper --gammas 1.5 --samples 4";
+    let (direct, tables) = (quick(&format!("{flags} --integrator direct:8")), quick(flags));
+    assert_eq!((direct["integrator"].as_str(), tables["integrator"].as_str()), (Some("direct:8"), Some("tables")));
+    assert_ne!(direct["candidates"][0]["cost"], tables["candidates"][0]["cost"]);
+    let folder = folder();
+    fit(folder.path(), "out", &format!("{QUICK} --integrator direct"))
+        .refused(&["--integrator direct", "--search pattern"]);
+}
+
+#[test]
 fn preset_paper_is_the_method_of_the_paper() {
     let json = quick("--preset paper");
     // Flags given as well win over it: those of the quick fit.

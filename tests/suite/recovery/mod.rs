@@ -49,7 +49,7 @@ impl Session {
     fn search(&self, gamma: f64, search: SearchKind, start: Start) -> Candidate {
         let method = Method { model: self.model, search, start, ..Method::default() };
         let Photograph { subset, pixels, mean_radiance, .. } = &self.photo;
-        search_gamma(&method, gamma, &self.table, subset, pixels, *mean_radiance).unwrap()
+        search_gamma(&method, gamma, &self.table, subset, pixels, *mean_radiance, None).unwrap()
     }
 
     fn prediction(&self, gamma: f64) -> Prediction {

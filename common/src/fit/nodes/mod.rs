@@ -14,7 +14,7 @@ use crate::graph::Registry;
 
 pub(super) use polish::PolishParameters;
 pub(super) use report::{ReportParameters, ReportWire};
-pub(super) use search::SearchParameters;
+pub(super) use search::{DirectWire, SearchParameters};
 pub(super) use select::SelectParameters;
 pub(super) use transport::TransportParameters;
 pub(super) use view::{ViewWire, joined};

@@ -1,17 +1,22 @@
 //! `search`: stage one for one gamma on one pixel subset.
 //!
-//! Inputs: subset with the photo's values; the shards of its transport table, in order.
+//! Inputs: subset with the photo's values; the shards of its transport table, in order; for the direct integrator then the
+//! environment, and the normal map, if the surface has one.
 
 use super::view::concatenated;
 use crate::{
     brdf,
     fit::{
-        AtZero, Method, SearchKind, Start, search_gamma,
-        wire::{CandidateWire, SubsetWire, read, write},
+        AtZero, DirectPixels, Method, SearchKind, Start, search_gamma,
+        wire::{CandidateWire, EnvironmentWire, ImageWire, SubsetWire, read, write},
     },
     graph::{Blob, NodeFailure, NodeType, RunContext},
+    light::LightDistribution,
+    render::transport::Pixel,
+    scene::{Geometry, GeometrySpec},
 };
 use serde::{Deserialize, Serialize};
+use std::sync::Arc;
 
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(in crate::fit) struct SearchParameters {
@@ -23,6 +28,52 @@ pub(in crate::fit) struct SearchParameters {
     pub(in crate::fit) pattern: bool,
     pub(in crate::fit) paper_start: bool,
     pub(in crate::fit) clamp_at_zero: bool,
+    pub(in crate::fit) direct: Option<DirectWire>,
+}
+
+/// The direct integrator in place of the table.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub(in crate::fit) struct DirectWire {
+    pub(in crate::fit) geometry: GeometrySpec,
+    pub(in crate::fit) has_normals: bool,
+    pub(in crate::fit) samples: u32,
+    pub(in crate::fit) seed: u64,
+}
+
+/// A scene for the direct integrator.
+#[derive(Debug)]
+struct Scene {
+    geometry: Geometry,
+    light: Arc<LightDistribution>,
+    samples: u32,
+    seed: u64,
+}
+
+impl Scene {
+    fn read(wire: &DirectWire, inputs: &[Blob], context: &RunContext) -> Result<Self, NodeFailure> {
+        let [environment, normals @ ..] = inputs else {
+            return Err(NodeFailure::new("the direct integrator takes an environment, found none"));
+        };
+        let light = context.decoded(environment, |bytes| {
+            let environment = read::<EnvironmentWire>("environment", bytes)?.environment()?;
+            Ok(LightDistribution::new(Arc::new(environment)))
+        })?;
+        let map = |bytes: &[u8]| read::<ImageWire>("normal map", bytes)?.image();
+        let normals = normals.first().map(|blob| context.decoded(blob, map)).transpose()?;
+        let geometry = Geometry::from_spec(&wire.geometry, normals.as_deref())
+            .map_err(|error| NodeFailure::new(error.to_string()))?;
+        Ok(Self { geometry, light, samples: wire.samples, seed: wire.seed })
+    }
+
+    /// These pixels of it, all inside the image.
+    fn pixels<'a>(&'a self, pixels: &'a [Pixel]) -> Result<DirectPixels<'a>, NodeFailure> {
+        let (geometry, light) = (&self.geometry, &*self.light);
+        let outside = |p: &&Pixel| p[0] as usize >= geometry.width() || p[1] as usize >= geometry.height();
+        match pixels.iter().find(outside) {
+            Some(pixel) => Err(NodeFailure::new(format!("pixel {pixel:?} lies outside the image"))),
+            None => Ok(DirectPixels { geometry, light, pixels, samples: self.samples, seed: self.seed }),
+        }
+    }
 }
 
 #[derive(Debug)]
@@ -41,6 +92,13 @@ impl NodeType for Search {
         let subset_wire = context.decoded(subset, |bytes| read::<SubsetWire>("pixel subset", bytes))?;
         let subset = subset_wire.subset()?;
         let model = brdf::model(&parameters.model).map_err(|error| NodeFailure::new(error.to_string()))?;
+        let scene_inputs = parameters.direct.as_ref().map_or(0, |direct| 1 + usize::from(direct.has_normals));
+        let Some((shards, of_scene)) = shards.len().checked_sub(scene_inputs).map(|at| shards.split_at(at)) else {
+            return Err(NodeFailure::new(
+                "the direct integrator takes a table and an environment, found too few inputs",
+            ));
+        };
+        let scene = parameters.direct.as_ref().map(|wire| Scene::read(wire, of_scene, context)).transpose()?;
         let table = concatenated(model, shards, context)?;
         if table.pixels != subset.pixels.len() {
             let (expected, found) = (subset.pixels.len(), table.pixels);
@@ -59,7 +117,8 @@ impl NodeType for Search {
             ..Method::default()
         };
         let mean = parameters.mean_radiance;
-        let mut candidate = search_gamma(&method, parameters.gamma, &table, &subset, &subset_wire.photo, mean)?;
+        let direct = scene.as_ref().map(|scene| scene.pixels(&subset.pixels)).transpose()?;
+        let mut candidate = search_gamma(&method, parameters.gamma, &table, &subset, &subset_wire.photo, mean, direct)?;
         candidate.subset = parameters.subset;
         write("candidate", &CandidateWire::of(&candidate))
     }

@@ -24,7 +24,7 @@ use std::{
 pub(super) struct SubsetTables(BTreeMap<usize, TransportTable>);
 
 impl SubsetTables {
-    /// The table of subset `s`, which the node `search` reads: its inputs but the first are the shards.
+    /// The table of subset `s`, which the node `search` reads: of its inputs, those that are outputs are the shards.
     pub(super) fn get(
         &mut self,
         s: usize,
@@ -46,14 +46,11 @@ impl SubsetTables {
 
 fn table_of(model: &dyn Model, search: NodeId, graph: &GraphEdit<'_>) -> Result<TransportTable, PlanError> {
     let inputs = &graph.spec(search).ok_or_else(missing)?.inputs;
-    let shard = |input: &Input| {
-        let blob = match *input {
-            Input::Blob(hash) => graph.blob(hash),
-            Input::OutputOf(node) => graph.output(node),
-        };
+    let shard = |shard: NodeId| {
+        let blob = graph.output(shard);
         read::<TableWire>("transport table", blob.ok_or_else(missing)?).and_then(TableWire::table).map_err(other)
     };
-    let shards = inputs.iter().skip(1).map(shard).collect::<Result<Vec<_>, _>>()?;
+    let shards = inputs.iter().filter_map(Input::node).map(shard).collect::<Result<Vec<_>, _>>()?;
     joined(model, &shards.iter().collect::<Vec<_>>()).map_err(other)
 }
 

@@ -1,5 +1,6 @@
 //! The method and its plan on scenes that are small enough for a unit test.
 
+mod direct;
 mod planner;
 mod polish;
 mod recovery;

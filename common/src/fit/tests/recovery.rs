@@ -11,7 +11,7 @@ const KNOWN: [(&str, &[f64]); 3] = [
 ];
 
 fn search(method: &Method, scene: &StageOne, gamma: f64) -> Candidate {
-    search_gamma(method, gamma, &scene.table, &scene.subset, &scene.photo, 0.5).unwrap()
+    search_gamma(method, gamma, &scene.table, &scene.subset, &scene.photo, 0.5, None).unwrap()
 }
 
 #[test]

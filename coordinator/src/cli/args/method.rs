@@ -2,7 +2,7 @@
 
 use super::super::preset;
 use crate::settings::{
-    DisplayExposure, Gammas, Judge, MethodSettings, ModelName, Preset, Samples, Sampling, SearchKind,
+    DisplayExposure, Gammas, Integrator, Judge, MethodSettings, ModelName, Preset, Samples, Sampling, SearchKind,
 };
 use clap::{Args, ValueEnum};
 use std::num::NonZeroUsize;
@@ -32,6 +32,10 @@ pub(crate) struct MethodArgs {
     /// How the cost is minimised
     #[arg(long, value_name = "SEARCH", value_enum, default_value_t)]
     search: SearchKind,
+    /// How the searches render their pixels: by transport tables, or direct[:SAMPLES], by Monte Carlo integration in every
+    /// evaluation as in the paper, which takes thousands of times longer and needs --search pattern
+    #[arg(long, value_name = "INTEGRATOR", default_value_t)]
+    integrator: Integrator,
     /// Whether the winner is refined on the metric itself; its result is reported apart
     #[arg(long, value_name = "on|off", value_enum, default_value_t = Switch::On)]
     polish: Switch,
@@ -56,6 +60,7 @@ impl MethodArgs {
             sampling: self.sampling,
             subsets: self.subsets,
             search: self.search,
+            integrator: self.integrator,
             start: preset::start(self.preset),
             compress_at_zero: preset::compress_at_zero(self.preset),
             polish: matches!(self.polish, Switch::On),
