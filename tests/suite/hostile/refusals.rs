@@ -2,7 +2,8 @@
 
 use super::{PROGRAM, WORKER, run_at_the_gate, worker};
 use lookalike::protocol::{
-    Access, CHALLENGE_BYTES, Challenge, PROTOCOL_VERSION, RESPONSE_BYTES, Secret, VERDICT_BYTES, Verdict,
+    Access, CHALLENGE_BYTES, Challenge, PROTOCOL_VERSION, ProofKey, RESPONSE_BYTES, Response, RunName, Secret,
+    ToCoordinator, ToWorker, VERDICT_BYTES, Verdict, Welcome,
 };
 use lookalike_coordinator::access::{Credentials, Identity};
 use lookalike_coordinator::runner::RunnerOptions;
@@ -10,8 +11,10 @@ use lookalike_tests::cluster::{Cluster, options};
 use lookalike_tests::gate::Gate;
 use lookalike_tests::plan::Leaves;
 use lookalike_tests::process::{Process, stderr};
-use lookalike_tests::stranger::{FalseCoordinator, challenge, connect_tls, greet, identity, read_to_the_end, tls_of};
-use lookalike_worker::tls::provider;
+use lookalike_tests::stranger::{
+    FalseCoordinator, TlsServer, challenge, connect_tls, greet, identity, read_message, read_to_the_end, tell, tls_of,
+};
+use lookalike_worker::tls::{channel_binding, provider};
 use rustls::server::{ClientHello, ResolvesServerCert};
 use rustls::sign::CertifiedKey;
 use std::io::{Read, Write};
@@ -226,7 +229,7 @@ fn coordinator_that_falls_silent_is_left_and_called_again() {
     let address = coordinator.address().to_string();
     let access = Access { address, certificate: known.pin(), secret: Secret::from_bytes([7; 32]) };
     let _worker = start(&folder, &access);
-    let mut names = Vec::new();
+    let (mut names, mut silent) = (Vec::new(), Vec::new());
     for _ in 0..2 {
         let mut stream = coordinator.next_tls(&tls_of(&known)).unwrap();
         let asked = Challenge::new([1; 32]);
@@ -245,7 +248,7 @@ fn coordinator_that_falls_silent_is_left_and_called_again() {
             tell(&mut stream, &ToWorker::Heartbeat);
             while !matches!(read_message(&mut stream), ToCoordinator::Heartbeat { .. }) {}
         }
-        std::mem::forget(stream);
+        silent.push(stream);
     }
     assert_eq!(names[0], names[1], "it is the same process");
 }
