@@ -106,11 +106,9 @@ impl LocalWorkers {
     ) -> Result<JoinSet<()>, RunError> {
         let mut first: Vec<_> = orphans
             .iter()
-            .map(|process| Place::Orphan(Orphan {
-                    process: *process,
-                    access: self.access.clone(),
-                    present: present.subscribe(),
-                }))
+            .map(|process| {
+                Place::Orphan(Orphan { process: *process, access: self.access.clone(), present: present.subscribe() })
+            })
             .collect();
         for _ in orphans.len()..self.count {
             let process =

@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use lookalike::graph::{Blob, BlobHash, DecodedCache, Registry, RunContext};
 use lookalike::protocol::{
-    Access, Assignment, FailureKind, Hello, IncomingBlob, ProofKey, ToCoordinator, ToWorker, Welcome,
+    Access, Assignment, FailureKind, Hello, IncomingBlob, ProcessName, ProofKey, ToCoordinator, ToWorker, Welcome,
 };
 use lookalike_worker::tls::{channel_binding, connect};
 use lookalike_worker::wire::{Incoming, Parcel, Received, WireError, greet_coordinator, send_message};

@@ -8,8 +8,9 @@ use std::sync::atomic::{AtomicU8, Ordering};
 use std::time::{Duration, SystemTime};
 
 use lookalike::protocol::{
-    Access, CHALLENGE_BYTES, Challenge, CodecError, FrameReader, FrameTag, Hello, ProcessName, ProofKey, RESPONSE_BYTES, Response,
-    Secret, ToCoordinator, ToWorker, VERDICT_BYTES, Verdict, decode_message, encode_message, frame_header,
+    Access, CHALLENGE_BYTES, Challenge, CodecError, FrameReader, FrameTag, Hello, ProcessName, ProofKey,
+    RESPONSE_BYTES, Response, Secret, ToCoordinator, ToWorker, VERDICT_BYTES, Verdict, decode_message, encode_message,
+    frame_header,
 };
 use lookalike_coordinator::access::Identity;
 use lookalike_coordinator::tls::server_config;

@@ -30,8 +30,8 @@ pub use handshake::{
     VERDICT_BYTES, Verdict,
 };
 pub use message::{
-    Assignment, Executing, FailureKind, Hello, LeaseName, MAX_MESSAGE_TEXT_BYTES, ProcessName, RunName, ToCoordinator, ToWorker,
-    Welcome, bounded_text,
+    Assignment, Executing, FailureKind, Hello, LeaseName, MAX_MESSAGE_TEXT_BYTES, ProcessName, RunName, ToCoordinator,
+    ToWorker, Welcome, bounded_text,
 };
 pub use transfer::{IncomingBlob, PART_BYTES, TransferError, parts};
 pub use version::{MAGIC, PROTOCOL_VERSION};

@@ -7,7 +7,14 @@ use crate::graph::{BlobHash, MAX_BLOB_BYTES};
 const LEASE: LeaseName = LeaseName { node: 300, attempt: 2, epoch: 1 };
 
 fn to_worker() -> Vec<ToWorker> {
-    let welcome = Welcome { worker: 7, run: RunName([9; 16]), epoch: 1, heartbeat_ms: 1000, silence_ms: 15_000, drain_ms: 30_000 };
+    let welcome = Welcome {
+        worker: 7,
+        run: RunName([9; 16]),
+        epoch: 1,
+        heartbeat_ms: 1000,
+        silence_ms: 15_000,
+        drain_ms: 30_000,
+    };
     let assignment = Assignment {
         lease: LEASE,
         kind: "search".into(),

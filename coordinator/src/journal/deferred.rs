@@ -175,9 +175,8 @@ mod tests {
         transaction.rollback().unwrap();
         deferred.take(&Batch { attempts: vec![ended(7, Some(2), Outcome::Finished)], ..Batch::default() });
         deferred.written(deferred.write(&connection).unwrap());
-        let finished: u64 = connection
-            .query_row("SELECT count(*) FROM attempts WHERE outcome = 0", [], |row| row.get(0))
-            .unwrap();
+        let finished: u64 =
+            connection.query_row("SELECT count(*) FROM attempts WHERE outcome = 0", [], |row| row.get(0)).unwrap();
         assert_eq!(finished, 1);
     }
 

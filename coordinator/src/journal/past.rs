@@ -122,9 +122,8 @@ fn past(connection: &Connection, results: usize) -> rusqlite::Result<Past> {
          WHERE ended_ms IS NULL AND left_ms IS NULL AND seen_ms > ?1 ORDER BY 1",
     )?;
     let since = unix_ms() - LONGEST_WAIT_MS;
-    let worker = |row: &Row<'_>| {
-        Ok(WorkerProcess { id: row.get(0)?, name: ProcessName(row.get(1)?), is_local: row.get(2)? })
-    };
+    let worker =
+        |row: &Row<'_>| Ok(WorkerProcess { id: row.get(0)?, name: ProcessName(row.get(1)?), is_local: row.get(2)? });
     past.workers = statement.query_map([since], worker)?.collect::<rusqlite::Result<_>>()?;
     Ok(past)
 }

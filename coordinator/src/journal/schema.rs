@@ -152,7 +152,8 @@ pub(super) fn create(
     made?;
     std::fs::rename(&unfinished, path).map_err(creating)?;
     // A file system that cannot synchronise a folder has its own way to keep names.
-    let _ = path.parent().map(std::fs::File::open).transpose().and_then(|folder| folder.map_or(Ok(()), |it| it.sync_all()));
+    let _ =
+        path.parent().map(std::fs::File::open).transpose().and_then(|folder| folder.map_or(Ok(()), |it| it.sync_all()));
     connect(path, is_shared(path))
 }
 

@@ -81,7 +81,8 @@ pub(super) fn found(
 /// Whether a worker may have a node that it executes: it is not done, not to be run alone, and at most one other one executes it.
 fn may_go_on(core: &Core, worker: WorkerId, node: NodeId) -> bool {
     let (Some(member), Some(record)) = (core.members.get(worker), core.look(node)) else { return false };
-    let is_begun = |holder: &&WorkerId| core.members.get(**holder).is_some_and(|holder| !holder.waiting.contains(&node));
+    let is_begun =
+        |holder: &&WorkerId| core.members.get(**holder).is_some_and(|holder| !holder.waiting.contains(&node));
     let is_free = !member.leases.contains_key(&node) && member.alone_with.is_none();
     let is_wanted = core.graph.state(node) == Some(&NodeState::Ready) && !core.is_suspect(node);
     let is_other = !schedule::is_origin(core, node, worker);

@@ -310,7 +310,8 @@ impl World {
                 let departures =
                     [Departure::Lost, Departure::Silent, Departure::Goodbye, Departure::TooSlow, violation];
                 let departure = departures[usize::from(departure)].clone();
-                let at_it = self.connected[&worker].iter().filter(|(node, _)| self.executing.contains(&(worker, **node)));
+                let at_it =
+                    self.connected[&worker].iter().filter(|(node, _)| self.executing.contains(&(worker, **node)));
                 let at_it = at_it.map(|(node, attempt)| (*node, *attempt)).collect();
                 let name = self.processes[&worker];
                 self.lose(worker, departure);

@@ -390,7 +390,10 @@ fn silent_worker_is_lost_after_its_lease_ends_and_any_sign_of_life_renews_it() {
     bench.start(A, 0, 1);
     assert_eq!(bench.core.next_deadline(), Some(Duration::from_secs(5)));
     assert!(bench.pass_time(4).unwrap().is_empty());
-    bench.handle(Event::Heartbeat { worker: A, executing: vec![Executing { node: NodeId(0), attempt: 1, permille: 400 }] });
+    bench.handle(Event::Heartbeat {
+        worker: A,
+        executing: vec![Executing { node: NodeId(0), attempt: 1, permille: 400 }],
+    });
     assert_eq!(bench.core.next_deadline(), Some(Duration::from_secs(9)));
     assert!(bench.pass_time(4).unwrap().is_empty());
     assert_eq!(bench.pass_time(1).unwrap(), ["worker 1 is thrown out", "n0 requeued, 0"]);

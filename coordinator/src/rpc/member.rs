@@ -198,9 +198,7 @@ impl<R: AsyncRead + Unpin> Reader<R> {
                 let (executing, ours) = (earlier.collect(), self.ours(&executing));
                 return Ok(Some(Inbound::Reported { worker, executing, ours }));
             }
-            ToCoordinator::Heartbeat { executing } => {
-                Event::Heartbeat { worker, executing: self.ours(&executing) }
-            }
+            ToCoordinator::Heartbeat { executing } => Event::Heartbeat { worker, executing: self.ours(&executing) },
             ToCoordinator::Started(lease) if self.is_ours(lease)? => {
                 let event = Event::Started { worker, node: NodeId(lease.node), attempt: lease.attempt };
                 return Ok(Some(Inbound::Timed { arrived: self.incoming.heard(), event }));
@@ -369,10 +367,9 @@ mod tests {
     async fn worker_hears_of_its_coordinator_as_often_as_that_one_of_it() {
         let (near, far) = duplex(1 << 20);
         let (mailbox, postman) = mailbox(1000);
-        let writing =
-            tokio::spawn(
-                async move { write(Patient::new(near, HEARTBEAT), postman, HEARTBEAT, &AtomicUsize::new(0)).await },
-            );
+        let writing = tokio::spawn(async move {
+            write(Patient::new(near, HEARTBEAT), postman, HEARTBEAT, &AtomicUsize::new(0)).await
+        });
         let mut incoming = Incoming::new(far);
         let began = Instant::now();
         for _ in 0..5 {

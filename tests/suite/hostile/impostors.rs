@@ -15,7 +15,9 @@ use lookalike_tests::gate::{Gate, Waiting};
 use lookalike_tests::plan::{Leaves, TestPlanner};
 use lookalike_tests::process::{Process, stderr};
 use lookalike_tests::proxy::Proxy;
-use lookalike_tests::stranger::{TlsClient, connect, connect_tls, greet, hear, hello, join, read_to_the_end, say, say_frame};
+use lookalike_tests::stranger::{
+    TlsClient, connect, connect_tls, greet, hear, hello, join, read_to_the_end, say, say_frame,
+};
 
 use super::{PROGRAM, run_at_the_gate, run_within, worker};
 

@@ -45,6 +45,7 @@ fn what_was_stopped_has_no_opinion_and_nodes_here_are_stopped_at_once() {
     bench.join(A, 1);
     let said = bench.finish(A, 0, 1, 0);
     assert!(said.contains(&"stop 1 here".to_owned()), "{said:?}");
-    let stopped = Event::Failed { site: Site::Coordinator, node: NodeId(1), attempt: 1, failure: NodeFailure::Cancelled };
+    let stopped =
+        Event::Failed { site: Site::Coordinator, node: NodeId(1), attempt: 1, failure: NodeFailure::Cancelled };
     assert!(bench.handle(stopped).is_empty());
 }
