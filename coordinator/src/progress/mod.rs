@@ -133,6 +133,11 @@ fn remark(event: &RunEvent) -> Option<String> {
             "warning: {deaths} workers have died while they computed {}: from now on it runs alone",
             name.label
         )),
+        RunEvent::AnswersDiffer { name, first, second, error } => Some(format!(
+            "warning: {} has an output and an error ({error}), one from {first} and one from {second}: one of these machines is not to \
+             be trusted",
+            name.label
+        )),
         RunEvent::NodeSpeculated { name, worker } => {
             Some(format!("{} is slow: {worker} computes it too, and the first answer counts", name.label))
         }
