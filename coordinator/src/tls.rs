@@ -6,7 +6,7 @@ use std::sync::Arc;
 use lookalike_worker::tls::{Transport, provider, transport};
 use rustls::ServerConfig;
 use rustls::server::NoServerSessionStorage;
-use tokio::net::TcpStream;
+use tokio::io::{AsyncRead, AsyncWrite};
 use tokio_rustls::{TlsAcceptor, server};
 
 use crate::access::Identity;
@@ -31,6 +31,9 @@ pub fn server_config(identity: &Identity) -> Result<ServerConfig, rustls::Error>
 ///
 /// # Errors
 /// When the stream fails, or the other side does not speak TLS 1.3.
-pub async fn accept(acceptor: &TlsAcceptor, stream: TcpStream) -> io::Result<server::TlsStream<Transport>> {
+pub async fn accept<S>(acceptor: &TlsAcceptor, stream: S) -> io::Result<server::TlsStream<Transport<S>>>
+where
+    S: AsyncRead + AsyncWrite + Unpin,
+{
     acceptor.accept(transport(stream)).await
 }

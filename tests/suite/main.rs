@@ -27,4 +27,5 @@ mod program;
 mod recovery;
 mod render;
 mod resume;
+mod sim;
 mod tidy;

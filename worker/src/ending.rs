@@ -7,11 +7,11 @@ use tracing::info;
 
 /// The wishes that this process shall end.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Wishes {
+pub struct Wishes {
     /// Cancelled by the first SIGTERM or Ctrl-C: finish what is begun, then end.
-    pub(crate) drain: CancellationToken,
+    pub drain: CancellationToken,
     /// Cancelled by the second, and as the leash says: end at once.
-    pub(crate) end: CancellationToken,
+    pub end: CancellationToken,
 }
 
 /// What the end of stdin means to a worker.

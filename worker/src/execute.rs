@@ -1,11 +1,11 @@
 //! Jobs to results: the compute pool.
 
-use std::num::NonZeroUsize;
 use std::sync::Arc;
 
 use lookalike::graph::{Blob, DecodedCache, NodeFailure, Registry, RunContext};
-use rayon::{ThreadPool, ThreadPoolBuilder};
 use tokio::sync::mpsc::UnboundedSender;
+
+use crate::world::Pool;
 
 /// One execution of one node: all it needs.
 #[derive(Debug)]
@@ -25,25 +25,23 @@ pub(crate) struct Completed {
     pub(crate) result: Result<Blob, NodeFailure>,
 }
 
-/// Runs jobs on a rayon pool of its own. Dropped, it does not wait for running jobs: they end with the process.
+/// Runs jobs on a pool.
 #[derive(Debug)]
-pub(crate) struct Executor {
-    pool: ThreadPool,
+pub(crate) struct Executor<P> {
+    pool: P,
     registry: Arc<Registry>,
     decoded: Arc<DecodedCache>,
     completed: UnboundedSender<Completed>,
 }
 
-impl Executor {
+impl<P: Pool> Executor<P> {
     pub(crate) fn new(
-        threads: NonZeroUsize,
+        pool: P,
         registry: Registry,
         decoded_bytes: usize,
         completed: UnboundedSender<Completed>,
-    ) -> Result<Self, rayon::ThreadPoolBuildError> {
-        let name = |index| format!("compute-{index}");
-        let pool = ThreadPoolBuilder::new().num_threads(threads.get()).thread_name(name).build()?;
-        Ok(Self { pool, registry: Arc::new(registry), decoded: Arc::new(DecodedCache::new(decoded_bytes)), completed })
+    ) -> Self {
+        Self { pool, registry: Arc::new(registry), decoded: Arc::new(DecodedCache::new(decoded_bytes)), completed }
     }
 
     /// The surroundings for one execution.
@@ -51,11 +49,11 @@ impl Executor {
         RunContext::new(Arc::clone(&self.decoded))
     }
 
-    /// Begin to execute a job. Its result goes to the channel; its parallel iterators use the pool.
+    /// Begin to execute a job. Its result goes to the channel.
     pub(crate) fn start(&self, job: Job) {
         let registry = Arc::clone(&self.registry);
         let completed = self.completed.clone();
-        self.pool.spawn_fifo(move || {
+        self.pool.spawn(move || {
             let result = registry.run(&job.kind, &job.parameters, &job.inputs, &job.context);
             // Nobody listens any more when the process is about to end.
             let _ = completed.send(Completed { serial: job.serial, result });

@@ -15,6 +15,7 @@ mod session;
 mod tasks;
 pub mod tls;
 pub mod wire;
+pub mod world;
 
 #[cfg(test)]
 mod tests;
@@ -30,6 +31,9 @@ use tracing_subscriber::EnvFilter;
 pub use error::WorkerError;
 pub use options::{Arguments, WorkerOptions};
 
+use crate::ending::{Wishes, watch_for_the_end};
+use crate::world::{Real, World};
+
 /// Work for one coordinator until it ends the run, or the worker is asked to end (SIGTERM, Ctrl-C, the end of stdin with
 /// [`WorkerOptions::leash`]).
 ///
@@ -39,7 +43,23 @@ pub use options::{Arguments, WorkerOptions};
 pub fn run(options: &WorkerOptions, registry: Registry) -> Result<(), WorkerError> {
     // One thread is enough to talk; the cores belong to the pool.
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(WorkerError::Runtime)?;
-    runtime.block_on(session::run(options, registry))
+    runtime.block_on(async {
+        let wishes = watch_for_the_end(options.leash).map_err(WorkerError::Runtime)?;
+        run_in(Real, options, registry, wishes).await
+    })
+}
+
+/// The same in any world, on the runtime that there is, asked to end by `wishes` alone.
+///
+/// # Errors
+/// Those of [`run`].
+pub async fn run_in<W: World>(
+    world: W,
+    options: &WorkerOptions,
+    registry: Registry,
+    wishes: Wishes,
+) -> Result<(), WorkerError> {
+    session::run(world, options, registry, wishes).await
 }
 
 /// The program `lookalike-worker` with these node types and the process's own command line.

@@ -1,14 +1,13 @@
 //! The socket loop: connect, greet, serve one connection, and again while there is hope.
 
-use std::sync::{Arc, mpsc as blocking};
+use std::sync::Arc;
 use std::time::Duration;
 
 use lookalike::graph::{Blob, BlobHash, Registry};
 use lookalike::protocol::{
     Access, Hello, IncomingBlob, ProcessName, ProofKey, ToCoordinator, ToWorker, TransferError, Welcome,
 };
-use tokio::io::{AsyncWriteExt, ReadHalf, WriteHalf, split};
-use tokio::net::TcpStream;
+use tokio::io::{AsyncWrite, AsyncWriteExt, ReadHalf, WriteHalf, split};
 use tokio::sync::Notify;
 use tokio::sync::mpsc::{UnboundedReceiver, UnboundedSender, unbounded_channel};
 use tokio::task::JoinHandle;
@@ -17,13 +16,14 @@ use tokio_rustls::client::TlsStream;
 use tracing::{debug, info, warn};
 
 use crate::cache::BlobCache;
-use crate::ending::{Leash, Wishes, watch_for_the_end};
+use crate::ending::{Leash, Wishes};
 use crate::error::WorkerError;
 use crate::execute::{Completed, Executor};
 use crate::options::WorkerOptions;
 use crate::tasks::{Action, Tasks};
 use crate::tls::{self, TlsError, Transport};
 use crate::wire::{Incoming, Parcel, Received, WireError, greet_coordinator, is_small, send_message};
+use crate::world::World;
 
 /// How long connecting and greeting may take.
 const GREETING_TIME: Duration = Duration::from_secs(10);
@@ -41,17 +41,23 @@ const DRAIN_TIME: Duration = Duration::from_secs(30);
 const LONGEST_DRAIN: Duration = Duration::from_hours(24 * 365);
 
 /// Work until the coordinator ends the run or this process is asked to end.
-pub(crate) async fn run(options: &WorkerOptions, registry: Registry) -> Result<(), WorkerError> {
+pub(crate) async fn run<W: World>(
+    world: W,
+    options: &WorkerOptions,
+    registry: Registry,
+    wishes: Wishes,
+) -> Result<(), WorkerError> {
     let access = read_access(options)?;
     let address = options.address.clone().unwrap_or_else(|| access.address.clone());
-    let wishes = watch_for_the_end(options.leash).map_err(WorkerError::Runtime)?;
     let mut name = [0; 16];
-    getrandom::fill(&mut name).map_err(std::io::Error::other).map_err(WorkerError::Runtime)?;
+    world.fill_random(&mut name).map_err(WorkerError::Runtime)?;
     let (completed_sender, completed) = unbounded_channel();
     let threads = options.threads;
-    let executor = Executor::new(threads, registry, options.decoded_blob_bytes, completed_sender)?;
+    let pool = world.start_pool(threads)?;
+    let executor = Executor::new(pool, registry, options.decoded_blob_bytes, completed_sender);
     let tasks = Tasks::new(threads.get(), BlobCache::new(options.cached_blob_bytes));
     let mut session = Session {
+        world,
         address,
         access,
         name: ProcessName(name),
@@ -83,7 +89,8 @@ enum Ended {
     AskedToEnd,
 }
 
-struct Session {
+struct Session<W: World> {
+    world: W,
     address: String,
     access: Access,
     name: ProcessName,
@@ -96,12 +103,12 @@ struct Session {
     drain_time: Duration,
     /// It drains, at most until then.
     leave_by: Option<Instant>,
-    executor: Executor,
+    executor: Executor<W::Pool>,
     completed: UnboundedReceiver<Completed>,
     tasks: Tasks,
 }
 
-impl Session {
+impl<W: World> Session<W> {
     async fn keep_connected(&mut self, patience: Duration) -> Result<(), WorkerError> {
         let mut without_since = Instant::now();
         let mut pause = FIRST_PAUSE;
@@ -127,10 +134,11 @@ impl Session {
             info!(address = %self.address, %error, ?pause, "without coordinator, trying again");
             let wishes = self.wishes.clone();
             tokio::select! {
-                () = sleep(scattered(pause).min(patience - after)) => {}
-                () = sleep_until_some(self.leave_by) => {}
-                () = wishes.drain.cancelled(), if self.leave_by.is_none() => self.begin_to_drain(),
+                biased;
                 () = wishes.end.cancelled() => return Ok(()),
+                () = wishes.drain.cancelled(), if self.leave_by.is_none() => self.begin_to_drain(),
+                () = sleep_until_some(self.leave_by) => {}
+                () = sleep(self.scattered(pause).min(patience - after)) => {}
             }
             pause = (pause * 2).min(LONGEST_PAUSE);
         }
@@ -155,15 +163,16 @@ impl Session {
     async fn connect_and_serve(&mut self, was_welcome: &mut bool) -> Result<Ended, WireError> {
         let wishes = self.wishes.clone();
         let (incoming, writer, welcome) = tokio::select! {
-            greeted = timeout(GREETING_TIME, self.greet()) => greeted.map_err(|_| WireError::TimedOut)??,
+            biased;
             () = wishes.end.cancelled() => return Ok(Ended::AskedToEnd),
             () = wishes.drain.cancelled(), if self.tasks.are_done() => return Ok(Ended::AskedToEnd),
+            greeted = timeout(GREETING_TIME, self.greet()) => greeted.map_err(|_| WireError::TimedOut)??,
         };
         *was_welcome = true;
         info!(address = %self.address, worker = welcome.worker, "joined");
         let (outgoing, announced, mut writing) = start_writing(writer);
         let heart = Arc::new(Notify::new());
-        let heartbeat = start_heart(Duration::from_millis(welcome.heartbeat_ms.into()), Arc::clone(&heart));
+        let heartbeat = self.world.start_heart(Duration::from_millis(welcome.heartbeat_ms.into()), Arc::clone(&heart));
         let silence = Duration::from_millis(welcome.silence_ms.into());
         let mut connection = Connection { incoming, outgoing, announced, transfer: None, silence };
         self.drain_time = self.own_drain_time.unwrap_or(Duration::from_millis(welcome.drain_ms.into()));
@@ -178,6 +187,7 @@ impl Session {
         let actions = self.tasks.welcomed(welcome.run);
         self.act(&connection, actions);
         let ended = tokio::select! {
+            biased;
             ended = self.serve(&mut connection, &heart) => ended,
             ended = &mut writing => Err(ended.map_or(WireError::Ended, |written| written.err().unwrap_or(WireError::Ended))),
         };
@@ -192,20 +202,19 @@ impl Session {
         ended
     }
 
-    async fn greet(&self) -> Result<(Incoming<Reader>, Writer, Welcome), WireError> {
-        let stream = TcpStream::connect(&self.address).await?;
-        stream.set_nodelay(true)?;
+    async fn greet(&self) -> Result<(Incoming<Reader<W>>, Writer<W>, Welcome), WireError> {
+        let stream = self.world.connect(&self.address).await?;
         let mut stream = match tls::connect(stream, self.access.certificate).await {
             Ok(stream) => stream,
             Err(error) => return Err(TlsError::of_handshake(error)?.into()),
         };
         let channel = tls::channel_binding(stream.get_ref().1).map_err(std::io::Error::other)?;
         let mut nonce = [0; 32];
-        getrandom::fill(&mut nonce).map_err(std::io::Error::other)?;
+        self.world.fill_random(&mut nonce)?;
         greet_coordinator(&mut stream, &ProofKey::new(&self.access.secret, &channel), nonce).await?;
         let (reader, mut writer) = split(stream);
         let threads = u32::try_from(self.threads).unwrap_or(u32::MAX);
-        let (build, process) = (env!("CARGO_PKG_VERSION").to_owned(), std::process::id());
+        let (build, process) = (env!("CARGO_PKG_VERSION").to_owned(), self.world.process());
         let hello = Hello { build, threads, process, name: self.name, is_local: self.is_local };
         send_message(&mut writer, &ToCoordinator::Hello(hello)).await?;
         let mut incoming = Incoming::new(reader);
@@ -215,7 +224,7 @@ impl Session {
         }
     }
 
-    async fn serve(&mut self, connection: &mut Connection, heart: &Notify) -> Result<Ended, WireError> {
+    async fn serve(&mut self, connection: &mut Connection<W>, heart: &Notify) -> Result<Ended, WireError> {
         let wishes = self.wishes.clone();
         let mut silent = std::pin::pin!(sleep_until(connection.silent_at()));
         while !self.may_leave() && !wishes.end.is_cancelled() {
@@ -256,7 +265,7 @@ impl Session {
 
     fn received(
         &mut self,
-        connection: &mut Connection,
+        connection: &mut Connection<W>,
         received: Received<ToWorker>,
     ) -> Result<Vec<Action>, WireError> {
         let new_context = || self.executor.context();
@@ -289,7 +298,7 @@ impl Session {
     }
 
     /// Do what the tasks ask for. Nothing here waits.
-    fn act(&self, connection: &Connection, actions: Vec<Action>) {
+    fn act(&self, connection: &Connection<W>, actions: Vec<Action>) {
         for action in actions {
             let outgoing = match action {
                 Action::Execute(job) => {
@@ -307,13 +316,21 @@ impl Session {
             let _ = connection.outgoing.send(outgoing);
         }
     }
+
+    /// A pause of half to all of this length: many workers that lost one coordinator shall not all come back at the same time.
+    fn scattered(&self, pause: Duration) -> Duration {
+        let mut chance = [0];
+        // Without chance the pause is as long as it may be.
+        let share = self.world.fill_random(&mut chance).map_or(1.0, |()| 0.5 + f64::from(chance[0]) / 512.0);
+        pause.mul_f64(share)
+    }
 }
 
-type Reader = ReadHalf<TlsStream<Transport>>;
-type Writer = WriteHalf<TlsStream<Transport>>;
+type Reader<W> = ReadHalf<TlsStream<Transport<<W as World>::Stream>>>;
+type Writer<W> = WriteHalf<TlsStream<Transport<<W as World>::Stream>>>;
 
-struct Connection {
-    incoming: Incoming<Reader>,
+struct Connection<W: World> {
+    incoming: Incoming<Reader<W>>,
     outgoing: UnboundedSender<Outgoing>,
     announced: UnboundedReceiver<u64>,
     transfer: Option<IncomingBlob>,
@@ -321,7 +338,7 @@ struct Connection {
     silence: Duration,
 }
 
-impl Connection {
+impl<W: World> Connection<W> {
     /// When it has been silent for too long, unless a byte comes before.
     fn silent_at(&self) -> Instant {
         self.incoming.heard() + self.silence
@@ -350,7 +367,9 @@ type Writing = JoinHandle<Result<(), WireError>>;
 const WRITTEN_TOGETHER: usize = 256;
 
 /// Write in a task of its own: a large output must not keep the worker from reading, nor the other way round.
-fn start_writing(writer: Writer) -> (UnboundedSender<Outgoing>, UnboundedReceiver<u64>, Writing) {
+fn start_writing(
+    writer: impl AsyncWrite + Unpin + Send + 'static,
+) -> (UnboundedSender<Outgoing>, UnboundedReceiver<u64>, Writing) {
     let (outgoing, queue) = unbounded_channel();
     let (written, announced) = unbounded_channel();
     (outgoing, announced, tokio::spawn(write(writer, queue, written)))
@@ -358,7 +377,7 @@ fn start_writing(writer: Writer) -> (UnboundedSender<Outgoing>, UnboundedReceive
 
 /// Write what is queued, together what came together: the output of a node and the start of the next leave in one packet.
 async fn write(
-    mut writer: Writer,
+    mut writer: impl AsyncWrite + Unpin,
     mut queue: UnboundedReceiver<Outgoing>,
     written: UnboundedSender<u64>,
 ) -> Result<(), WireError> {
@@ -394,30 +413,5 @@ async fn sleep_until_some(then: Option<Instant>) {
     match then {
         Some(then) => sleep_until(then).await,
         None => std::future::pending().await,
-    }
-}
-
-/// A pause of half to all of this length: many workers that lost one coordinator shall not all come back at the same time.
-fn scattered(pause: Duration) -> Duration {
-    let mut chance = [0];
-    // Without chance the pause is as long as it may be.
-    let share = getrandom::fill(&mut chance).map_or(1.0, |()| 0.5 + f64::from(chance[0]) / 512.0);
-    pause.mul_f64(share)
-}
-
-/// Beat in a thread of its own until the returned sender is dropped. Beats that nobody has taken yet are one.
-fn start_heart(interval: Duration, heart: Arc<Notify>) -> Option<blocking::Sender<()>> {
-    let (keep, dropped) = blocking::channel::<()>();
-    let beat = move || {
-        while dropped.recv_timeout(interval) == Err(blocking::RecvTimeoutError::Timeout) {
-            heart.notify_one();
-        }
-    };
-    match std::thread::Builder::new().name("heartbeat".into()).spawn(beat) {
-        Ok(_) => Some(keep),
-        Err(error) => {
-            warn!(%error, "cannot start the heartbeat: the coordinator will take this worker for lost");
-            None
-        }
     }
 }

@@ -28,15 +28,14 @@ use rustls::{
     SignatureScheme,
 };
 use thiserror::Error as ThisError;
-use tokio::io::BufReader;
-use tokio::net::TcpStream;
+use tokio::io::{AsyncRead, AsyncWrite, BufReader};
 use tokio_rustls::{TlsConnector, client};
 
 /// The name that every coordinator's certificate is for, whatever its host is called.
 pub const SERVER_NAME: &str = "lookalike-coordinator";
 
-/// A TCP stream that is read in large pieces: rustls asks for 4 KiB at a time.
-pub type Transport = BufReader<TcpStream>;
+/// A stream that is read in large pieces: rustls asks for 4 KiB at a time.
+pub type Transport<S> = BufReader<S>;
 
 /// How much is read from the system at a time.
 const READ_BYTES: usize = 32 << 10;
@@ -105,7 +104,10 @@ impl TlsError {
 /// # Errors
 /// When the stream fails, or the other side is not the coordinator whose certificate `pin` names: see
 /// [`TlsError::of_handshake`].
-pub async fn connect(stream: TcpStream, pin: CertificatePin) -> io::Result<client::TlsStream<Transport>> {
+pub async fn connect<S>(stream: S, pin: CertificatePin) -> io::Result<client::TlsStream<Transport<S>>>
+where
+    S: AsyncRead + AsyncWrite + Unpin,
+{
     let config = client_config(pin).map_err(io::Error::other)?;
     let name = ServerName::try_from(SERVER_NAME).map_err(io::Error::other)?;
     TlsConnector::from(Arc::new(config)).connect(name, transport(stream)).await
@@ -113,7 +115,7 @@ pub async fn connect(stream: TcpStream, pin: CertificatePin) -> io::Result<clien
 
 /// The stream as TLS reads it.
 #[must_use]
-pub fn transport(stream: TcpStream) -> Transport {
+pub fn transport<S: AsyncRead>(stream: S) -> Transport<S> {
     BufReader::with_capacity(READ_BYTES, stream)
 }
 

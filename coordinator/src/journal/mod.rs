@@ -29,6 +29,7 @@
 
 mod batch;
 mod deferred;
+mod disk;
 mod error;
 mod finish;
 mod fits;
@@ -45,7 +46,7 @@ use std::path::PathBuf;
 use std::sync::mpsc::{Sender, channel, sync_channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::{self, JoinHandle};
-use std::time::{Instant, SystemTime};
+use std::time::{Duration, Instant, SystemTime};
 
 use lookalike::fit::BestScore;
 use lookalike::graph::NodeKey;
@@ -54,6 +55,7 @@ use tokio::sync::mpsc::{UnboundedReceiver, unbounded_channel};
 
 pub(crate) use self::batch::Batch;
 use self::deferred::Deferred;
+use self::disk::Disk;
 pub use self::error::JournalError;
 pub(crate) use self::finish::{Finished, finish, finished, settle};
 pub use self::fits::{FitLedger, FitStatus};
@@ -107,6 +109,7 @@ pub(crate) struct Journal {
     known: Known,
     commands: Sender<Command>,
     committed: UnboundedReceiver<Result<(), JournalError>>,
+    disk: Option<Disk>,
     thread: Option<JoinHandle<Result<(), JournalError>>>,
 }
 
@@ -114,8 +117,12 @@ pub(crate) struct Journal {
 type Known = Arc<Mutex<HashSet<NodeKey>>>;
 
 impl Journal {
-    /// Begin a run, or go on with the one that is there.
-    pub(crate) fn open(options: &JournalOptions, name: RunName) -> Result<Self, JournalError> {
+    /// Begin a run, or go on with the one that is there. `disk_time` is that of the [world](lookalike_worker::world::World).
+    pub(crate) fn open(
+        options: &JournalOptions,
+        name: RunName,
+        disk_time: Option<Duration>,
+    ) -> Result<Self, JournalError> {
         let path = options.path.clone();
         if path.exists() && !options.resume {
             return Err(JournalError::Exists { path });
@@ -142,7 +149,8 @@ impl Journal {
         let thread = thread::Builder::new().name("journal".into()).spawn(move || writer.run());
         let thread = thread.map_err(|source| JournalError::Create { path: path.clone(), source })?;
         let Loaded { run, epoch, past, .. } = loaded;
-        Ok(Self { path, run, epoch, past, known, commands, committed, thread: Some(thread) })
+        let disk = disk_time.map(Disk::new);
+        Ok(Self { path, run, epoch, past, known, commands, committed, disk, thread: Some(thread) })
     }
 
     /// What the reactor asks for the outputs of earlier epochs.
@@ -155,10 +163,14 @@ impl Journal {
     pub(crate) fn commit(&mut self, batch: Batch) {
         // A thread that has ended is noticed by `committed`.
         let _ = self.commands.send(Command::Commit(Box::new(batch)));
+        self.disk.iter_mut().for_each(|disk| disk.wait(&self.commands));
     }
 
     /// Wait until the earliest batch that was not told of is written.
     pub(crate) async fn committed(&mut self) -> Result<(), JournalError> {
+        if let Some(disk) = &mut self.disk {
+            disk.told().await;
+        }
         let gone = || JournalError::Thread { path: self.path.clone() };
         self.committed.recv().await.unwrap_or_else(|| Err(gone()))
     }
@@ -191,6 +203,16 @@ impl Journal {
         let _ = self.close(None);
         // The next attempt will say that there is a run already.
         let _ = remove(&path);
+    }
+}
+
+/// Dropped without [`Journal::close`] where the world decides about disks: the process was killed, and the next one may come at once.
+impl Drop for Journal {
+    fn drop(&mut self) {
+        if let (Some(_), Some(thread)) = (&self.disk, self.thread.take()) {
+            let _ = self.commands.send(Command::Die);
+            let _ = thread.join();
+        }
     }
 }
 

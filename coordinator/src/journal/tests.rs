@@ -60,7 +60,7 @@ fn write(journal: &mut Journal, batches: impl IntoIterator<Item = Batch>) {
 }
 
 fn begun(folder: &TempDir) -> Journal {
-    Journal::open(&options(folder), NAME).unwrap()
+    Journal::open(&options(folder), NAME, None).unwrap()
 }
 
 fn sql(folder: &TempDir, statement: &str) {
@@ -81,7 +81,7 @@ fn next_epoch_finds_results_deaths_and_the_address() {
     // Killed: nothing is closed. (A process that is killed writes nothing more; a thread cannot be.)
     let copy = copied(&folder);
     drop(journal);
-    let again = Journal::open(&options(&copy), RunName([8; 16])).unwrap();
+    let again = Journal::open(&options(&copy), RunName([8; 16]), None).unwrap();
     assert_eq!((again.run, again.epoch, again.past.results), (NAME, 2, 1));
     assert_eq!(again.past.listen, "127.0.0.1:4100".parse().ok());
     assert_eq!(again.past.local_workers, [4711, 4712]);
@@ -114,7 +114,7 @@ fn torn_write_costs_only_the_group_that_was_being_written() {
         let copy = copied(&folder);
         let torn = fs::OpenOptions::new().write(true).open(copy.path().join("run.sqlite-wal")).unwrap();
         torn.set_len(length).unwrap();
-        let again = Journal::open(&options(&copy), NAME).unwrap();
+        let again = Journal::open(&options(&copy), NAME, None).unwrap();
         let mut recall = again.recall();
         assert_eq!(recall.recall(key(1)).output, Some(output(1)), "{length}");
         assert_eq!(recall.recall(key(2)).output, None, "{length}");
@@ -130,7 +130,7 @@ fn number_of_an_epoch_is_never_given_again_whatever_is_left_of_the_log() {
     write(&mut journal, [batch, completed(1)]);
     let copy = copied(&folder);
     fs::write(copy.path().join("run.sqlite-wal"), "").unwrap();
-    let again = Journal::open(&options(&copy), RunName([8; 16])).unwrap();
+    let again = Journal::open(&options(&copy), RunName([8; 16]), None).unwrap();
     assert_eq!((again.run, again.epoch, again.past.results), (NAME, 2, 0));
     assert_eq!(again.past.listen, "127.0.0.1:4100".parse().ok());
 }
@@ -192,7 +192,7 @@ fn output_that_is_computed_again_after_its_release_is_written_again() {
     both.keep(key(2), output(2));
     write(&mut journal, [again, completed(2), both]);
     let copy = copied(&folder);
-    let mut recall = Journal::open(&options(&copy), NAME).unwrap().recall();
+    let mut recall = Journal::open(&options(&copy), NAME, None).unwrap().recall();
     assert_eq!(recall.recall(key(1)).output, Some(output(1)));
     assert_eq!(recall.recall(key(2)).output, Some(output(2)));
 }
@@ -209,7 +209,7 @@ fn journal_is_there_as_a_whole_or_not_at_all() {
     fs::write(folder.path().join("run.sqlite.new"), "half of a journal").unwrap();
     fs::write(folder.path().join("run.sqlite.new-journal"), "more of it").unwrap();
     let fresh = JournalOptions { resume: false, ..options(&folder) };
-    let journal = Journal::open(&fresh, NAME).unwrap();
+    let journal = Journal::open(&fresh, NAME, None).unwrap();
     assert_eq!((journal.epoch, journal.past.results), (1, 0));
     journal.close(None).unwrap();
     assert!(!folder.path().join("run.sqlite.new").exists());
@@ -228,12 +228,12 @@ fn survivors_are_known_by_name_and_local_ones_by_their_machine() {
     }
     write(&mut journal, [batch]);
     let copy = copied(&folder);
-    let past = Journal::open(&options(&copy), NAME).unwrap().past;
+    let past = std::mem::take(&mut Journal::open(&options(&copy), NAME, None).unwrap().past);
     let names: Vec<_> = past.workers.iter().map(|worker| (worker.name.0[0], worker.is_local)).collect();
     assert_eq!(names, [(1, true), (2, false), (3, false)]);
     assert_eq!(past.local_workers, [1, 4711]);
     sql(&copy, "UPDATE epochs SET host = 'elsewhere'");
-    assert_eq!(Journal::open(&options(&copy), NAME).unwrap().past.local_workers, [0; 0]);
+    assert_eq!(Journal::open(&options(&copy), NAME, None).unwrap().past.local_workers, [0; 0]);
 }
 
 #[test]
@@ -252,7 +252,7 @@ fn result_that_is_kept_late_is_recalled() {
 fn file_that_does_not_fit_is_refused_by_name() {
     let folder = tempfile::tempdir().unwrap();
     let refused = |expected: &str| {
-        let error = Journal::open(&options(&folder), NAME).unwrap_err();
+        let error = Journal::open(&options(&folder), NAME, None).unwrap_err();
         assert!(error.to_string().contains(expected), "{error}");
         assert_eq!(error.exit_code(), 2);
     };
@@ -266,10 +266,10 @@ fn file_that_does_not_fit_is_refused_by_name() {
     fs::remove_file(&path).unwrap();
     begun(&folder).close(None).unwrap();
     let fresh = JournalOptions { resume: false, ..options(&folder) };
-    let error = Journal::open(&fresh, NAME).unwrap_err().to_string();
+    let error = Journal::open(&fresh, NAME, None).unwrap_err().to_string();
     assert!(error.contains("already holds a run; go on with it with --resume"), "{error}");
     let other = JournalOptions { identity: RunIdentity::default().with("--seed", "3"), ..options(&folder) };
-    let error = Journal::open(&other, NAME).unwrap_err().to_string();
+    let error = Journal::open(&other, NAME, None).unwrap_err().to_string();
     assert!(error.contains("--seed is 0 there and 3 here"), "{error}");
     sql(&folder, "PRAGMA user_version = 99");
     refused("has journal format 99, expected 2");

@@ -38,8 +38,12 @@ pub(super) enum Command {
     Note(Box<Batch>),
     /// Read the output of a node.
     Read(NodeKey, SyncSender<Option<Blob>>),
+    /// Say that all that was asked for before is done.
+    Wait(SyncSender<()>),
     /// Write how this coordinator's part ended, and end.
     Close(Option<String>),
+    /// End without another word, as a process does that is killed.
+    Die,
 }
 
 pub(super) struct Writer {
@@ -74,6 +78,8 @@ impl Writer {
                     self.is_news = true;
                 }
                 Ok(Command::Read(key, answer)) => _ = answer.send(self.read(key)),
+                Ok(Command::Wait(done)) => _ = done.send(()),
+                Ok(Command::Die) => return Ok(()),
                 Ok(Command::Close(ended)) => return self.close(ended.as_deref()),
                 // The coordinator's future was dropped.
                 Err(RecvTimeoutError::Disconnected) => return self.close(Some("it was dropped")),

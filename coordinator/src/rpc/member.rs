@@ -11,6 +11,7 @@ use lookalike::protocol::{
     self as protocol, FailureKind, IncomingBlob, LeaseName, PART_BYTES, ToCoordinator, ToWorker, Welcome, bounded_text,
 };
 use lookalike_worker::wire::{Incoming, Parcel, Received, WireError};
+use lookalike_worker::world::World;
 use tokio::io::{AsyncRead, AsyncWrite, AsyncWriteExt};
 use tokio::sync::mpsc::Sender;
 use tokio::sync::oneshot;
@@ -26,7 +27,7 @@ use crate::reactor::{Event, Executing};
 const UNASKED_BYTES: u64 = 8 << 20;
 
 /// Serve a worker to its end.
-pub(super) async fn serve(greeted: Greeted, worker: WorkerId, peer: SocketAddr, gate: &Gate) {
+pub(super) async fn serve<W: World>(greeted: Greeted<W::Stream>, worker: WorkerId, peer: SocketAddr, gate: &Gate<W>) {
     let Greeted { incoming, writer, hello } = greeted;
     info!(%worker, %peer, process = hello.process, build = bounded_text(&hello.build), "joined");
     let (mailbox, postman) = mailbox(gate.limits.queued_bytes);
@@ -55,10 +56,11 @@ pub(super) async fn serve(greeted: Greeted, worker: WorkerId, peer: SocketAddr, 
     let (overflowing, closed) = (postman.overflowing(), postman.closed());
     let writer = Patient::new(writer, gate.policy.lost_after);
     let departure = tokio::select! {
-        departure = &mut reading => departure,
-        () = overflowing => Departure::TooSlow,
+        biased;
         // Thrown out: whoever did it knows.
         () = closed => return,
+        () = overflowing => Departure::TooSlow,
+        departure = &mut reading => departure,
         written = write(writer, postman, gate.policy.heartbeat, &pending_blobs) => match written {
             // We have said our last word: let the worker say its own, so that closing does not destroy ours.
             Ok(()) => timeout(gate.limits.farewell_time, reading).await.unwrap_or(Departure::Lost),

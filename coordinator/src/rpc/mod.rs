@@ -20,8 +20,8 @@ use lookalike::protocol::{
 };
 use lookalike_worker::tls::{TlsError, Transport, channel_binding};
 use lookalike_worker::wire::{Incoming, WireError, greet_worker};
+use lookalike_worker::world::World;
 use tokio::io::{ReadHalf, WriteHalf, split};
-use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::mpsc::Sender;
 use tokio::sync::oneshot;
 use tokio::task::JoinSet;
@@ -71,7 +71,8 @@ pub(crate) enum Outgoing {
 }
 
 /// What every connection of a run needs.
-pub(crate) struct Gate {
+pub(crate) struct Gate<W> {
+    pub(crate) world: W,
     pub(crate) tls: TlsAcceptor,
     pub(crate) secret: Secret,
     pub(crate) limits: Limits,
@@ -82,7 +83,7 @@ pub(crate) struct Gate {
 }
 
 /// Let workers in until `stop`, then give the connected ones a moment to take their leave.
-pub(crate) async fn serve_forever(listener: TcpListener, gate: Gate, stop: CancellationToken) {
+pub(crate) async fn serve_forever<W: World>(listener: W::Listener, gate: Gate<W>, stop: CancellationToken) {
     let limits = gate.limits;
     let gate = Arc::new(gate);
     let strangers = Strangers::new(limits.strangers);
@@ -90,9 +91,10 @@ pub(crate) async fn serve_forever(listener: TcpListener, gate: Gate, stop: Cance
     let mut connections = JoinSet::new();
     loop {
         let accepted = tokio::select! {
+            biased;
             () = stop.cancelled() => break,
             Some(_) = connections.join_next() => continue,
-            accepted = listener.accept() => accepted,
+            accepted = W::accept(&listener) => accepted,
         };
         let (stream, peer) = match accepted {
             Ok(accepted) => accepted,
@@ -138,17 +140,17 @@ fn means_us(error: &WireError) -> bool {
     matches!(error, WireError::Handshake(why) if *why != HandshakeError::Magic)
 }
 
-type Connection = TlsStream<Transport>;
+type Connection<S> = TlsStream<Transport<S>>;
 
 /// A stranger that has become a worker.
-struct Greeted {
-    incoming: Incoming<ReadHalf<Connection>>,
-    writer: WriteHalf<Connection>,
+struct Greeted<S> {
+    incoming: Incoming<ReadHalf<Connection<S>>>,
+    writer: WriteHalf<Connection<S>>,
     hello: Hello,
 }
 
 /// Make a worker of a stranger, in the time that it may take and as long as nobody else needs its place.
-async fn greet(stream: TcpStream, place: Place, gate: &Gate) -> Result<Greeted, WireError> {
+async fn greet<W: World>(stream: W::Stream, place: Place, gate: &Gate<W>) -> Result<Greeted<W::Stream>, WireError> {
     tokio::select! {
         biased;
         greeted = timeout(gate.limits.stranger_time, handshake(stream, gate)) => {
@@ -158,15 +160,14 @@ async fn greet(stream: TcpStream, place: Place, gate: &Gate) -> Result<Greeted, 
     }
 }
 
-async fn handshake(stream: TcpStream, gate: &Gate) -> Result<Greeted, WireError> {
-    stream.set_nodelay(true)?;
+async fn handshake<W: World>(stream: W::Stream, gate: &Gate<W>) -> Result<Greeted<W::Stream>, WireError> {
     let mut stream = match accept(&gate.tls, stream).await {
         Ok(stream) => stream,
         Err(error) => return Err(TlsError::of_handshake(error)?.into()),
     };
     let channel = channel_binding(stream.get_ref().1).map_err(io::Error::other)?;
     let mut nonce = [0; 32];
-    getrandom::fill(&mut nonce).map_err(io::Error::other)?;
+    gate.world.fill_random(&mut nonce)?;
     greet_worker(&mut stream, &ProofKey::new(&gate.secret, &channel), nonce).await?;
     let (reader, writer) = split(stream);
     let mut incoming = Incoming::with_frames(reader, FrameReader::with_limit(gate.limits.frame_bytes));

@@ -9,7 +9,7 @@ use std::time::SystemTime;
 
 use lookalike::graph::WorkerId;
 use lookalike::protocol::{ProcessName, RunName, ToWorker};
-use tokio::net::TcpListener;
+use lookalike_worker::world::World;
 use tokio::sync::mpsc::Sender;
 use tokio::sync::watch;
 use tokio::task::{JoinHandle, JoinSet};
@@ -70,13 +70,14 @@ impl Takeover {
 
 impl Cluster {
     /// Listen, write the access file or take the one that is there, start the local workers that have not survived.
-    pub(crate) async fn start(
+    pub(crate) async fn start<W: World>(
+        world: W,
         options: &RunnerOptions,
         (run, epoch): (RunName, u64),
         takeover: Option<Takeover>,
         inbound: Sender<Inbound>,
     ) -> Result<Self, RunError> {
-        let (listener, credentials) = listen(options, takeover.as_ref()).await?;
+        let (listener, credentials) = listen(&world, options, takeover.as_ref()).await?;
         let (bound, Credentials { access, identity }) = credentials;
         let tls = server_config(&identity).map_err(RunError::Tls)?;
         let stop = CancellationToken::new();
@@ -84,6 +85,7 @@ impl Cluster {
         let worked = workers.worked.clone();
         // From here on the drop guard inside `Self` ends what was started.
         let gate = Gate {
+            world,
             tls: TlsAcceptor::from(Arc::new(tls)),
             secret: access.secret,
             limits: options.limits,
@@ -161,10 +163,11 @@ impl Drop for Cluster {
 }
 
 /// Listen, and have the credentials for it: those made beforehand, those of the earlier coordinator of this run, or new ones.
-async fn listen(
+async fn listen<W: World>(
+    world: &W,
     options: &RunnerOptions,
     takeover: Option<&Takeover>,
-) -> Result<(TcpListener, (SocketAddr, Credentials)), RunError> {
+) -> Result<(W::Listener, (SocketAddr, Credentials)), RunError> {
     let now = SystemTime::now();
     let given = options.access.as_ref().map(|path| Credentials::read(path, now)).transpose()?;
     let earlier = match (&given, takeover) {
@@ -180,8 +183,7 @@ async fn listen(
         true => RunError::PortTaken { listen, source },
         false => RunError::Listen { listen, source },
     };
-    let listener = TcpListener::bind(listen).await.map_err(listen_error)?;
-    let bound = listener.local_addr().map_err(listen_error)?;
+    let (listener, bound) = world.listen(listen).await.map_err(listen_error)?;
     let credentials = match (given, earlier) {
         (Some(given), _) => given,
         (None, Some(earlier)) => at_address(earlier, options, bound)?,

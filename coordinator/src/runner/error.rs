@@ -69,7 +69,7 @@ pub enum RunError {
     },
     /// The operating system gives no random bytes.
     #[error("the system gives no random bytes for the name of the run: {0}")]
-    Randomness(getrandom::Error),
+    Randomness(io::Error),
     /// Nobody can be told to stop.
     #[error("cannot listen for Ctrl-C and SIGTERM")]
     Signals(#[source] io::Error),

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use lookalike::graph::{Blob, DecodedCache, NodeId, NodeSpec, Registry, RunContext};
+use lookalike_worker::world::Pool;
 use tokio::sync::mpsc::UnboundedSender;
 
 use crate::comm::{RunEvent, Site};
@@ -13,7 +14,10 @@ use crate::reactor::Event;
 const DECODED_BOUND_BYTES: usize = 128 << 20;
 
 /// What nodes need that run in this process.
-pub(super) struct Here {
+pub(super) struct Here<P> {
+    /// Not blocking threads of tokio: parallel iterators run on a pool anyway, and a runtime waits for blocking threads before it
+    /// ends, but an interrupted run shall not wait for a node.
+    pool: P,
     registry: Arc<Registry>,
     decoded: Arc<DecodedCache>,
     /// Of every node that runs here, with the progress that was told last: to watch it, and to cancel it when the run ends.
@@ -21,11 +25,11 @@ pub(super) struct Here {
     results: UnboundedSender<Event>,
 }
 
-impl Here {
+impl<P: Pool> Here<P> {
     /// A place for nodes whose outputs go to `results`.
-    pub(super) fn new(registry: Arc<Registry>, results: UnboundedSender<Event>) -> Self {
+    pub(super) fn new(pool: P, registry: Arc<Registry>, results: UnboundedSender<Event>) -> Self {
         let decoded = Arc::new(DecodedCache::new(DECODED_BOUND_BYTES));
-        Self { registry, decoded, contexts: BTreeMap::new(), results }
+        Self { pool, registry, decoded, contexts: BTreeMap::new(), results }
     }
 
     /// Run a node.
@@ -33,9 +37,7 @@ impl Here {
         let context = RunContext::new(Arc::clone(&self.decoded));
         self.contexts.insert(node, (context.clone(), 0));
         let (registry, results) = (Arc::clone(&self.registry), self.results.clone());
-        // On the rayon pool and not on a blocking thread of tokio: its parallel iterators run there anyway, and a runtime
-        // waits for blocking threads before it ends, but an interrupted run shall not wait for a node.
-        rayon::spawn(move || {
+        self.pool.spawn(move || {
             let site = Site::Coordinator;
             let result = match registry.run(&spec.kind, &spec.parameters, &inputs, &context) {
                 Ok(output) => Event::Finished { site, node, attempt, output },

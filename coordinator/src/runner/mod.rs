@@ -26,6 +26,7 @@ use std::time::Duration;
 
 use lookalike::graph::{NodeId, Planner, Registry, WorkerId};
 use lookalike::protocol::{Assignment, LeaseName, RunName, ToWorker};
+use lookalike_worker::world::{Real, World};
 use tokio::sync::Notify;
 use tokio::sync::mpsc::{Receiver, UnboundedReceiver, channel, unbounded_channel};
 use tokio::time::{Instant, MissedTickBehavior, interval, sleep_until};
@@ -72,13 +73,28 @@ pub async fn run<P: Planner>(
     registry: Arc<Registry>,
     observer: impl FnMut(&RunEvent),
 ) -> Result<(P, RunSummary), RunError> {
+    run_in(Real, options, planner, registry, observer).await
+}
+
+/// The same in any world. Local workers are processes in every world.
+///
+/// # Errors
+/// Those of [`run`].
+pub async fn run_in<W: World, P: Planner>(
+    world: W,
+    options: RunnerOptions,
+    planner: P,
+    registry: Arc<Registry>,
+    observer: impl FnMut(&RunEvent),
+) -> Result<(P, RunSummary), RunError> {
     // Before anything is started: a signal in between must not leave it behind.
     let interrupt = options.handle_signals.then(Interrupt::watch).transpose().map_err(RunError::Signals)?;
     let interrupted = interrupt.as_ref().map_or_else(CancellationToken::new, Interrupt::token);
     options.check()?;
     let mut name = [0; 16];
-    getrandom::fill(&mut name).map_err(RunError::Randomness)?;
-    let journal = options.journal.as_ref().map(|options| Journal::open(options, RunName(name))).transpose()?;
+    world.fill_random(&mut name).map_err(RunError::Randomness)?;
+    let open = |options| Journal::open(options, RunName(name), world.disk_time());
+    let journal = options.journal.as_ref().map(open).transpose()?;
     let (run, epoch) = journal.as_ref().map_or((RunName(name), FIRST_EPOCH), |journal| (journal.run, journal.epoch));
     let earlier = journal.as_ref().filter(|_| epoch > FIRST_EPOCH);
     let takeover = earlier.map(|journal| Takeover::of(&journal.past, &options));
@@ -94,10 +110,11 @@ pub async fn run<P: Planner>(
         outbox: Outbox::default(),
         cluster: None,
         observer,
-        here: Here::new(registry, results_sender),
+        here: Here::new(world.common_pool(), registry, results_sender),
         memory: Memory::new(journal, &options.policy),
         survivors: None,
         began: Instant::now(),
+        world,
     };
     let begin = Begin { options, run, takeover };
     let outcome = driver.drive(begin, results, interrupted).await;
@@ -119,21 +136,22 @@ struct Begin {
     takeover: Option<Takeover>,
 }
 
-struct Driver<P, O> {
+struct Driver<W: World, P, O> {
+    world: W,
     core: Core,
     planner: P,
     outbox: Outbox,
     /// There as soon as there is something to do for workers.
     cluster: Option<Cluster>,
     observer: O,
-    here: Here,
+    here: Here<W::Pool>,
     memory: Memory,
     /// The workers of an earlier coordinator, as long as they are waited for.
     survivors: Option<Survivors>,
     began: Instant,
 }
 
-impl<P: Planner, O: FnMut(&RunEvent)> Driver<P, O> {
+impl<W: World, P: Planner, O: FnMut(&RunEvent)> Driver<W, P, O> {
     async fn drive(
         &mut self,
         begin: Begin,
@@ -205,7 +223,8 @@ impl<P: Planner, O: FnMut(&RunEvent)> Driver<P, O> {
         if started.is_ok() && !self.core.is_finished() {
             let is_new = takeover.is_none();
             let survivors = takeover.as_ref().map(|takeover| takeover.survivors.clone()).unwrap_or_default();
-            match Cluster::start(&options, (run, self.core.epoch), takeover, inbound).await {
+            let world = self.world.clone();
+            match Cluster::start(world, &options, (run, self.core.epoch), takeover, inbound).await {
                 Ok(cluster) => {
                     (self.observer)(&RunEvent::Listening { address: cluster.address.clone() });
                     group.batch.listens(cluster.bound.to_string());

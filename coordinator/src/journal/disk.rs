@@ -1,0 +1,42 @@
+//! A disk whose pace the world decides: see [`World::disk_time`](lookalike_worker::world::World::disk_time).
+//!
+//! The thread that writes is there as ever, but whoever gives it something waits until it has done it, and is told after the disk's
+//! time. So nothing depends on when the thread runs.
+
+use std::collections::VecDeque;
+use std::sync::mpsc::{Sender, sync_channel};
+use std::time::Duration;
+
+use tokio::time::{Instant, sleep_until};
+
+use super::writer::Command;
+
+/// What was written and not told of.
+#[derive(Debug)]
+pub(super) struct Disk {
+    time: Duration,
+    due: VecDeque<Instant>,
+}
+
+impl Disk {
+    pub(super) fn new(time: Duration) -> Self {
+        Self { time, due: VecDeque::new() }
+    }
+
+    /// Something was given to the thread: block until it is done.
+    pub(super) fn wait(&mut self, commands: &Sender<Command>) {
+        let (sender, done) = sync_channel(1);
+        if commands.send(Command::Wait(sender)).is_ok() {
+            let _ = done.recv();
+        }
+        self.due.push_back(Instant::now() + self.time);
+    }
+
+    /// Wait until the earliest of what was written may be told of.
+    pub(super) async fn told(&mut self) {
+        if let Some(due) = self.due.front() {
+            sleep_until(*due).await;
+            self.due.pop_front();
+        }
+    }
+}

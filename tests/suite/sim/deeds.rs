@@ -1,0 +1,111 @@
+//! What is done to a simulated run, and how it is mended again.
+
+use std::sync::Weak;
+use std::time::Duration;
+
+use lookalike_worker::ending::Wishes;
+
+use super::chance::Chance;
+use super::stage::Place;
+use super::wire::Fate;
+
+/// Something that is done at its time.
+#[derive(Clone, Debug)]
+pub(super) enum Deed {
+    /// A new fault, whichever it will be.
+    Fault,
+    /// The link to a worker works again.
+    MendLink(usize, Link),
+    /// An end of a connection fails.
+    Reset(Weak<Fate>),
+    /// A process begins in a place where there is none.
+    Start(Place),
+    /// A worker goes on.
+    Unstick(usize),
+    /// A worker computes as fast as the others.
+    Hurry(usize),
+    /// A worker that was asked to end is asked again.
+    Insist(Wishes),
+}
+
+/// What is wrong with a link.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Link {
+    /// Everything on it waits, nothing is lost.
+    Held,
+    /// Everything on it is lost, both ways.
+    Cut,
+    /// What goes to the worker is lost.
+    CutDown,
+    /// What comes from the worker is lost.
+    CutUp,
+    /// Everything on it takes long.
+    Slow,
+}
+
+/// What may happen.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Fault {
+    Link(Link),
+    /// The connections end, as a firewall ends them: each end notices at its own time.
+    ResetConnections,
+    /// A worker's process is killed.
+    KillWorker,
+    /// A worker's machine is gone: nobody says so.
+    PowerOff,
+    /// A worker is asked to end.
+    Drain,
+    /// A worker does nothing for a while, and says nothing.
+    Stick,
+    /// A worker computes slowly.
+    SlowDown,
+    /// The coordinator's process is killed; another one goes on.
+    KillCoordinator,
+}
+
+impl Fault {
+    const ALL: [Self; 12] = [
+        Self::Link(Link::Held),
+        Self::Link(Link::Cut),
+        Self::Link(Link::CutDown),
+        Self::Link(Link::CutUp),
+        Self::Link(Link::Slow),
+        Self::ResetConnections,
+        Self::KillWorker,
+        Self::PowerOff,
+        Self::Drain,
+        Self::Stick,
+        Self::SlowDown,
+        Self::KillCoordinator,
+    ];
+
+    /// One of them.
+    pub(super) fn draw(chance: &mut Chance) -> Self {
+        chance.of(&Self::ALL)
+    }
+
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Self::Link(Link::Held) => "link held",
+            Self::Link(Link::Cut) => "link cut",
+            Self::Link(Link::CutDown) => "link cut downwards",
+            Self::Link(Link::CutUp) => "link cut upwards",
+            Self::Link(Link::Slow) => "link slow",
+            Self::ResetConnections => "connections reset",
+            Self::KillWorker => "worker killed",
+            Self::PowerOff => "worker's machine off",
+            Self::Drain => "worker drained",
+            Self::Stick => "worker stuck",
+            Self::SlowDown => "worker slow",
+            Self::KillCoordinator => "coordinator killed",
+        }
+    }
+
+    /// How long it lasts.
+    pub(super) fn time(self, chance: &mut Chance) -> Duration {
+        match self {
+            Self::KillCoordinator | Self::KillWorker => chance.time(10, 4000),
+            _ => chance.time(50, 9000),
+        }
+    }
+}

@@ -1,0 +1,165 @@
+//! What the processes of a simulated run and whoever torments them share.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::net::{IpAddr, SocketAddr};
+use std::path::PathBuf;
+use std::sync::{Mutex, MutexGuard, PoisonError, Weak};
+use std::time::Duration;
+
+use lookalike::graph::BlobHash;
+use lookalike_coordinator::core::RunSummary;
+use lookalike_worker::ending::Wishes;
+
+use super::wire::Fate;
+
+/// Where a process runs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Place {
+    Coordinator,
+    Worker(usize),
+}
+
+impl Place {
+    /// The name of its host.
+    pub(super) fn host(self) -> String {
+        match self {
+            Self::Coordinator => "coordinator".into(),
+            Self::Worker(index) => format!("worker-{index}"),
+        }
+    }
+
+    /// Where a connection comes from: turmoil counts the addresses of hosts from 1, and the coordinator is the first.
+    pub(super) fn of(address: SocketAddr) -> Self {
+        let number = match address.ip() {
+            IpAddr::V4(address) => usize::from(address.octets()[3]),
+            IpAddr::V6(_) => 0,
+        };
+        number.checked_sub(2).map_or(Self::Coordinator, Self::Worker)
+    }
+}
+
+/// How a run ended: what came of each node, and what it has cost.
+pub(super) type Outcome = Result<(BTreeMap<String, String>, RunSummary), String>;
+
+/// What everybody shares.
+#[derive(Debug)]
+pub(super) struct Stage {
+    pub(super) seed: u64,
+    pub(super) folder: PathBuf,
+    /// The shortest and the longest time that most nodes take, in milliseconds.
+    pub(super) node_ms: (u64, u64),
+    state: Mutex<State>,
+}
+
+#[derive(Debug, Default)]
+pub(super) struct State {
+    /// Who, what, when.
+    trace: Vec<String>,
+    /// What must never happen and has.
+    pub(super) wrong: Vec<String>,
+    /// The ends of connections: those of the link to this worker, and at which end.
+    wires: Vec<(Place, Place, Weak<Fate>)>,
+    /// Where a process is about to die of the node that it runs.
+    pub(super) doomed: BTreeSet<Place>,
+    pub(super) stuck: BTreeSet<Place>,
+    pub(super) slow: BTreeMap<Place, u32>,
+    /// How to ask the worker in a place to end.
+    pub(super) wishes: BTreeMap<Place, Wishes>,
+    /// The workers that have ended by themselves, and whether they were asked to.
+    pub(super) ended: Vec<(usize, bool)>,
+    /// How many processes there were in a place.
+    pub(super) processes: BTreeMap<Place, u32>,
+    /// The processes that something was done to.
+    pub(super) harmed: BTreeSet<u32>,
+    /// The processes of the workers that the present coordinator has.
+    pub(super) joined: BTreeSet<u32>,
+    /// The nodes whose outputs were told of, and by which coordinator.
+    pub(super) finished: BTreeMap<String, u32>,
+    pub(super) outcome: Option<Outcome>,
+}
+
+impl Stage {
+    pub(super) fn new(seed: u64, folder: PathBuf, node_ms: (u64, u64)) -> Self {
+        Self { seed, folder, node_ms, state: Mutex::default() }
+    }
+
+    pub(super) fn state(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Write something into the trace, said in a process.
+    pub(super) fn say(&self, place: Place, what: &str) {
+        self.note(turmoil::sim_elapsed().unwrap_or_default(), place, what);
+    }
+
+    /// Write something into the trace.
+    pub(super) fn note(&self, at: Duration, place: Place, what: &str) {
+        self.state().trace.push(format!("{:9.3} {:<11} {what}", at.as_secs_f64(), place.host()));
+    }
+
+    /// Something has happened that must never happen.
+    pub(super) fn wrong(&self, what: String) {
+        self.state().wrong.push(what);
+    }
+
+    /// The trace, one line each.
+    pub(super) fn trace(&self) -> String {
+        self.state().trace.join("\n")
+    }
+
+    /// A number that is another one if anything has happened otherwise or at another time.
+    pub(super) fn trace_hash(&self) -> BlobHash {
+        BlobHash::of(self.trace().as_bytes())
+    }
+
+    /// The number of the next process in a place.
+    pub(super) fn next_process(&self, place: Place) -> u32 {
+        let mut state = self.state();
+        let count = state.processes.entry(place).or_default();
+        *count += 1;
+        number(place, *count)
+    }
+
+    /// The number of the process that runs in a place, or did.
+    pub(super) fn process(&self, place: Place) -> u32 {
+        number(place, self.state().processes.get(&place).copied().unwrap_or(0))
+    }
+
+    /// A connection was made on the link to a worker.
+    pub(super) fn laid(&self, link: Place, end: Place, fate: Weak<Fate>) {
+        let mut state = self.state();
+        state.wires.retain(|(.., fate)| fate.strong_count() > 0);
+        state.wires.push((link, end, fate));
+    }
+
+    /// The ends of the connections that there are on the link to a worker.
+    pub(super) fn wires(&self, link: Place) -> Vec<(Place, Weak<Fate>)> {
+        let state = self.state();
+        let on_link = state.wires.iter().filter(|(other, ..)| *other == link);
+        on_link.map(|(_, end, fate)| (*end, Weak::clone(fate))).collect()
+    }
+
+    /// The process in a place dies of its node: nothing leaves it any more.
+    pub(super) fn doom(&self, place: Place) {
+        self.say(place, "runs a deadly node");
+        let ends = self.wires(place).into_iter().filter(|(end, _)| *end == place);
+        ends.filter_map(|(_, fate)| fate.upgrade()).for_each(|fate| fate.mute());
+        self.state().doomed.insert(place);
+    }
+
+    pub(super) fn is_stuck(&self, place: Place) -> bool {
+        self.state().stuck.contains(&place)
+    }
+
+    pub(super) fn slowness(&self, place: Place) -> u32 {
+        self.state().slow.get(&place).copied().unwrap_or(1)
+    }
+}
+
+fn number(place: Place, count: u32) -> u32 {
+    let place = match place {
+        Place::Coordinator => 0,
+        Place::Worker(index) => u32::try_from(index).unwrap_or(0) + 1,
+    };
+    1000 * (place + 1) + count
+}

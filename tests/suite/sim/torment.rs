@@ -1,0 +1,185 @@
+//! How faults are chosen, done and mended.
+
+use std::time::Duration;
+
+use super::deeds::{Deed, Fault, Link};
+use super::run::Run;
+use super::stage::Place;
+
+/// How many coordinators are killed at most: after each, workers are waited for.
+const MOST_COORDINATORS: u32 = 4;
+
+impl Run {
+    /// Let the next fault happen some time.
+    pub(super) fn plan_fault(&mut self) {
+        if self.faults_left > 0 {
+            self.faults_left -= 1;
+            let pause = self.chance.time(0, self.pause_ms);
+            self.plan(pause, Deed::Fault);
+        }
+    }
+
+    /// Do something after a while.
+    fn plan(&mut self, after: Duration, deed: Deed) {
+        self.planned += 1;
+        self.deeds.insert((self.sim.elapsed() + after, self.planned), deed);
+    }
+
+    pub(super) fn perform(&mut self, deed: Deed) {
+        match deed {
+            Deed::Fault => {
+                let (fault, victim) = (Fault::draw(&mut self.chance), self.chance.index(self.workers));
+                if self.hurt(fault, victim) {
+                    *self.faults.entry(fault.name()).or_default() += 1;
+                }
+                self.plan_fault();
+            }
+            Deed::MendLink(index, link) => self.mend(index, link),
+            Deed::Reset(fate) => fate.upgrade().iter().for_each(|fate| fate.reset()),
+            Deed::Start(place) => {
+                self.absent.remove(&place);
+                if place == Place::Coordinator {
+                    self.stage.state().joined.clear();
+                }
+                self.sim.bounce(place.host());
+            }
+            Deed::Unstick(index) => _ = self.stage.state().stuck.remove(&Place::Worker(index)),
+            Deed::Hurry(index) => _ = self.stage.state().slow.remove(&Place::Worker(index)),
+            Deed::Insist(wishes) => wishes.end.cancel(),
+        }
+    }
+
+    /// Do harm to a worker, or to the coordinator. Whether that was possible.
+    fn hurt(&mut self, fault: Fault, index: usize) -> bool {
+        let time = fault.time(&mut self.chance);
+        let place = if fault == Fault::KillCoordinator { Place::Coordinator } else { Place::Worker(index) };
+        let needs_link = matches!(fault, Fault::Link(_) | Fault::PowerOff);
+        if self.absent.contains(&place) || needs_link && self.broken.contains(&index) {
+            return false;
+        }
+        if fault == Fault::KillCoordinator && self.faults.get(fault.name()) == Some(&MOST_COORDINATORS) {
+            return false;
+        }
+        let wishes = self.stage.state().wishes.get(&place).cloned();
+        self.stage.note(self.sim.elapsed(), place, &format!("* {} for {time:?}", fault.name()));
+        match fault {
+            Fault::Link(Link::Slow) | Fault::SlowDown | Fault::KillCoordinator => {}
+            _ => self.harm(place),
+        }
+        match fault {
+            Fault::Link(link) => self.break_link(index, link, time),
+            Fault::ResetConnections => self.reset_ends(index, time),
+            Fault::KillWorker | Fault::KillCoordinator => self.kill(place, time),
+            Fault::PowerOff => {
+                self.break_link(index, Link::Cut, time);
+                self.kill(place, time);
+            }
+            Fault::Drain => {
+                let Some(wishes) = wishes else { return false };
+                wishes.drain.cancel();
+                if self.chance.happens(0.3) {
+                    self.plan(time, Deed::Insist(wishes));
+                }
+            }
+            Fault::Stick => {
+                self.stage.state().stuck.insert(place);
+                self.plan(time, Deed::Unstick(index));
+            }
+            Fault::SlowDown => {
+                let factor = u32::try_from(self.chance.between(2, 5)).unwrap_or(2);
+                self.stage.state().slow.insert(place, factor);
+                self.plan(time, Deed::Hurry(index));
+            }
+        }
+        true
+    }
+
+    /// From now on the process in a place may leave without being asked.
+    fn harm(&mut self, place: Place) {
+        let process = self.stage.process(place);
+        self.stage.state().harmed.insert(process);
+    }
+
+    fn kill(&mut self, place: Place, time: Duration) {
+        self.sim.crash(place.host());
+        if place == Place::Coordinator {
+            self.coordinators_ended.push(self.sim.elapsed());
+        }
+        self.gone(place);
+        self.plan(time, Deed::Start(place));
+    }
+
+    /// There is no process in a place any more.
+    fn gone(&mut self, place: Place) {
+        self.absent.insert(place);
+        let mut state = self.stage.state();
+        state.wishes.remove(&place);
+        state.stuck.remove(&place);
+    }
+
+    fn break_link(&mut self, index: usize, link: Link, time: Duration) {
+        let (near, far) = (Place::Coordinator.host(), Place::Worker(index).host());
+        self.broken.insert(index);
+        match link {
+            Link::Held => self.sim.hold(near, far),
+            Link::Cut => self.sim.partition(near, far),
+            Link::CutDown => self.sim.partition_oneway(near, far),
+            Link::CutUp => self.sim.partition_oneway(far, near),
+            Link::Slow => self.sim.set_link_latency(near, far, self.chance.time(100, 400)),
+        }
+        if matches!(link, Link::Cut | Link::CutDown | Link::CutUp) {
+            self.reset_ends(index, time + Duration::from_secs(2));
+        }
+        self.plan(time, Deed::MendLink(index, link));
+    }
+
+    fn mend(&mut self, index: usize, link: Link) {
+        let (near, far) = (Place::Coordinator.host(), Place::Worker(index).host());
+        let place = Place::Worker(index);
+        self.broken.remove(&index);
+        self.stage.note(self.sim.elapsed(), place, &format!("* no longer {}", Fault::Link(link).name()));
+        match link {
+            Link::Held => self.sim.release(near, far),
+            Link::Cut | Link::CutDown | Link::CutUp => {
+                self.sim.repair(near, far);
+                // Whoever has begun to connect meanwhile has lost something that nobody sends again.
+                self.reset_ends(index, Duration::ZERO);
+            }
+            Link::Slow => self.sim.set_link_latency(near, far, self.chance.time(1, 100)),
+        }
+        // There may be another process by now.
+        if link != Link::Slow {
+            self.harm(place);
+        }
+    }
+
+    /// Let both ends of every connection of a worker fail, each at its own time.
+    fn reset_ends(&mut self, index: usize, within: Duration) {
+        let most = u64::try_from(within.as_millis()).unwrap_or(0);
+        for (_, fate) in self.stage.wires(Place::Worker(index)) {
+            let after = self.chance.time(0, most);
+            self.plan(after, Deed::Reset(fate));
+        }
+    }
+
+    /// See to the processes that have come to their end.
+    pub(super) fn bury(&mut self) {
+        let mut state = self.stage.state();
+        let (doomed, ended) = (std::mem::take(&mut state.doomed), std::mem::take(&mut state.ended));
+        drop(state);
+        for place in doomed {
+            self.harm(place);
+            let pause = self.chance.time(10, 1000);
+            self.kill(place, pause);
+            *self.faults.entry("worker killed by its node").or_default() += 1;
+        }
+        for (index, was_asked) in ended {
+            if !was_asked {
+                self.left_unasked.push((index, self.sim.elapsed()));
+            }
+            let pause = self.chance.time(10, 3000);
+            self.gone(Place::Worker(index));
+            self.plan(pause, Deed::Start(Place::Worker(index)));
+        }
+    }
+}

@@ -1,0 +1,103 @@
+//! Connections that can be reset: turmoil does not send again what a partition has swallowed, so a stream that was there has to
+//! end, as TCP ends one that gets no answer. Each end notices at its own time.
+
+use std::io;
+use std::pin::Pin;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
+use std::task::{Context, Poll, Waker};
+
+use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
+use turmoil::net::TcpStream;
+
+/// One end of a connection.
+#[derive(Debug)]
+pub(super) struct Wire {
+    stream: TcpStream,
+    fate: Arc<Fate>,
+}
+
+/// What the simulation can do to an end of a connection.
+#[derive(Debug, Default)]
+pub(super) struct Fate(Mutex<State>);
+
+#[derive(Debug, Default)]
+struct State {
+    is_reset: bool,
+    /// The process is about to die: nothing leaves it any more.
+    is_mute: bool,
+    /// Those of reading and of writing.
+    wakers: [Option<Waker>; 2],
+}
+
+impl Wire {
+    pub(super) fn new(stream: TcpStream) -> Self {
+        Self { stream, fate: Arc::default() }
+    }
+
+    pub(super) fn fate(&self) -> Weak<Fate> {
+        Arc::downgrade(&self.fate)
+    }
+}
+
+impl Fate {
+    /// From now on reading and writing fail.
+    pub(super) fn reset(&self) {
+        let mut state = self.state();
+        state.is_reset = true;
+        let wakers = std::mem::take(&mut state.wakers);
+        drop(state);
+        wakers.into_iter().flatten().for_each(Waker::wake);
+    }
+
+    /// From now on writing waits.
+    pub(super) fn mute(&self) {
+        self.state().is_mute = true;
+    }
+
+    fn state(&self) -> MutexGuard<'_, State> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// An error if the end was reset; else remember whom to wake. `None` if it may not go on.
+    fn check(&self, way: usize, context: &Context<'_>) -> io::Result<Option<()>> {
+        let mut state = self.state();
+        if state.is_reset {
+            return Err(io::ErrorKind::ConnectionReset.into());
+        }
+        state.wakers[way] = Some(context.waker().clone());
+        Ok((way == READING || !state.is_mute).then_some(()))
+    }
+}
+
+const READING: usize = 0;
+const WRITING: usize = 1;
+
+impl AsyncRead for Wire {
+    fn poll_read(mut self: Pin<&mut Self>, context: &mut Context<'_>, bytes: &mut ReadBuf<'_>) -> Poll<io::Result<()>> {
+        self.fate.check(READING, context)?;
+        Pin::new(&mut self.stream).poll_read(context, bytes)
+    }
+}
+
+impl AsyncWrite for Wire {
+    fn poll_write(mut self: Pin<&mut Self>, context: &mut Context<'_>, bytes: &[u8]) -> Poll<io::Result<usize>> {
+        match self.fate.check(WRITING, context)? {
+            Some(()) => Pin::new(&mut self.stream).poll_write(context, bytes),
+            None => Poll::Pending,
+        }
+    }
+
+    fn poll_flush(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<io::Result<()>> {
+        match self.fate.check(WRITING, context)? {
+            Some(()) => Pin::new(&mut self.stream).poll_flush(context),
+            None => Poll::Pending,
+        }
+    }
+
+    fn poll_shutdown(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<io::Result<()>> {
+        match self.fate.check(WRITING, context)? {
+            Some(()) => Pin::new(&mut self.stream).poll_shutdown(context),
+            None => Poll::Pending,
+        }
+    }
+}
