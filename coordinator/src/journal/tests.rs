@@ -374,7 +374,7 @@ fn fit(name: &str, state: &str, outputs: &[(&str, &str)]) -> FitRow {
 fn what_fits_have_written_is_there_no_later_than_the_next_transaction() {
     let folder = tempfile::tempdir().unwrap();
     let options = options(&folder);
-    let mut journal = Journal::open(&options, NAME).unwrap();
+    let mut journal = Journal::open(&options, NAME, None).unwrap();
     options.fits.tell(fit("gold", "running", &[]));
     options.fits.tell(fit("gold", "done", &[("fit.json", "12ab")]));
     options.fits.tell(fit("chrome", "running", &[]));
@@ -401,7 +401,7 @@ fn what_fits_have_written_is_there_no_later_than_the_next_transaction() {
 fn run_in_which_fits_failed_has_ended_and_can_be_gone_on_with() {
     let folder = tempfile::tempdir().unwrap();
     let options = options(&folder);
-    let mut journal = Journal::open(&options, NAME).unwrap();
+    let mut journal = Journal::open(&options, NAME, None).unwrap();
     write(&mut journal, [completed(1)]);
     journal.close(None).unwrap();
     options.fits.tell(fit("gold", "failed", &[]));
@@ -411,7 +411,7 @@ fn run_in_which_fits_failed_has_ended_and_can_be_gone_on_with() {
     assert_eq!((status.state, status.error.as_deref()), (RunState::Ended, Some("1 of 12 fits failed")));
     assert_eq!((status.fits[0].state.as_str(), status.finished_at.is_some()), ("failed", true));
     assert_eq!(finished(&path, &identity()).unwrap(), None);
-    let again = Journal::open(&options, NAME).unwrap();
+    let again = Journal::open(&options, NAME, None).unwrap();
     assert_eq!((again.epoch, again.past.results), (2, 1));
     assert_eq!(Status::of(folder.path()).unwrap().state, RunState::Running);
 }
