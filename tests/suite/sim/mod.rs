@@ -27,6 +27,9 @@ const SEEDS: u64 = if cfg!(feature = "slow") { 1000 } else { 50 };
 /// Names the seed to replay.
 const SEED: &str = "LOOKALIKE_SIM_SEED";
 
+/// Says how many seeds are simulated twice.
+const TWICE: &str = "LOOKALIKE_SIM_TWICE";
+
 /// Says how many seeds are simulated.
 const COUNT: &str = "LOOKALIKE_SIM_SEEDS";
 
@@ -51,8 +54,10 @@ fn runs_come_through_whatever_happens_to_the_network() {
 
 #[test]
 fn seed_replays_to_the_same_events_at_the_same_times() {
-    for seed in [1, 2, 3] {
+    for seed in 1..=number(TWICE).unwrap_or(5) {
         let [first, second] = [0, 1].map(|_| simulate(seed).expect("a run that comes through").trace);
+        let differing = first.lines().zip(second.lines()).find(|(first, second)| first != second);
+        assert_eq!(differing, None, "seed {seed}");
         assert_eq!(first, second, "seed {seed}");
     }
 }
@@ -64,7 +69,7 @@ fn seed_that_is_asked_for_is_replayed() {
         return;
     };
     match try_seed(seed) {
-        Ok(ending) => println!("{ending:#?}"),
+        Ok(ending) => println!("{}\n{:#?}", ending.trace, ending.faults),
         Err(wrong) => panic!("seed {seed}:\n{wrong}\n{}", replay(seed)),
     }
 }

@@ -7,7 +7,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::{Duration, SystemTime};
 
-use lookalike::graph::{BlobHash, Execution, run_in_process};
+use lookalike::graph::{Execution, run_in_process};
 use lookalike_coordinator::access::Credentials;
 use lookalike_coordinator::core::RunSummary;
 use lookalike_tests::journal::JournalView;
@@ -37,8 +37,8 @@ pub(super) struct Ending {
     pub(super) summary: RunSummary,
     pub(super) nodes: usize,
     pub(super) coordinators: u32,
-    /// Of all that happened, and when.
-    pub(super) trace: BlobHash,
+    /// All that happened, and when.
+    pub(super) trace: String,
 }
 
 /// Simulate the run of a seed.
@@ -180,7 +180,7 @@ impl Run {
         let state = self.stage.state();
         let coordinators = state.processes.get(&Place::Coordinator).copied().unwrap_or(0);
         drop(state);
-        let (trace, time) = (self.stage.trace_hash(), self.sim.elapsed());
+        let (trace, time) = (self.stage.trace(), self.sim.elapsed());
         Ok(Ending { faults: self.faults.clone(), time, summary, nodes: results.len(), coordinators, trace })
     }
 

@@ -6,7 +6,6 @@ use std::path::PathBuf;
 use std::sync::{Mutex, MutexGuard, PoisonError, Weak};
 use std::time::Duration;
 
-use lookalike::graph::BlobHash;
 use lookalike_coordinator::core::RunSummary;
 use lookalike_worker::ending::Wishes;
 
@@ -105,11 +104,6 @@ impl Stage {
     /// The trace, one line each.
     pub(super) fn trace(&self) -> String {
         self.state().trace.join("\n")
-    }
-
-    /// A number that is another one if anything has happened otherwise or at another time.
-    pub(super) fn trace_hash(&self) -> BlobHash {
-        BlobHash::of(self.trace().as_bytes())
     }
 
     /// The number of the next process in a place.

@@ -127,7 +127,8 @@ impl Run {
             Link::CutUp => self.sim.partition_oneway(far, near),
             Link::Slow => self.sim.set_link_latency(near, far, self.chance.time(100, 400)),
         }
-        if matches!(link, Link::Cut | Link::CutDown | Link::CutUp) {
+        // Or nobody says anything, and each end has to notice the silence.
+        if matches!(link, Link::Cut | Link::CutDown | Link::CutUp) && self.chance.happens(0.5) {
             self.reset_ends(index, time + Duration::from_secs(2));
         }
         self.plan(time, Deed::MendLink(index, link));
@@ -142,8 +143,9 @@ impl Run {
             Link::Held => self.sim.release(near, far),
             Link::Cut | Link::CutDown | Link::CutUp => {
                 self.sim.repair(near, far);
-                // Whoever has begun to connect meanwhile has lost something that nobody sends again.
-                self.reset_ends(index, Duration::ZERO);
+                if self.chance.happens(0.5) {
+                    self.reset_ends(index, Duration::ZERO);
+                }
             }
             Link::Slow => self.sim.set_link_latency(near, far, self.chance.time(1, 100)),
         }
