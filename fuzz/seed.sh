@@ -2,7 +2,7 @@
 # Fills corpus/ with files to start from.
 set -eu
 cd "$(dirname "$0")"
-mkdir -p corpus/exr corpus/hdr corpus/pfm corpus/png_jpeg corpus/codec
+mkdir -p corpus/exr corpus/hdr corpus/pfm corpus/png_jpeg corpus/codec corpus/journal corpus/manifest
 cp ../common/src/image/fixtures/*.exr corpus/exr/
 printf '#?RADIANCE\nEXPOSURE=2\nCOLORCORR=1 1 2\nPRIMARIES=0.64 0.33 0.29 0.60 0.15 0.06 0.333 0.333\nFORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 10\n\002\002\000\012\212\200\212\000\212\000\212\201' > corpus/hdr/new
 printf '#?RGBE\n\n+X 1 -Y 4\n\200\100\040\201\001\001\001\003' > corpus/hdr/old
@@ -12,3 +12,7 @@ cp seeds/png_jpeg/* corpus/png_jpeg/
 # The first byte chooses the decoder: a frame of a goodbye, an access file.
 printf '\001\003\002\000\000\000\000\006' > corpus/codec/frame
 printf '\006{ "address": "127.0.0.1:45123", "certificate": "blake3:%064d", "secret": "%064d" }' 0 0 > corpus/codec/access
+# The third table, its fourth column, a number: a state that there is not.
+printf '\002\003\001\000\377\000\000\000\000\000\000\000' > corpus/journal/state
+printf '\006\004\004\001abcdefgh' > corpus/journal/output
+printf 'photos = ["*.exr"]\nenvironments = "sky.hdr"\nmodels = ["ggx"]\n[defaults]\nsamples = 32\n[[set]]\nname = "a"\nphotos = "gold.exr"\nenvironments = "sky.hdr"\nenv-rotation = 90\n[[fit]]\nname = "b"\nphoto = "tin.exr"\nenv = "sky.hdr"\nsphere = [1, 2, 3]\nmax-cssim = 0.05\n' > corpus/manifest/all

@@ -29,6 +29,21 @@ pub mod tls;
 
 pub use cli::Exit;
 
+/// What only the fuzz targets call.
+#[cfg(fuzzing)]
+#[doc(hidden)]
+pub mod fuzzing {
+    use std::path::Path;
+
+    /// How many fits a manifest lists, or what is wrong with it.
+    ///
+    /// # Errors
+    /// What is wrong with it.
+    pub fn manifest(path: &Path) -> Result<usize, String> {
+        crate::cli::manifest(path, &[]).map(|fits| fits.len()).map_err(|error| format!("{error:#}"))
+    }
+}
+
 /// The program `lookalike`: reads the process's arguments, runs the command they name, reports errors on stderr.
 #[must_use]
 pub fn main() -> ExitCode {

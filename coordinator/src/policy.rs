@@ -66,7 +66,8 @@ impl Default for Policy {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Speculation {
     /// A node is slow once it runs this many times as long as the median of its kind (default 2, at least 1); `None`: no node
-    /// ever is. Before a node of the kind is complete, none is slow.
+    /// ever is. Before a node of the kind is complete, it is so many times the longest time of any node, and at least twelve times
+    /// [`after`](Self::after).
     pub factor: Option<f64>,
     /// A node is not slow before it has run for this long (default 5 s). A worker that does not begin with the next node for
     /// this long, though it has a thread for it, is slow with it too.

@@ -117,6 +117,8 @@ pub enum Event {
     },
     /// The time of [`Core::next_deadline`] has come.
     DeadlinePassed,
+    /// The planner may have more to add, though no node has ended.
+    LookAgain,
 }
 
 /// A node that a worker says to execute.
@@ -195,6 +197,7 @@ pub fn handle_arrived(
         }
         Event::BlobRequested { worker, hash } => membership::send_blob(core, worker, hash, now, outbox),
         Event::LocalWorkersGivenUp { last_status } => core.given_up = Some(last_status),
+        Event::LookAgain => planner.look_again(&mut GraphEdit::new(&mut core.graph))?,
         Event::DeadlinePassed => {
             while let Some(worker) = core.members.silent(now) {
                 membership::drop_worker(core, worker, &Departure::Silent, now, outbox);

@@ -46,7 +46,8 @@ impl Namespace {
             skip(&why);
             return None;
         }
-        let cable = |kind: &str, index: u32| Cable::new(&name, kind, number * 8 + (serial * 2 + index) % 8);
+        // Sixteen cables for each process: more than its tests have at a time.
+        let cable = |kind: &str, index: u32| Cable::new(&name, kind, number_of(number, serial * 2 + index));
         let namespace = Self { line: cable("l", 0), control: cable("c", 1), name };
         let laid = namespace.line.lay(&namespace.name).and_then(|()| namespace.control.lay(&namespace.name));
         match laid {
@@ -146,6 +147,11 @@ impl Drop for Namespace {
     }
 }
 
+/// The number of a cable among all: there are addresses for 32768 of them.
+fn number_of(process: u32, serial: u32) -> u32 {
+    (process & 0x7ff) * 16 + serial % 16
+}
+
 impl Cable {
     /// The cable of this number: four addresses of 198.18.0.0/15 each.
     fn new(namespace: &str, kind: &str, number: u32) -> Self {
@@ -183,5 +189,19 @@ fn try_ip(arguments: &str) -> Result<(), String> {
     match output.status.success() {
         true => Ok(()),
         false => Err(String::from_utf8_lossy(&output.stderr).into_owned()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::BTreeSet;
+
+    #[test]
+    fn cables_of_a_process_and_of_its_neighbours_have_addresses_of_their_own() {
+        let cables = (0..3).flat_map(|process| (0..16).map(move |serial| number_of(process, serial)));
+        assert_eq!(cables.map(|number| Cable::new("n", "l", number).near).collect::<BTreeSet<_>>().len(), 48);
+        let last = Cable::new("n", "l", number_of(u32::MAX, 15));
+        assert_eq!((last.near.as_str(), last.far.as_str()), ("198.19.255.253", "198.19.255.254"));
     }
 }

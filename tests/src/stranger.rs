@@ -255,6 +255,30 @@ pub fn tls_of(identity: &Identity) -> Arc<ServerConfig> {
     Arc::new(server_config(identity).expect("a usable identity"))
 }
 
+/// Tell a worker something.
+///
+/// # Panics
+/// When it is gone.
+pub fn tell(stream: &mut impl Write, message: &ToWorker) {
+    let body = encode_message(message).expect("a message");
+    say_frame(stream, FrameTag::Message, &body);
+}
+
+/// The next message of a worker that sends no blobs.
+///
+/// # Panics
+/// When none comes.
+pub fn read_message(stream: &mut impl Read) -> ToCoordinator {
+    let (mut frames, mut byte) = (FrameReader::default(), [0]);
+    loop {
+        stream.read_exact(&mut byte).expect("a message in time");
+        frames.push(&byte);
+        if let Some(frame) = frames.next_frame().expect("a frame") {
+            return decode_message(&frame.body).expect("a message");
+        }
+    }
+}
+
 /// Read a worker's answer to this challenge, and say a verdict.
 ///
 /// # Errors

@@ -2,6 +2,7 @@
 
 mod ending;
 mod manifest;
+mod others;
 mod outputs;
 mod resume;
 mod same_bits;

@@ -29,8 +29,9 @@ fn reference() -> Option<Vec<u8>> {
     reference
 }
 
+/// A lease that is short for a worker that was stopped, and long for one that the machine lets wait.
 fn impatient() -> Policy {
-    Policy { heartbeat: Duration::from_millis(100), lost_after: Duration::from_millis(700), ..Policy::default() }
+    Policy { heartbeat: Duration::from_millis(100), lost_after: Duration::from_secs(3), ..Policy::default() }
 }
 
 fn wait_for_drain(cluster: &Cluster) {

@@ -2,6 +2,7 @@
 //! touch, what keeps results the same on every machine, what a file looks like. Each reads the sources; each message
 //! says where and what to do instead. ARCHITECTURE.md states the same rules in prose.
 
+mod contracts;
 mod documents;
 mod files;
 mod models;

@@ -34,7 +34,8 @@ pub struct Part<P> {
 pub enum Next<P> {
     /// This part.
     Part(Box<Part<P>>),
-    /// There are more, but the next one is not ready to begin.
+    /// There are more, but the next one is not ready to begin: whoever runs the graph is to be told when it is, with
+    /// [`Planner::look_again`].
     NotYet,
     /// No more parts.
     End,
@@ -214,6 +215,11 @@ impl<S: Parts> Planner for Many<S> {
             let (kind, label) = (kind.clone(), split_label(&label).1.to_owned());
             self.give_up(number, PartFailure::Node { kind, label, reason: reason.clone() }, graph)?;
         }
+        self.go_on(graph)
+    }
+
+    /// The next part may be there, or one has become safe.
+    fn look_again(&mut self, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
         self.go_on(graph)
     }
 

@@ -34,6 +34,16 @@ pub trait Planner {
         Err(PlanError::NodeFailed { kind, label, reason: reason.clone() })
     }
 
+    /// Something outside of the run may have changed that the planner waits for, such as inputs that are being read: more nodes may
+    /// follow. May be called at any time after [`start`](Self::start). By default nothing changes.
+    ///
+    /// # Errors
+    /// What makes the run impossible; it ends the run.
+    fn look_again(&mut self, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
+        let _ = graph;
+        Ok(())
+    }
+
     /// Whether a second run of this node would tell whether its output is right, for the share of nodes that a run verifies.
     /// Not worth it where [`completed`](Self::completed) computes the output's claims again. By default every node.
     fn is_verified_by_repetition(&self, spec: &NodeSpec) -> bool {

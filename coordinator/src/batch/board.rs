@@ -9,9 +9,10 @@ use crate::{
     cli::Exit,
     comm::RunEvent,
     fitting::Clock,
+    journal::{FitLedger, FitRow, FitStatus},
     metrics::Metrics,
     outputs::{OutFolder, Timing},
-    progress::{Display, FitCount, FitEvent},
+    progress::{Display, Ending, FitCount, FitEvent},
     settings::BatchFit,
 };
 use lookalike::{
@@ -67,16 +68,42 @@ impl State {
     }
 }
 
+impl Row {
+    /// As the journal has it.
+    fn for_the_journal(&self, number: u32) -> FitRow {
+        let (scores, error) = match &self.state {
+            State::Done(scores) => (Some(scores), None),
+            State::Failed(error) => (None, Some(error.clone())),
+            State::Waiting | State::Running | State::Stopped => (None, None),
+        };
+        let status = FitStatus {
+            name: self.name.clone(),
+            state: self.state.name().to_owned(),
+            cssim: scores.map(|scores| scores.cssim),
+            seconds: self.seconds,
+            error,
+        };
+        FitRow { number, status, outputs: scores.map(|scores| scores.files.clone()).unwrap_or_default() }
+    }
+}
+
 /// All words that [`State::name`] can say.
 const STATES: [&str; 6] = ["waiting", "running", "done", "missed", "failed", "stopped"];
 
 /// How every fit is doing.
 pub(super) struct Board {
     inner: Mutex<Inner>,
-    metrics: Option<Metrics>,
     out: OutFolder,
     /// Held while the summaries are written, so that an older one never replaces a newer one.
     writing: Mutex<()>,
+}
+
+/// Who is told how fits are doing.
+pub(super) struct Watchers {
+    pub(super) display: Box<dyn Display>,
+    pub(super) metrics: Option<Metrics>,
+    /// The journal.
+    pub(super) ledger: FitLedger,
 }
 
 struct Inner {
@@ -84,7 +111,7 @@ struct Inner {
     numbers: BTreeMap<String, u32>,
     /// Of fits under way.
     clocks: BTreeMap<u32, FitClock>,
-    display: Box<dyn Display>,
+    watchers: Watchers,
     workers_joined: usize,
     /// How the run is doing: `running`, `finished` or `stopped`.
     state: &'static str,
@@ -107,9 +134,8 @@ impl Board {
     pub(super) fn new(
         fits: &[BatchFit],
         complete: Vec<Option<(Scores, f64)>>,
+        watchers: Watchers,
         out: OutFolder,
-        display: Box<dyn Display>,
-        metrics: Option<Metrics>,
     ) -> anyhow::Result<Self> {
         let row = |(fit, complete): (&BatchFit, Option<(Scores, f64)>)| {
             let (scores, seconds) = complete.unzip();
@@ -126,15 +152,16 @@ impl Board {
             rows: fits.iter().zip(complete).map(row).collect::<Result<_, _>>()?,
             numbers: (0..).zip(fits).map(|(number, fit)| (fit.name.clone(), number)).collect(),
             clocks: BTreeMap::new(),
-            display,
+            watchers,
             workers_joined: 0,
             state: "running",
             is_stopped: false,
             began: Instant::now(),
         };
-        let board = Self { inner: Mutex::new(inner), metrics, out, writing: Mutex::new(()) };
+        (0..).zip(&inner.rows).for_each(|(number, row)| inner.watchers.ledger.tell(row.for_the_journal(number)));
+        inner.show_metrics();
+        let board = Self { inner: Mutex::new(inner), out, writing: Mutex::new(()) };
         board.write_summaries()?;
-        board.lock().show_metrics(board.metrics.as_ref());
         Ok(board)
     }
 
@@ -147,7 +174,7 @@ impl Board {
             clock.attempts += u64::from(matches!(event, RunEvent::NodeStarted { .. }));
             clock.requeued += u64::from(matches!(event, RunEvent::NodeRequeued { .. }));
         }
-        inner.display.event(event);
+        inner.watchers.display.event(event);
     }
 
     /// The inputs of a fit are there, which took so many seconds.
@@ -157,7 +184,7 @@ impl Board {
         inner.clocks.insert(number, clock);
         inner.set(number, State::Running);
         let name = inner.name(number);
-        inner.show(&FitEvent::Started { number, name, best }, self.metrics.as_ref());
+        inner.show(number, &FitEvent::Started { number, name, best });
     }
 
     /// The nodes of a fit have ended: what they cost.
@@ -181,7 +208,7 @@ impl Board {
         let name = inner.name(number);
         let seconds = inner.end(number);
         let event = FitEvent::Finished { number, name, cssim, cssim_object, is_missed, seconds };
-        inner.show(&event, self.metrics.as_ref());
+        inner.show(number, &event);
         drop(inner);
         self.write_summaries_soon();
     }
@@ -192,7 +219,7 @@ impl Board {
         inner.set(number, State::Failed(error.to_owned()));
         let name = inner.name(number);
         inner.end(number);
-        inner.show(&FitEvent::Failed { number, name, error: error.to_owned() }, self.metrics.as_ref());
+        inner.show(number, &FitEvent::Failed { number, name, error: error.to_owned() });
         drop(inner);
         self.write_summaries_soon();
     }
@@ -209,27 +236,42 @@ impl Board {
         self.lock().is_stopped
     }
 
-    /// Whether every fit has results.
-    pub(super) fn is_complete(&self) -> bool {
-        self.lock().rows.iter().all(|row| matches!(row.state, State::Done(_)))
+    /// What is wrong when all has come to its end: fits without results.
+    pub(super) fn problem(&self) -> Option<String> {
+        let FitCount { total, done, .. } = self.lock().count();
+        match (total, total - done) {
+            (_, 0) => None,
+            (1, _) => Some("the fit failed".to_owned()),
+            (_, failed) => Some(format!("{failed} of {total} fits failed")),
+        }
     }
 
-    /// The run is over: the last summaries, and the same as text.
-    pub(super) fn finish(&self, error: Option<&anyhow::Error>) -> anyhow::Result<String> {
+    /// No fit will change any more: the last summaries.
+    ///
+    /// # Errors
+    /// If they cannot be written.
+    pub(super) fn close(&self) -> anyhow::Result<()> {
         let mut inner = self.lock();
         for row in &mut inner.rows {
             if matches!(row.state, State::Waiting | State::Running) {
                 row.state = State::Stopped;
             }
         }
-        let problem = error.map(|error| format!("{error:#}"));
-        inner.display.finish(problem.as_deref().map_or(Ok(()), Err));
-        inner.show_metrics(self.metrics.as_ref());
+        inner.show_metrics();
         let is_whole = inner.rows.iter().all(|row| !matches!(row.state, State::Stopped));
         inner.state = if is_whole { "finished" } else { "stopped" };
         drop(inner);
-        self.write_summaries()?;
-        Ok(self.summary().table())
+        self.write_summaries()
+    }
+
+    /// All is written, and the run is over.
+    pub(super) fn end(&self, ending: Ending<'_>) {
+        self.lock().watchers.display.finish(ending);
+    }
+
+    /// The summaries for people.
+    pub(super) fn table(&self) -> String {
+        self.summary().table()
     }
 
     /// The exit code that the fits ask for.
@@ -314,14 +356,18 @@ impl Inner {
         count
     }
 
-    fn show(&mut self, event: &FitEvent, metrics: Option<&Metrics>) {
+    /// Tells everybody of a change of a fit.
+    fn show(&mut self, number: u32, event: &FitEvent) {
+        if let Some(row) = self.rows.get(number as usize) {
+            self.watchers.ledger.tell(row.for_the_journal(number));
+        }
+        self.show_metrics();
         let count = self.count();
-        self.display.fit(event, count);
-        self.show_metrics(metrics);
+        self.watchers.display.fit(event, count);
     }
 
-    fn show_metrics(&self, metrics: Option<&Metrics>) {
-        if let Some(metrics) = metrics {
+    fn show_metrics(&self) {
+        if let Some(metrics) = &self.watchers.metrics {
             let of = |state: &str| self.rows.iter().filter(|row| row.state.name() == state).count();
             metrics.set_fits(&STATES.map(|state| (state, of(state))));
         }

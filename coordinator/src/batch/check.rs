@@ -1,4 +1,4 @@
-//! Before any work: every file is read once, and everything that is wrong is told at once.
+//! Before any work: the inputs of every fit are read, and everything that is wrong is told at once.
 
 use super::{lights::Lights, prepare::Prepared};
 use crate::{

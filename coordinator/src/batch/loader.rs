@@ -10,6 +10,7 @@ use std::{
     },
     thread,
 };
+use tokio::sync::Notify;
 
 /// Fits that wait for their turn in memory, beside the one that is being read.
 const AHEAD: usize = 1;
@@ -32,6 +33,8 @@ pub(super) struct Shelf {
     pub(super) checks: Arc<[Checked]>,
     pub(super) lights: Arc<Lights>,
     pub(super) stage_two: StageTwo,
+    /// Told whenever a fit is there.
+    pub(super) wake: Arc<Notify>,
 }
 
 impl Loader {
@@ -60,12 +63,14 @@ fn read_all(shelf: &Shelf, sender: &SyncSender<Loaded>) {
         let prepared = Prepared::new(fit, &shelf.lights, shelf.stage_two);
         let unchanged = prepared.and_then(|prepared| {
             same(&checked.inputs, &prepared.inputs)?;
+            same_settings(&checked.identity, &prepared.identity(fit)?)?;
             Ok(Box::new(prepared))
         });
         if sender.send((number, unchanged)).is_err() {
             // Nobody wants fits any more.
             return;
         }
+        shelf.wake.notify_one();
     }
 }
 
@@ -79,6 +84,16 @@ fn same(before: &serde_json::Value, now: &serde_json::Value) -> anyhow::Result<(
         }
     }
     Ok(())
+}
+
+/// Refuses what settings say differently now, such as an exposure that comes from another file.
+fn same_settings(before: &[(&str, String)], now: &[(&str, String)]) -> anyhow::Result<()> {
+    match before.iter().zip(now).find(|(before, now)| before != now) {
+        None => Ok(()),
+        Some(((name, before), (_, now))) => {
+            bail!("{name} was {before} when the batch began and is {now} now: a file was changed; run this fit again")
+        }
+    }
 }
 
 #[cfg(test)]
@@ -95,5 +110,13 @@ mod tests {
         now["environment"]["blake3"] = json!("3");
         let message = same(&before, &now).unwrap_err().to_string();
         assert!(message.starts_with("the environment m.hdr was changed since the batch began"), "{message}");
+    }
+
+    #[test]
+    fn settings_that_files_have_changed_are_named_with_both_values() {
+        let of = |exposure: &str| [("--seed", "0".to_owned()), ("--display-exposure", exposure.to_owned())];
+        assert!(same_settings(&of("1.5"), &of("1.5")).is_ok());
+        let message = same_settings(&of("1.5"), &of("3")).unwrap_err().to_string();
+        assert!(message.starts_with("--display-exposure was 1.5 when the batch began and is 3 now"), "{message}");
     }
 }

@@ -1,7 +1,7 @@
 //! Many fits as one run.
 //!
 //! ```text
-//!   manifest ──► fits ──► check: read every file once, tell all that is wrong
+//!   manifest ──► fits ──► check: read the inputs of every fit, tell all that is wrong
 //!                           │
 //!                  loader (a thread): reads a fit's files again when its turn is near
 //!                           ▼
@@ -11,6 +11,7 @@
 //! ```
 //! The board knows how every fit is doing. Everybody tells it, and it tells the display, the metrics and the summaries.
 
+mod backlog;
 mod board;
 mod check;
 mod lights;
@@ -24,37 +25,35 @@ mod window;
 
 use crate::{
     cli::Exit,
-    fitting::{is_finished, journal_failed, run_to_end, runner_options},
+    fitting::{journal_failed, run_to_end, runner_options},
     inputs::show_warnings,
-    journal::{self, Finished, JOURNAL_FILE, JournalOptions},
+    journal::{self, Finished, FitLedger, JOURNAL_FILE, JournalOptions},
     metrics::Metrics,
     outputs::{FIT_FILES, OutFolder, print_result},
-    progress::display_of_many,
+    progress::{Ending, display_of_many},
     settings::{BatchFit, BatchSettings, OnFailure, ProgressKind},
 };
 use anyhow::Context;
-use board::Board;
+use board::{Board, Watchers};
 use lights::Lights;
 use lookalike::graph::Many;
 use std::{process::ExitCode, sync::Arc};
 use supply::{Supply, SupplyOptions};
+use tokio::sync::Notify;
 use window::{Demand, Window};
 
 /// Runs a batch and writes its results.
 pub(crate) fn run(settings: BatchSettings) -> anyhow::Result<ExitCode> {
     // Whatever can fail fails before any work is done.
-    if !settings.resume {
-        resume::refuse_old(&settings.out)?;
-    }
+    resume::refuse_old(&settings)?;
     let out = OutFolder::create(&settings.out, settings.resume)?;
     let metrics = settings.metrics.map(Metrics::listen).transpose()?;
     let lights = Arc::new(Lights::default());
     let checked = check::check(&settings, &lights)?;
     let out_name = settings.out.display().to_string();
     let identity = resume::identity(&settings.fits, &checked.fits);
-    let is_finished = settings.resume && is_finished(&out, &out_name, &identity)?;
-    let complete = |fit: &BatchFit| settings.resume.then(|| resume::complete(&out, fit)).flatten();
-    let complete: Vec<_> = settings.fits.iter().map(complete).collect();
+    let resume::Earlier { is_finished, complete, remark } =
+        resume::earlier(&out, &out_name, &identity, &settings.fits)?;
     let open: Vec<u32> =
         (0..).zip(&complete).filter(|(_, complete)| complete.is_none()).map(|(number, _)| number).collect();
     let fits: Arc<[_]> = settings.fits.into();
@@ -63,13 +62,17 @@ pub(crate) fn run(settings: BatchSettings) -> anyhow::Result<ExitCode> {
         ProgressKind::Json => checked.warnings.iter().for_each(|text| display.say(&format!("warning: {text}"))),
         _ => show_warnings(&checked.warnings),
     }
+    remark.iter().for_each(|text| display.say(text));
     metrics.iter().for_each(|metrics| display.say(&format!("metrics at {}", metrics.url())));
-    let board = Arc::new(Board::new(&fits, complete, out.clone(), display, metrics.clone())?);
+    let ledger = FitLedger::default();
+    let watchers = Watchers { display, metrics: metrics.clone(), ledger: ledger.clone() };
+    let board = Arc::new(Board::new(&fits, complete, watchers, out.clone()).context(Exit::ClusterFailed)?);
     if is_finished {
         return end(&board, Ok(()));
     }
     let workers = settings.cluster.workers.count();
     let demand = Arc::new(Demand::expecting(workers));
+    let wake = Arc::new(Notify::new());
     let (supply, written) = Supply::new(SupplyOptions {
         fits: Arc::clone(&fits),
         open: open.into(),
@@ -81,15 +84,18 @@ pub(crate) fn run(settings: BatchSettings) -> anyhow::Result<ExitCode> {
         is_fail_fast: settings.on_failure == OnFailure::FailFast,
         out: out.clone(),
         out_name,
+        wake: Arc::clone(&wake),
     })?;
     let seed = fits.first().map_or(0, |fit| fit.method.seed);
     let mut options = runner_options(&settings.cluster, &out, seed);
+    options.wake = Some(wake);
     options.journal = Some(JournalOptions {
         path: out.file(JOURNAL_FILE),
         identity,
         resume: settings.resume,
         survivors: true,
         best: None,
+        fits: ledger.clone(),
     });
     let run = run_to_end(options, Many::new(supply), metrics.as_ref(), |event| {
         demand.note(event);
@@ -98,18 +104,29 @@ pub(crate) fn run(settings: BatchSettings) -> anyhow::Result<ExitCode> {
     // Also of a run that failed: what was computed is written.
     let run = run.map(|(planner, summary)| (drop(planner), summary).1);
     written.wait();
-    if run.is_ok() && board.is_complete() {
-        let finished = Finished { outputs: outputs(&out, &fits)? };
-        journal::finish(&out.file(JOURNAL_FILE), &finished).map_err(journal_failed)?;
+    let closed = close(&out, &board, &ledger, run.is_ok(), &fits);
+    end(&board, first_error(run.map(|_| ()), closed))
+}
+
+/// Tells the journal what has come after it was closed: fits whose results were written last, and how all of it ended.
+fn close(out: &OutFolder, board: &Board, ledger: &FitLedger, is_whole: bool, fits: &[BatchFit]) -> anyhow::Result<()> {
+    let path = out.file(JOURNAL_FILE);
+    if !path.exists() {
+        // The run could not begin.
+        return Ok(());
     }
-    end(&board, run.map(|_| ()))
+    let ended = board.problem().filter(|_| is_whole);
+    journal::settle(&path, ledger, ended.as_deref()).map_err(journal_failed)?;
+    if is_whole && ended.is_none() {
+        let finished = Finished { outputs: outputs(out, fits).context(Exit::ClusterFailed)? };
+        journal::finish(&path, &finished).map_err(journal_failed)?;
+    }
+    Ok(())
 }
 
 /// Tells all that is wrong with a batch, without running it.
 pub(crate) fn check(settings: &BatchSettings) -> anyhow::Result<()> {
-    if !settings.resume {
-        resume::refuse_old(&settings.out)?;
-    }
+    resume::refuse_old(settings)?;
     show_warnings(&check::check(settings, &Lights::default())?.warnings);
     Ok(())
 }
@@ -121,22 +138,31 @@ fn outputs(out: &OutFolder, fits: &[BatchFit]) -> anyhow::Result<Vec<(String, St
     there.collect()
 }
 
-/// Tells how it went.
+/// Writes the last summaries and tells how it went.
 fn end(board: &Board, run: anyhow::Result<()>) -> anyhow::Result<ExitCode> {
-    let outcome = finish(board, run);
-    let summary = board.finish(outcome.as_ref().err())?;
-    print_result(&summary).context("cannot write to stdout")?;
-    outcome.map(|()| board.exit().into())
+    // A disk that is full may have room later.
+    let written = board.close().context(Exit::ClusterFailed);
+    let stopped =
+        run.as_ref().err().filter(|_| board.was_stopped_by_a_fit()).map(|error| error.root_cause().to_string());
+    let outcome = first_error(if stopped.is_some() { Ok(()) } else { run }, written);
+    let failed = outcome.as_ref().err().map(|error| format!("{error:#}"));
+    board.end(match (&failed, &stopped) {
+        (Some(error), _) => Ending::Failed(error),
+        (None, Some(reason)) => Ending::Stopped(reason),
+        (None, None) => Ending::Finished,
+    });
+    let printed = print_result(&board.table()).context("cannot write to stdout");
+    first_error(outcome, printed).map(|()| board.exit().into())
 }
 
-/// How the run ended, as the user is to be told. One that a failed fit ended has told that already.
-fn finish(board: &Board, run: anyhow::Result<()>) -> anyhow::Result<()> {
-    match run {
-        Err(error) if board.was_stopped_by_a_fit() => {
-            tracing::info!(%error, "the run was ended by a fit that failed");
-            Ok(())
+/// What went wrong first is the one to tell; what followed from it is logged.
+fn first_error(first: anyhow::Result<()>, then: anyhow::Result<()>) -> anyhow::Result<()> {
+    match (first, then) {
+        (Err(first), Err(then)) => {
+            tracing::warn!("{then:#}");
+            Err(first)
         }
-        other => other,
+        (first, then) => first.and(then),
     }
 }
 

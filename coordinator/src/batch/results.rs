@@ -1,11 +1,12 @@
 //! The results of fits that have ended: written beside the run, so that it never waits for a disk.
 
-use super::board::Board;
+use super::{backlog::Backlog, board::Board};
 use crate::{
     fitting::{final_parameters, final_score, final_scores, notes, write_results},
-    outputs::{FitRecord, OutFolder, Timing},
+    outputs::{FIT_FILES, FitRecord, OutFolder, Timing},
     settings::MethodSettings,
 };
+use anyhow::Context;
 use lookalike::{
     fit::{FitOutcome, Method},
     scene::Capture,
@@ -15,6 +16,7 @@ use std::sync::{
     Arc, Mutex, PoisonError,
     mpsc::{Receiver, Sender, channel},
 };
+use tokio::sync::Notify;
 
 /// What a fit was made from.
 #[derive(Debug)]
@@ -50,6 +52,8 @@ pub(super) struct Scores {
     pub(super) is_polished: bool,
     /// Whether the score lies above the fit's `max-cssim`.
     pub(super) is_missed: bool,
+    /// The files that were written, each with the BLAKE3 of its bytes.
+    pub(super) files: Vec<(String, String)>,
 }
 
 /// Writes results on the rayon pool.
@@ -62,6 +66,9 @@ pub(super) struct Writers {
     open: Sender<()>,
     /// Fits whose results were written since somebody asked.
     safe: Arc<Mutex<Vec<u32>>>,
+    backlog: Backlog,
+    /// Told whenever a fit is written.
+    wake: Arc<Notify>,
 }
 
 /// Waits for the writers.
@@ -76,9 +83,15 @@ impl Written {
 }
 
 impl Writers {
-    pub(super) fn new(board: Arc<Board>, out: OutFolder, out_name: String) -> (Self, Written) {
+    pub(super) fn new(board: Arc<Board>, out: OutFolder, out_name: String, wake: Arc<Notify>) -> (Self, Written) {
         let (open, written) = channel();
-        (Self { board, out, out_name, open, safe: Arc::default() }, Written(written))
+        let (safe, backlog) = (Arc::default(), Backlog::default());
+        (Self { board, out, out_name, open, safe, backlog, wake }, Written(written))
+    }
+
+    /// The fits that are being written.
+    pub(super) fn backlog(&self) -> &Backlog {
+        &self.backlog
     }
 
     /// The fits whose results were written since the last call.
@@ -89,7 +102,8 @@ impl Writers {
     /// Begins to write the results of a fit.
     pub(super) fn write(&self, fitted: Fitted) {
         let (board, out, open) = (Arc::clone(&self.board), self.out.clone(), self.open.clone());
-        let safe = Arc::clone(&self.safe);
+        let (safe, wake) = (Arc::clone(&self.safe), Arc::clone(&self.wake));
+        let entry = self.backlog.add(fitted.inputs.capture.photo().width() * fitted.inputs.capture.photo().height());
         let out_name = format!("{}/{}", self.out_name, fitted.name);
         rayon::spawn(move || {
             match write(&out, out_name, &fitted) {
@@ -99,6 +113,8 @@ impl Writers {
                 }
                 Err(error) => board.failed(fitted.number, &format!("{error:#}")),
             }
+            drop((fitted, entry));
+            wake.notify_one();
             drop(open);
         });
     }
@@ -120,6 +136,11 @@ fn write(out: &OutFolder, out_name: String, fitted: &Fitted) -> anyhow::Result<S
     write_results(&folder, &record, &Timing { out: out_name, ..timing.clone() })?;
     let (cssim, cssim_object) = final_scores(outcome);
     let best = final_score(&inputs.method, outcome);
+    let files = FIT_FILES.iter().map(|name| {
+        let hash = folder.hash(name)?.with_context(|| format!("{} is gone already", folder.file(name).display()))?;
+        Ok(((*name).to_owned(), hash))
+    });
+    let files = files.collect::<anyhow::Result<_>>()?;
     Ok(Scores {
         cssim,
         cssim_object,
@@ -127,5 +148,6 @@ fn write(out: &OutFolder, out_name: String, fitted: &Fitted) -> anyhow::Result<S
         parameters: final_parameters(outcome).to_vec(),
         is_polished: outcome.polished.is_some(),
         is_missed: inputs.max_cssim.is_some_and(|limit| best > limit),
+        files,
     })
 }

@@ -174,7 +174,7 @@ mod tests {
 
     fn scores(parameters: Vec<f64>, is_missed: bool) -> State {
         let (cssim, cssim_object, gamma) = (0.25, 0.125, 1.5);
-        State::Done(Scores { cssim, cssim_object, gamma, parameters, is_polished: true, is_missed })
+        State::Done(Scores { cssim, cssim_object, gamma, parameters, is_polished: true, is_missed, files: Vec::new() })
     }
 
     fn summary() -> Summary {

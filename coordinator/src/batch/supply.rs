@@ -1,6 +1,7 @@
 //! Where the parts of the run come from, and where they go: the loader's fits in, results out.
 
 use super::{
+    backlog::Load,
     board::Board,
     check::Checked,
     lights::Lights,
@@ -18,6 +19,7 @@ use lookalike::{
     graph::{Next, Part, PartFailure, Parts, PlanError},
 };
 use std::{collections::BTreeMap, sync::Arc};
+use tokio::sync::Notify;
 
 /// What a supply is made of.
 #[derive(Debug)]
@@ -34,6 +36,8 @@ pub(super) struct SupplyOptions {
     pub(super) is_fail_fast: bool,
     pub(super) out: OutFolder,
     pub(super) out_name: String,
+    /// Told whenever there may be more to begin.
+    pub(super) wake: Arc<Notify>,
 }
 
 /// The fits of a batch as the parts of its run.
@@ -63,9 +67,14 @@ impl Supply {
             checks: Arc::clone(&options.checks),
             lights: Arc::clone(&options.lights),
             stage_two: options.stage_two,
+            wake: Arc::clone(&options.wake),
         })?;
-        let (writers, written) =
-            Writers::new(Arc::clone(&options.board), options.out.clone(), options.out_name.clone());
+        let (writers, written) = Writers::new(
+            Arc::clone(&options.board),
+            options.out.clone(),
+            options.out_name.clone(),
+            Arc::clone(&options.wake),
+        );
         Ok((Self { options, loader, taken: 0, active: BTreeMap::new(), writers }, written))
     }
 
@@ -89,6 +98,12 @@ impl Supply {
         Ok(Some(Part { number, name: fit.name.clone(), planner }))
     }
 
+    /// Whether the next fit should begin beside those that are in memory.
+    fn has_room(&self, there: Load, ready: usize) -> bool {
+        let next = self.options.open.get(self.taken).and_then(|next| self.options.checks.get(*next as usize));
+        next.is_none_or(|next| self.options.window.has_room(there, ready, next.pixels))
+    }
+
     fn give_up(&mut self, number: u32, error: &str) -> Result<(), PlanError> {
         self.options.board.failed(number, error);
         self.check_failures()
@@ -108,6 +123,10 @@ impl Parts for Supply {
 
     fn next(&mut self, wait: bool) -> Result<Next<FitPlanner>, PlanError> {
         loop {
+            if wait {
+                // Nothing else is under way, but what is being written takes its room.
+                self.writers.backlog().wait_until(|load| self.has_room(load, 0));
+            }
             self.check_failures()?;
             let loaded = if wait { self.loader.wait().ok_or(true) } else { self.loader.look() };
             match loaded {
@@ -126,10 +145,8 @@ impl Parts for Supply {
     }
 
     fn wants_more(&self, active: usize, ready: usize) -> bool {
-        let next = self.options.open.get(self.taken).and_then(|next| self.options.checks.get(*next as usize));
-        let Some(next) = next else { return true };
         let pixels = self.active.values().map(|active| active.pixels).sum();
-        self.options.window.has_room(active, ready, pixels, next.pixels)
+        self.has_room(Load { fits: active, pixels } + self.writers.backlog().load(), ready)
     }
 
     fn completed(&mut self, part: Part<FitPlanner>) -> Result<(), PlanError> {
@@ -152,5 +169,56 @@ impl Parts for Supply {
 
     fn newly_safe(&mut self) -> Vec<u32> {
         self.writers.newly_safe()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        batch::{board::Watchers, window::Demand},
+        journal::FitLedger,
+        progress::display_of_many,
+        settings::ProgressKind,
+    };
+    use serde_json::Value;
+
+    /// A supply whose next fit has so many pixels, for one worker of one thread.
+    fn supply(out: &OutFolder, pixels: usize) -> Supply {
+        let watchers =
+            Watchers { display: display_of_many(ProgressKind::None, 0), metrics: None, ledger: FitLedger::default() };
+        let board = Arc::new(Board::new(&[], Vec::new(), watchers, out.clone()).unwrap());
+        let options = SupplyOptions {
+            fits: Arc::new([]),
+            open: Arc::new([]),
+            checks: Arc::new([Checked { inputs: Value::Null, pixels, identity: Vec::new() }]),
+            lights: Arc::default(),
+            board,
+            window: Window::new(Arc::new(Demand::expecting(1)), StageTwo::Workers),
+            stage_two: StageTwo::Workers,
+            is_fail_fast: false,
+            out: out.clone(),
+            out_name: String::new(),
+            wake: Arc::default(),
+        };
+        let (mut supply, _) = Supply::new(options).unwrap();
+        supply.options.open = Arc::new([0]);
+        supply
+    }
+
+    #[test]
+    fn fits_that_are_being_written_take_room_until_they_are() {
+        let folder = tempfile::tempdir().unwrap();
+        let supply = supply(&OutFolder::create(folder.path(), false).unwrap(), 1 << 20);
+        assert!(supply.wants_more(1, 0));
+        let one = supply.writers.backlog().add(1);
+        assert!(!supply.wants_more(1, 0), "one under way and one being written are two for one thread");
+        assert!(supply.wants_more(0, 0));
+        drop(one);
+        assert!(supply.wants_more(1, 0));
+        let large = supply.writers.backlog().add(2 << 20);
+        assert!(!supply.wants_more(0, 0), "more than memory holds");
+        drop(large);
+        assert!(supply.wants_more(0, 0));
     }
 }

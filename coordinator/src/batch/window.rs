@@ -1,5 +1,6 @@
 //! How many fits are under way at a time: enough to keep all workers busy, few enough for memory.
 
+use super::backlog::Load;
 use crate::{comm::RunEvent, settings::StageTwo};
 use lookalike::graph::WorkerId;
 use std::{
@@ -65,17 +66,16 @@ impl Window {
         Self { demand, stage_two, cores: rayon::current_num_threads() }
     }
 
-    /// Whether another fit of so many pixels should begin beside `active` ones, of `active_pixels` in all, with `ready` nodes for
-    /// the workers.
-    pub(super) fn has_room(&self, active: usize, ready: usize, active_pixels: usize, pixels: usize) -> bool {
+    /// Whether another fit of so many pixels should begin beside those that are in memory, with `ready` nodes for the workers.
+    pub(super) fn has_room(&self, there: Load, ready: usize, pixels: usize) -> bool {
         let threads = self.demand.threads();
         // Polish occupies one thread per fit: of the workers, or here, where fits would only queue up for it.
         let most_active = match self.stage_two {
             StageTwo::Workers => 2 * threads,
             StageTwo::Coordinator => self.cores + threads.div_ceil(4) + 1,
         };
-        let bytes = (active_pixels + pixels).saturating_mul(BYTES_PER_PIXEL);
-        ready < READY_PER_THREAD * threads && active < most_active && bytes <= MOST_BYTES
+        let bytes = (there.pixels + pixels).saturating_mul(BYTES_PER_PIXEL);
+        ready < READY_PER_THREAD * threads && there.fits < most_active && bytes <= MOST_BYTES
     }
 }
 
@@ -90,14 +90,18 @@ mod tests {
         Window { demand, stage_two, cores: 2 }
     }
 
+    fn has_room(window: &Window, fits: usize, ready: usize, there: usize, pixels: usize) -> bool {
+        window.has_room(Load { fits, pixels: there }, ready, pixels)
+    }
+
     #[test]
     fn fits_begin_until_the_workers_have_enough_to_do() {
         let window = window(8, StageTwo::Workers);
-        assert!(window.has_room(1, 15, 0, 0) && !window.has_room(1, 16, 0, 0));
-        assert!(window.has_room(15, 0, 0, 0) && !window.has_room(16, 0, 0, 0));
+        assert!(has_room(&window, 1, 15, 0, 0) && !has_room(&window, 1, 16, 0, 0));
+        assert!(has_room(&window, 15, 0, 0, 0) && !has_room(&window, 16, 0, 0, 0));
         window.demand.note(&RunEvent::WorkerLeft { worker: WorkerId(1), departure: Departure::Lost });
         assert!(
-            window.has_room(1, 1, 0, 0) && !window.has_room(1, 2, 0, 0),
+            has_room(&window, 1, 1, 0, 0) && !has_room(&window, 1, 2, 0, 0),
             "the one that was expected is not given up"
         );
     }
@@ -105,12 +109,12 @@ mod tests {
     #[test]
     fn fits_do_not_queue_up_for_a_coordinator_that_cannot_keep_up() {
         let window = window(8, StageTwo::Coordinator);
-        assert!(window.has_room(4, 0, 0, 0) && !window.has_room(5, 0, 0, 0));
+        assert!(has_room(&window, 4, 0, 0, 0) && !has_room(&window, 5, 0, 0, 0));
     }
 
     #[test]
     fn fits_under_way_have_room_in_memory() {
         let window = window(64, StageTwo::Workers);
-        assert!(window.has_room(9, 0, 9 << 18, 1 << 18) && !window.has_room(10, 0, 10 << 18, 1 << 18));
+        assert!(has_room(&window, 9, 0, 9 << 18, 1 << 18) && !has_room(&window, 10, 0, 10 << 18, 1 << 18));
     }
 }

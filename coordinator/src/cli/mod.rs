@@ -17,6 +17,8 @@ mod tokens;
 pub use exit::Exit;
 pub(crate) use exit::NotThereYet;
 pub(crate) use manifest::Problems;
+#[cfg(fuzzing)]
+pub(crate) use manifest::read as manifest;
 
 use crate::settings::DemoSettings;
 use anyhow::Context;

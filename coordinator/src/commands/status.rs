@@ -1,12 +1,19 @@
 //! `lookalike status`: the state of a run, from its journal, without disturbing it.
 
 use crate::{
-    journal::status::{Counts, RunState, Status},
+    journal::{
+        FitStatus,
+        status::{Counts, RunState, Status},
+    },
     outputs::print_result,
     settings::StatusSettings,
 };
 use anyhow::Context;
 use std::{process::ExitCode, time::Duration};
+
+/// The most fits that are listed, and the states that come first where there are more.
+const MOST_FITS: usize = 40;
+const FIRST_STATES: [&str; 3] = ["running", "failed", "missed"];
 
 /// The most workers that are listed.
 const MOST_WORKERS: usize = 20;
@@ -38,14 +45,64 @@ fn table(status: &Status, folder: &str) -> String {
     if let Some(best) = status.best_cssim {
         line("best CSSIM", format!("{best:.4}"));
     }
+    if !status.fits.is_empty() {
+        line("fits", fit_count(&status.fits));
+    }
+    text.push_str(&fits(&status.fits));
     text.push_str(&kinds(status));
     text.push_str(&workers(status));
     for failure in &status.failures {
         text.push_str(&format!("\nfailed: {} {:?}: {}\n", failure.kind, failure.label, failure.error));
     }
-    if status.state == RunState::Stopped {
-        let why = status.error.as_deref().unwrap_or("it does not say why");
-        text.push_str(&format!("\nstopped: {why}\ngo on with it: the same command with --resume\n"));
+    let why = status.error.as_deref().unwrap_or("it does not say why");
+    match status.state {
+        RunState::Stopped => {
+            text.push_str(&format!("\nstopped: {why}\ngo on with it: the same command with --resume\n"));
+        }
+        RunState::Ended => {
+            text.push_str(&format!("\nended: {why}\ntry what failed again: the same command with --resume\n"));
+        }
+        RunState::Running | RunState::Finished => {}
+    }
+    text
+}
+
+/// How many fits are in each state, in one line.
+fn fit_count(fits: &[FitStatus]) -> String {
+    let of = |state: &str| fits.iter().filter(|fit| fit.state == state).count();
+    let mut text = format!("{} of {} done", of("done") + of("missed"), fits.len());
+    for state in ["missed", "failed", "running", "waiting", "stopped"] {
+        if of(state) > 0 {
+            text.push_str(&format!(", {} {state}", of(state)));
+        }
+    }
+    text
+}
+
+/// A line per fit. Of many, those first that somebody may want to look at.
+fn fits(all: &[FitStatus]) -> String {
+    if all.is_empty() {
+        return String::new();
+    }
+    let mut shown: Vec<&FitStatus> = all.iter().collect();
+    if all.len() > MOST_FITS {
+        shown
+            .sort_by_key(|fit| FIRST_STATES.iter().position(|state| *state == fit.state).unwrap_or(FIRST_STATES.len()));
+        shown.truncate(MOST_FITS);
+    }
+    let width = shown.iter().map(|fit| fit.name.chars().count()).chain([3]).max().unwrap_or(3);
+    let mut text = format!("\n{:<width$}  {:<7}  {:>6}  {:>9}\n", "fit", "state", "CSSIM", "seconds");
+    for FitStatus { name, state, cssim, seconds, error } in &shown {
+        let cssim = cssim.map(|cssim| format!("{cssim:.4}")).unwrap_or_default();
+        let seconds = seconds.map(|seconds| format!("{seconds:.1}")).unwrap_or_default();
+        let error = error.as_deref().map(|error| format!("  {error}")).unwrap_or_default();
+        let line = format!("{name:<width$}  {state:<7}  {cssim:>6}  {seconds:>9}{error}");
+        text.push_str(line.trim_end());
+        text.push('\n');
+    }
+    match all.len() - shown.len() {
+        0 => {}
+        more => text.push_str(&format!("and {more} more fits (--json has them all)\n")),
     }
     text
 }
@@ -54,6 +111,7 @@ fn headline(status: &Status) -> &'static str {
     match status.state {
         RunState::Running => "running",
         RunState::Stopped => "stopped, not finished",
+        RunState::Ended => "ended, not all of it well",
         RunState::Finished => "finished",
     }
 }

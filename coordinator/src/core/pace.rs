@@ -10,6 +10,9 @@ use crate::policy::Speculation;
 /// How many of the latest nodes of a kind say what is usual.
 const RECENT: usize = 63;
 
+/// A node of a kind of which nobody knows how long it takes is slow after this many times what makes any other slow at the earliest.
+const UNKNOWN_IS_SLOW_AFTER: u32 = 12;
+
 /// Of how many nodes of a kind it has to be known how long they took before it is known of the kind.
 pub(crate) const ESTABLISHED: usize = 8;
 
@@ -17,6 +20,8 @@ pub(crate) const ESTABLISHED: usize = 8;
 #[derive(Debug, Default)]
 pub(crate) struct Pace {
     kinds: BTreeMap<String, KindPace>,
+    /// The longest time that any node has taken.
+    longest: Duration,
 }
 
 #[derive(Debug, Default)]
@@ -32,6 +37,7 @@ struct KindPace {
 impl Pace {
     /// A node has taken so long.
     pub(crate) fn note(&mut self, kind: &str, took: Duration) {
+        self.longest = self.longest.max(took);
         let pace = self.of(kind);
         if pace.recent.len() == RECENT
             && let Some(oldest) = pace.recent.pop_front()
@@ -70,7 +76,7 @@ impl Pace {
         is_wanted: impl Fn(NodeId) -> bool,
     ) -> Option<NodeId> {
         let slowest_of = |pace: &KindPace| {
-            let limit = pace.limit(speculation)?;
+            let limit = pace.limit(speculation, self.longest)?;
             let slow = pace.running.iter().take_while(|(since, _)| *since + limit <= now);
             slow.copied().find(|(_, node)| is_wanted(*node))
         };
@@ -80,7 +86,7 @@ impl Pace {
     /// When the next node will be slow that is not so yet.
     pub(crate) fn next_slow(&self, speculation: Speculation, now: Duration) -> Option<Duration> {
         let next_of = |pace: &KindPace| {
-            let limit = pace.limit(speculation)?;
+            let limit = pace.limit(speculation, self.longest)?;
             // Who began at this time or before is slow already. With less time than the limit behind us nobody is.
             let first = match now.checked_sub(limit) {
                 Some(begin) => pace.running.range((begin, NodeId(u64::MAX))..).next(),
@@ -102,12 +108,16 @@ impl KindPace {
     }
 
     /// A node of this kind is slow after this time; `None`: never.
-    fn limit(&self, speculation: Speculation) -> Option<Duration> {
+    fn limit(&self, speculation: Speculation, longest: Duration) -> Option<Duration> {
         let factor = speculation.factor?;
-        let median = self.usual()?;
+        let (known, least) = match self.usual() {
+            Some(median) => (median, speculation.after),
+            // The only one of its kind may hang as well as any other.
+            None => (longest, speculation.after.saturating_mul(UNKNOWN_IS_SLOW_AFTER)),
+        };
         // A policy's factor is finite; a time beyond all bounds is never reached.
-        let usual = Duration::try_from_secs_f64(median.as_secs_f64() * factor).unwrap_or(Duration::MAX / 2);
-        Some(usual.max(speculation.after))
+        let slow = Duration::try_from_secs_f64(known.as_secs_f64() * factor).unwrap_or(Duration::MAX / 2);
+        Some(slow.max(least).min(Duration::MAX / 2))
     }
 }
 
@@ -123,8 +133,12 @@ mod tests {
         let mut pace = Pace::default();
         pace.watch("search", 10 * SECOND, NodeId(1));
         let all = |_| true;
-        assert_eq!(pace.slowest(policy, 1000 * SECOND, all), None);
-        assert_eq!(pace.next_slow(policy, 10 * SECOND), None);
+        // Of the first one nobody knows, so it may take longer.
+        assert_eq!(pace.next_slow(policy, 10 * SECOND), Some(70 * SECOND));
+        pace.note("transport", 100 * SECOND);
+        assert_eq!(pace.next_slow(policy, 10 * SECOND), Some(210 * SECOND));
+        assert_eq!(pace.slowest(policy, 209 * SECOND, all), None);
+        assert_eq!(pace.slowest(policy, 210 * SECOND, all), Some(NodeId(1)));
         [1, 2, 9].iter().for_each(|took| pace.note("search", *took * SECOND));
         assert_eq!(pace.next_slow(policy, 10 * SECOND), Some(15 * SECOND));
         [9, 9].iter().for_each(|took| pace.note("search", *took * SECOND));

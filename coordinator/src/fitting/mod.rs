@@ -13,20 +13,20 @@ pub(crate) use identity::{FitIdentity, version};
 pub(crate) use method::method;
 pub(crate) use notes::notes;
 pub(crate) use results::{final_parameters, final_score, final_scores, judge, write_results};
-pub(crate) use resume::is_finished;
+pub(crate) use resume::{is_finished, missing};
 pub(crate) use running::{run_to_end, runner_options};
 
 use crate::{
     cli::Exit,
-    journal::{self, JOURNAL_FILE, JournalError, JournalOptions},
+    journal::{self, FitLedger, JOURNAL_FILE, JournalError, JournalOptions},
     metrics::Metrics,
     outputs::{FitRecord, OutFolder, Pictures, Timing, print_summary},
-    progress::display,
+    progress::{Display, Ending, display},
     settings::{ClusterSettings, MethodSettings, MetricsAddress, ProgressKind},
 };
 use anyhow::Context;
 use lookalike::{
-    fit::{FitOutcome, FitPlanner},
+    fit::{FitOutcome, FitPlanner, Method},
     scene::Capture,
 };
 use serde_json::Value;
@@ -68,6 +68,43 @@ pub(crate) struct Finished {
 
 /// Runs a fit and writes its results; `None` if that was done before.
 pub(crate) fn run(job: FitJob) -> anyhow::Result<Option<Finished>> {
+    let method = method(&job.settings)?;
+    let planner = FitPlanner::new(Arc::clone(&job.capture), method.clone(), job.exposure)
+        .context("the photo cannot be fitted")?
+        .also_render(&job.also_render);
+    let metrics = job.metrics.map(Metrics::listen).transpose()?;
+    let mut display = display(job.progress, planner.best());
+    let done = run_shown(&job, &method, planner, metrics.as_ref(), &mut *display);
+    let problem = done.as_ref().err().map(|error| format!("{error:#}"));
+    display.finish(problem.as_deref().map_or(Ending::Finished, Ending::Failed));
+    let Some(Done { outcome, pictures, timing, notes }) = done? else { return Ok(None) };
+    let record = record(&job, &method, &outcome, &notes);
+    print_summary(&record, &timing, &job.out_name).context("cannot write to stdout")?;
+    let best = final_score(&method, &outcome);
+    let missed = job.max_cssim.is_some_and(|limit| best > limit);
+    if let (true, Some(limit)) = (missed, job.max_cssim) {
+        eprintln!("the match has a score of {best:.4} (--judge {}), more than --max-cssim {limit}", judge(&method));
+    }
+    let code = if missed { Exit::MissedMaxCssim } else { Exit::Done };
+    Ok(Some(Finished { outcome, pictures, code: code.into() }))
+}
+
+/// A fit whose results are written.
+struct Done {
+    outcome: FitOutcome,
+    pictures: Pictures,
+    timing: Timing,
+    notes: Vec<String>,
+}
+
+/// The part of a fit that its display shows: up to its last file.
+fn run_shown(
+    job: &FitJob,
+    method: &Method,
+    planner: FitPlanner,
+    metrics: Option<&Metrics>,
+    display: &mut dyn Display,
+) -> anyhow::Result<Option<Done>> {
     let identity = FitIdentity {
         inputs: &job.inputs,
         capture: &job.capture,
@@ -76,15 +113,9 @@ pub(crate) fn run(job: FitJob) -> anyhow::Result<Option<Finished>> {
         also_render: &job.also_render,
     };
     let identity = identity.of_run()?;
-    if job.resume && is_finished(&job.out, &job.out_name, &identity)? {
+    if job.resume && is_finished(&job.out, &job.out_name, &identity, |text| display.say(text))? {
         return Ok(None);
     }
-    let method = method(&job.settings)?;
-    let planner = FitPlanner::new(Arc::clone(&job.capture), method.clone(), job.exposure)
-        .context("the photo cannot be fitted")?
-        .also_render(&job.also_render);
-    let metrics = job.metrics.map(Metrics::listen).transpose()?;
-    let mut display = display(job.progress, planner.best());
     let mut clock = Clock::start();
     let mut options = runner_options(&job.cluster, &job.out, job.settings.seed);
     options.journal = Some(JournalOptions {
@@ -93,16 +124,14 @@ pub(crate) fn run(job: FitJob) -> anyhow::Result<Option<Finished>> {
         resume: job.resume,
         survivors: job.is_resumable,
         best: Some(planner.best()),
+        fits: FitLedger::default(),
     });
-    let run = run_to_end(options, planner, metrics.as_ref(), |event| {
+    let (planner, summary) = run_to_end(options, planner, metrics, |event| {
         clock.note(event);
         display.event(event);
-    });
-    let problem = run.as_ref().err().map(|error| format!("{error:#}"));
-    display.finish(problem.as_deref().map_or(Ok(()), Err));
-    let (planner, summary) = run?;
+    })?;
     let outcome = planner.into_outcome().context("the graph ended without a result: please report this")?;
-    let notes = notes(&method, &outcome);
+    let notes = notes(method, &outcome);
     let mut seconds = vec![("inputs", job.input_seconds)];
     seconds.extend(clock.stages());
     seconds.push(("total", job.input_seconds + clock.total()));
@@ -114,26 +143,24 @@ pub(crate) fn run(job: FitJob) -> anyhow::Result<Option<Finished>> {
         attempts: summary.attempts,
         requeued: summary.requeued_nodes,
     };
-    let record = FitRecord {
+    // A disk that is full may have room later, and then nothing is computed again.
+    let pictures = write_results(&job.out, &record(job, method, &outcome, &notes), &timing);
+    let pictures = pictures.context(Exit::ClusterFailed)?;
+    let finished = journal::Finished { outputs: job.out.results().context(Exit::ClusterFailed)? };
+    journal::finish(&job.out.file(JOURNAL_FILE), &finished).map_err(journal_failed)?;
+    Ok(Some(Done { outcome, pictures, timing, notes }))
+}
+
+fn record<'a>(job: &'a FitJob, method: &'a Method, outcome: &'a FitOutcome, notes: &'a [String]) -> FitRecord<'a> {
+    FitRecord {
         settings: &job.settings,
-        method: &method,
+        method,
         capture: &job.capture,
         inputs: &job.inputs,
-        outcome: &outcome,
+        outcome,
         display_exposure: job.exposure,
-        notes: &notes,
-    };
-    let pictures = write_results(&job.out, &record, &timing)?;
-    let finished = journal::Finished { outputs: job.out.results()? };
-    journal::finish(&job.out.file(JOURNAL_FILE), &finished).map_err(journal_failed)?;
-    print_summary(&record, &timing, &job.out_name).context("cannot write to stdout")?;
-    let best = final_score(&method, &outcome);
-    let missed = job.max_cssim.is_some_and(|limit| best > limit);
-    if let (true, Some(limit)) = (missed, job.max_cssim) {
-        eprintln!("the match has a score of {best:.4} (--judge {}), more than --max-cssim {limit}", judge(&method));
+        notes,
     }
-    let code = if missed { Exit::MissedMaxCssim } else { Exit::Done };
-    Ok(Some(Finished { outcome, pictures, code: code.into() }))
 }
 
 /// What went wrong with a journal, with its exit code.

@@ -27,7 +27,7 @@ pub(crate) fn runner_options(cluster: &ClusterSettings, out: &OutFolder, seed: u
 
 /// Runs a planner to its end. Its errors carry their exit code.
 pub(crate) fn run_to_end<P: Planner>(
-    options: RunnerOptions,
+    mut options: RunnerOptions,
     planner: P,
     metrics: Option<&Metrics>,
     mut observer: impl FnMut(&RunEvent),
@@ -38,6 +38,7 @@ pub(crate) fn run_to_end<P: Planner>(
         .build()
         .context("cannot start the network runtime")?;
     if let Some(metrics) = metrics {
+        options.pulse = Some(metrics.pulse());
         let _guard = runtime.enter();
         runtime.spawn(metrics.serve()?);
     }

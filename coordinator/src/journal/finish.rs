@@ -3,9 +3,9 @@
 use std::path::Path;
 
 use rusqlite::{OptionalExtension, params};
-use serde_json::{Map, Value};
 
 use super::error::JournalError;
+use super::fits::{self, FitLedger};
 use super::identity::RunIdentity;
 use super::{past, schema, status, unix_ms};
 
@@ -18,8 +18,7 @@ pub(crate) struct Finished {
 /// Mark a run as finished. The outputs of its nodes are dropped: the results are written, and the outputs are large.
 pub(crate) fn finish(path: &Path, finished: &Finished) -> Result<(), JournalError> {
     let connection = schema::open(path)?;
-    let outputs = finished.outputs.iter().map(|(name, hash)| (name.clone(), Value::from(hash.as_str())));
-    let outputs = Value::Object(outputs.collect::<Map<_, _>>()).to_string();
+    let outputs = fits::files_json(&finished.outputs);
     let write = || -> rusqlite::Result<()> {
         let now = unix_ms();
         connection.execute("UPDATE run SET finished_ms = ?1, outputs = ?2", params![now, outputs])?;
@@ -38,14 +37,37 @@ pub(crate) fn finish(path: &Path, finished: &Finished) -> Result<(), JournalErro
     Ok(())
 }
 
+/// Write what the fits of a run came to after its journal was closed. With `ended`, all of them have ended, but not all of them well:
+/// how many did not.
+pub(crate) fn settle(path: &Path, ledger: &FitLedger, ended: Option<&str>) -> Result<(), JournalError> {
+    let mut connection = schema::open(path)?;
+    let rows = ledger.take();
+    let mut write = || -> rusqlite::Result<()> {
+        let transaction = connection.transaction()?;
+        fits::write(&transaction, &rows)?;
+        if let Some(ended) = ended {
+            let now = unix_ms();
+            transaction.execute("UPDATE run SET finished_ms = ?1", [now])?;
+            transaction.execute(
+                "UPDATE epochs SET ended_ms = ?1, seen_ms = ?1, ended = ?2 WHERE epoch = (SELECT max(epoch) FROM epochs)",
+                params![now, ended],
+            )?;
+        }
+        transaction.commit()
+    };
+    write().map_err(|source| JournalError::writing(path, source))?;
+    // What follows only tidies up.
+    let _ = status::write(&connection, path);
+    let _ = connection.pragma_update(None, "journal_mode", "DELETE");
+    Ok(())
+}
+
 /// The finished run of a journal, if it is finished, after a check that it is one of these inputs and settings.
 pub(crate) fn finished(path: &Path, identity: &RunIdentity) -> Result<Option<Finished>, JournalError> {
     let connection = schema::open(path)?;
     past::check_identity(path, &connection, identity)?;
-    let sql = "SELECT outputs FROM run WHERE finished_ms IS NOT NULL";
+    let sql = "SELECT outputs FROM run WHERE outputs IS NOT NULL";
     let outputs = connection.query_row(sql, [], |row| row.get::<_, String>(0)).optional();
     let outputs = outputs.map_err(|source| JournalError::reading(path, source))?;
-    let Some(Ok(Value::Object(outputs))) = outputs.map(|text| serde_json::from_str(&text)) else { return Ok(None) };
-    let output = |(name, hash): (String, Value)| Some((name, hash.as_str()?.to_owned()));
-    Ok(outputs.into_iter().map(output).collect::<Option<_>>().map(|outputs| Finished { outputs }))
+    Ok(outputs.and_then(|text| fits::files_of(&text)).map(|outputs| Finished { outputs }))
 }

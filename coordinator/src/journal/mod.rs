@@ -18,6 +18,7 @@
 //! | `attempts` | lease that was given out: worker, when, how it ended |
 //! | `workers`, `local_workers` | connection of a worker; process of this machine that was started as one |
 //! | `results` | node key: the hash and the bytes of its output |
+//! | `fits` | fit of a run of many: how it is doing, what it wrote |
 //!
 //! What nothing depends on is written about once a second: `deferred.rs`.
 //!
@@ -31,6 +32,7 @@ mod deferred;
 mod disk;
 mod error;
 mod finish;
+mod fits;
 mod identity;
 mod lock;
 mod past;
@@ -55,7 +57,9 @@ pub(crate) use self::batch::Batch;
 use self::deferred::Deferred;
 use self::disk::Disk;
 pub use self::error::JournalError;
-pub(crate) use self::finish::{Finished, finish, finished};
+pub(crate) use self::finish::{Finished, finish, finished, settle};
+pub use self::fits::{FitLedger, FitStatus};
+pub(crate) use self::fits::{FitRow, written};
 pub use self::identity::{Difference, RunIdentity};
 pub use self::lock::{LOCK_FILE, LockError, RunLock};
 pub(crate) use self::past::Past;
@@ -80,13 +84,15 @@ pub struct JournalOptions {
     pub survivors: bool,
     /// The best score so far, for people who look at the run.
     pub best: Option<Arc<BestScore>>,
+    /// What becomes of the fits, in a run of many.
+    pub fits: FitLedger,
 }
 
 impl JournalOptions {
     /// A new run, which cannot be gone on with by surviving workers.
     #[must_use]
     pub fn new(path: PathBuf, identity: RunIdentity) -> Self {
-        Self { path, identity, resume: false, survivors: false, best: None }
+        Self { path, identity, resume: false, survivors: false, best: None, fits: FitLedger::default() }
     }
 }
 

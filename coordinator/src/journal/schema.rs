@@ -83,6 +83,15 @@ CREATE TABLE results (
     hash        BLOB NOT NULL,
     bytes       BLOB
 );
+CREATE TABLE fits (
+    name        TEXT PRIMARY KEY,
+    number      INTEGER NOT NULL,
+    state       TEXT NOT NULL,
+    cssim       REAL,
+    seconds     REAL,
+    error       TEXT,
+    outputs     TEXT
+) WITHOUT ROWID;
 CREATE VIEW node_list AS
     SELECT id >> 32 AS epoch, id & 0xffffffff AS node, kind, label,
            CASE state WHEN 0 THEN 'waiting' WHEN 1 THEN 'ready' WHEN 2 THEN 'running' WHEN 3 THEN 'completed'

@@ -11,6 +11,7 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use super::error::JournalError;
+use super::fits::{self, FitStatus};
 use super::lock::RunLock;
 use super::schema::node_id;
 use super::{JOURNAL_FILE, place, schema};
@@ -35,6 +36,8 @@ pub enum RunState {
     Running,
     /// No coordinator is at work, and the run is not finished: `--resume` goes on with it.
     Stopped,
+    /// Every fit has come to its end, but some of them failed: `--resume` tries those again.
+    Ended,
     /// All results are written.
     Finished,
 }
@@ -60,7 +63,7 @@ pub struct Status {
     pub started_at: String,
     /// When the last coordinator was last seen to write.
     pub updated_at: String,
-    /// When the results were written.
+    /// When the results were written, or the last fit ended.
     pub finished_at: Option<String>,
     /// The seconds that its coordinators were at work, together.
     pub elapsed_s: f64,
@@ -78,6 +81,9 @@ pub struct Status {
     pub best_cssim: Option<f64>,
     /// The nodes that failed, at most 100.
     pub failures: Vec<NodeError>,
+    /// The fits of a run of many, in their order.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub fits: Vec<FitStatus>,
 }
 
 /// How many nodes are where.
@@ -192,7 +198,7 @@ impl Status {
 
     /// What the writer of the status cannot know: whether it is still there.
     fn settle(&mut self, is_running: Option<bool>) {
-        if self.state == RunState::Finished {
+        if matches!(self.state, RunState::Finished | RunState::Ended) {
             return;
         }
         // Where nobody can tell it is as it was.
@@ -210,6 +216,8 @@ impl Status {
                     "its coordinator ended without a word: it was killed, or the machine stopped".into()
                 });
                 self.workers.clear();
+                let open = self.fits.iter_mut().filter(|fit| matches!(fit.state.as_str(), "waiting" | "running"));
+                open.for_each(|fit| fit.state = "stopped".into());
             }
             None => {}
         }
@@ -246,9 +254,9 @@ pub(super) fn write(connection: &Connection, journal: &Path) -> anyhow::Result<(
 
 /// The status that a journal tells.
 fn read(connection: &Connection) -> rusqlite::Result<Status> {
-    let sql = "SELECT lower(hex(name)), started_ms, finished_ms FROM run";
-    let (run, started, finished): (String, i64, Option<i64>) =
-        connection.query_row(sql, [], |row| Ok((row.get(0)?, row.get(1)?, row.get(2)?)))?;
+    let sql = "SELECT lower(hex(name)), started_ms, finished_ms, outputs IS NOT NULL FROM run";
+    let (run, started, finished, is_whole): (String, i64, Option<i64>, bool) =
+        connection.query_row(sql, [], |row| Ok((row.get(0)?, row.get(1)?, row.get(2)?, row.get(3)?)))?;
     let sql = "SELECT epoch, process, host, seen_ms, ended, ended_ms FROM epochs ORDER BY epoch DESC LIMIT 1";
     let (epoch, process, host, seen, ended, ended_ms) = connection.query_row(sql, [], |row| {
         let ended: (Option<String>, Option<i64>) = (row.get(4)?, row.get(5)?);
@@ -266,7 +274,8 @@ fn read(connection: &Connection) -> rusqlite::Result<Status> {
     Ok(Status {
         schema: SCHEMA.to_owned(),
         state: match (finished, ended_ms) {
-            (Some(_), _) => RunState::Finished,
+            (Some(_), _) if is_whole => RunState::Finished,
+            (Some(_), _) => RunState::Ended,
             (None, Some(_)) if ended.is_some() => RunState::Stopped,
             _ => RunState::Running,
         },
@@ -286,6 +295,7 @@ fn read(connection: &Connection) -> rusqlite::Result<Status> {
         requeued,
         best_cssim,
         failures: failures(connection, epoch)?,
+        fits: fits::read(connection)?,
     })
 }
 

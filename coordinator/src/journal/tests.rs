@@ -14,6 +14,8 @@ use super::status::{RunState, Status};
 use super::*;
 use crate::comm::WorkerProcess;
 
+mod fits;
+
 const NAME: RunName = RunName([7; 16]);
 const DEATHS: Deaths = Deaths { in_company: 2, alone: 1, excused: 3 };
 

@@ -13,6 +13,7 @@ use super::JournalOptions;
 use super::batch::{Batch, NodeRow};
 use super::deferred::{Deferred, ms};
 use super::error::JournalError;
+use super::fits;
 use super::schema::node_id;
 use super::status;
 use super::unix_ms;
@@ -98,7 +99,9 @@ impl Writer {
             return Ok(());
         }
         let mut new = Vec::new();
+        let fits = self.options.fits.take();
         let outcome = self.connection.transaction().and_then(|transaction| {
+            fits::write(&transaction, &fits)?;
             new = write(&transaction, self.epoch, batch, &self.results)?;
             let rows = if is_much { Some(self.deferred.write(&transaction)?) } else { None };
             transaction.commit()?;
@@ -109,7 +112,10 @@ impl Writer {
             Some(_) => outcome.and_then(|()| self.reach_the_disk()),
             None => outcome,
         };
-        outcome.map_err(|source| JournalError::writing(&self.options.path, source))?;
+        if let Err(source) = outcome {
+            self.options.fits.put_back(fits);
+            return Err(JournalError::writing(&self.options.path, source));
+        }
         self.results.extend(new);
         // A node that is added again after its output was released runs again, and its output has to be written again.
         for key in batch.forgotten.iter().chain(&batch.released) {
@@ -166,14 +172,19 @@ impl Writer {
 
     /// Write what could wait.
     fn write_deferred(&mut self) {
+        let fits = self.options.fits.take();
         let outcome = self.connection.transaction().and_then(|transaction| {
+            fits::write(&transaction, &fits)?;
             let rows = self.deferred.write(&transaction)?;
             transaction.commit()?;
             Ok(rows)
         });
         match outcome {
             Ok(rows) => self.deferred.written(rows),
-            Err(error) => warn!(%error, "cannot note in the journal what is under way"),
+            Err(error) => {
+                self.options.fits.put_back(fits);
+                warn!(%error, "cannot note in the journal what is under way");
+            }
         }
     }
 

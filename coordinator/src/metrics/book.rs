@@ -145,7 +145,10 @@ impl Book {
             RunEvent::NodeReady { node } => self.wait(*node, now),
             RunEvent::NodeAssigned { node, .. } => {
                 self.attempts += 1;
-                self.change(*node, State::Leased);
+                // One that runs goes on when a second worker gets it too.
+                if self.open.get(node).is_some_and(|open| open.state < State::Leased) {
+                    self.change(*node, State::Leased);
+                }
             }
             RunEvent::NodeStarted { name, site } => {
                 self.attempts += u64::from(*site == Site::Coordinator);

@@ -1,4 +1,4 @@
-//! As much of HTTP/1.1 as a scraper needs: one GET or HEAD per connection, one page. Bounded in time, size and number, for anybody
+//! As much of HTTP/1.1 as a scraper or a probe needs: one GET or HEAD per connection. Bounded in time, size and number, for anybody
 //! who can connect may ask.
 
 use super::text::MEDIA_TYPE;
@@ -20,17 +20,29 @@ const MOST_HEAD_BYTES: usize = 8 << 10;
 /// The pause after the system refuses to accept a connection, such as for want of file descriptors.
 const ACCEPT_PAUSE: Duration = Duration::from_millis(100);
 
-/// Answers requests with what `page` says at their time.
-pub(super) async fn serve(listener: TcpListener, page: impl Fn() -> String + Send + Sync + 'static) {
-    let (places, page) = (Arc::new(Semaphore::new(AT_A_TIME)), Arc::new(page));
+/// What is served.
+pub(super) trait Pages: Send + Sync + 'static {
+    /// The metrics as of now.
+    fn page(&self) -> String;
+
+    /// What is wrong with the run itself, so far as that can be seen from outside.
+    ///
+    /// # Errors
+    /// In words.
+    fn health(&self) -> Result<(), String>;
+}
+
+/// Answers requests with what the pages says at their time.
+pub(super) async fn serve(listener: TcpListener, pages: impl Pages) {
+    let (places, pages) = (Arc::new(Semaphore::new(AT_A_TIME)), Arc::new(pages));
     loop {
         let Ok(place) = Arc::clone(&places).acquire_owned().await else { return };
         match listener.accept().await {
             Ok((stream, _)) => {
-                let page = Arc::clone(&page);
+                let pages = Arc::clone(&pages);
                 tokio::spawn(async move {
                     // Nobody but the scraper cares how it ended.
-                    let _ = timeout(PATIENCE, answer(stream, &*page)).await;
+                    let _ = timeout(PATIENCE, answer(stream, &*pages)).await;
                     drop(place);
                 });
             }
@@ -42,9 +54,9 @@ pub(super) async fn serve(listener: TcpListener, page: impl Fn() -> String + Sen
     }
 }
 
-async fn answer(mut stream: TcpStream, page: impl Fn() -> String) -> io::Result<()> {
+async fn answer(mut stream: TcpStream, pages: &impl Pages) -> io::Result<()> {
     let head = read_head(&mut stream).await?;
-    stream.write_all(&response(&head, page)).await?;
+    stream.write_all(&response(&head, pages)).await?;
     stream.shutdown().await
 }
 
@@ -62,7 +74,7 @@ async fn read_head(stream: &mut TcpStream) -> io::Result<Vec<u8>> {
 }
 
 /// The answer to a request with this head.
-pub(super) fn response(head: &[u8], page: impl Fn() -> String) -> Vec<u8> {
+pub(super) fn response(head: &[u8], pages: &impl Pages) -> Vec<u8> {
     let line = head.split(|byte| *byte == b'\r').next().unwrap_or_default();
     let line = String::from_utf8_lossy(line);
     let words: Vec<&str> = line.split(' ').collect();
@@ -77,8 +89,17 @@ pub(super) fn response(head: &[u8], page: impl Fn() -> String) -> Vec<u8> {
     }
     let with_body = method == "GET";
     match target.split('?').next() {
-        Some("/metrics") => message("200 OK", "", &page(), with_body),
-        _ => message("404 Not Found", "", "the metrics are at /metrics\n", with_body),
+        Some("/metrics") => message("200 OK", "", &pages.page(), with_body),
+        Some("/healthz") => match pages.health() {
+            Ok(()) => message("200 OK", "", "ok\n", with_body),
+            Err(what) => message("503 Service Unavailable", "", &format!("{what}\n"), with_body),
+        },
+        _ => message(
+            "404 Not Found",
+            "",
+            "the metrics are at /metrics, and whether the run goes on at /healthz\n",
+            with_body,
+        ),
     }
 }
 

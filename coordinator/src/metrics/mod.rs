@@ -8,13 +8,13 @@ mod histogram;
 mod http;
 mod text;
 
-use crate::{cli::Exit, comm::RunEvent, settings::MetricsAddress};
+use crate::{cli::Exit, comm::RunEvent, runner::Pulse, settings::MetricsAddress};
 use anyhow::Context;
 use book::Book;
 use std::{
     net::{SocketAddr, TcpListener},
     sync::{Arc, Mutex, PoisonError},
-    time::Instant,
+    time::{Duration, Instant},
 };
 
 /// The metrics of a run, and where they are served. Clones are the same metrics.
@@ -23,7 +23,11 @@ pub(crate) struct Metrics {
     book: Arc<Mutex<Book>>,
     listener: Arc<TcpListener>,
     address: SocketAddr,
+    pulse: Arc<Pulse>,
 }
+
+/// A loop that does not go round for so long hangs: it reads at most a photo and its light in one go.
+const LONGEST_ROUND: Duration = Duration::from_secs(30);
 
 impl Metrics {
     /// Takes the address; requests wait until [`Metrics::serve`] answers them.
@@ -38,7 +42,12 @@ impl Metrics {
         };
         let cannot = || format!("cannot serve metrics on {address}; is the address this machine's, and the port free?");
         let (address, listener) = bind().with_context(cannot).context(Exit::BadInput)?;
-        Ok(Self { book: Arc::new(Mutex::new(Book::new(Instant::now()))), listener: Arc::new(listener), address })
+        Ok(Self {
+            book: Arc::new(Mutex::new(Book::new(Instant::now()))),
+            listener: Arc::new(listener),
+            address,
+            pulse: Arc::default(),
+        })
     }
 
     /// What to type into a browser.
@@ -49,6 +58,11 @@ impl Metrics {
     /// Takes note of what happened.
     pub(crate) fn note(&self, event: &RunEvent) {
         self.with_book(|book| book.note(event, Instant::now()));
+    }
+
+    /// What the loop of the run has to show its rounds to.
+    pub(crate) fn pulse(&self) -> Arc<Pulse> {
+        Arc::clone(&self.pulse)
     }
 
     /// How many fits there are in each state.
@@ -63,13 +77,30 @@ impl Metrics {
     pub(crate) fn serve(&self) -> anyhow::Result<impl Future<Output = ()> + Send + use<>> {
         let listener = self.listener.try_clone().and_then(tokio::net::TcpListener::from_std);
         let listener = listener.context("cannot serve metrics")?;
-        let metrics = self.clone();
-        Ok(http::serve(listener, move || metrics.with_book(|book| text::page(book, Instant::now()))))
+        Ok(http::serve(listener, self.clone()))
     }
 
     fn with_book<T>(&self, use_it: impl FnOnce(&mut Book) -> T) -> T {
         // A panic cannot leave the numbers half changed in a way that matters.
         use_it(&mut self.book.lock().unwrap_or_else(PoisonError::into_inner))
+    }
+}
+
+impl http::Pages for Metrics {
+    fn page(&self) -> String {
+        self.with_book(|book| text::page(book, Instant::now()))
+    }
+
+    fn health(&self) -> Result<(), String> {
+        health(self.pulse.age())
+    }
+}
+
+/// Whether a loop is well that went round so long ago, if it has begun.
+fn health(age: Option<Duration>) -> Result<(), String> {
+    match age.filter(|age| *age > LONGEST_ROUND) {
+        None => Ok(()),
+        Some(age) => Err(format!("the loop that hands out work went round {} s ago", age.as_secs())),
     }
 }
 

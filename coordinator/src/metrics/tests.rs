@@ -2,7 +2,8 @@
 
 use super::{
     book::Book,
-    http::response,
+    health,
+    http::{Pages, response},
     text::{escaped, page},
 };
 use crate::comm::{Departure, NodeName, RunEvent, Site};
@@ -81,6 +82,21 @@ fn nodes_are_where_the_last_event_left_them() {
 }
 
 #[test]
+fn node_that_runs_goes_on_when_a_second_worker_gets_it_too() {
+    let began = Instant::now();
+    let mut book = Book::new(began);
+    book.note(&RunEvent::NodeAdded { name: name(0, "search") }, began);
+    book.note(&RunEvent::NodeReady { node: NodeId(0) }, began);
+    let assigned = |worker| RunEvent::NodeAssigned { node: NodeId(0), worker: WorkerId(worker) };
+    book.note(&assigned(1), began);
+    book.note(&RunEvent::NodeStarted { name: name(0, "search"), site: Site::Worker(WorkerId(1)) }, began);
+    book.note(&assigned(2), began);
+    let page = page(&book, began);
+    let nodes = |state: &str| value(&page, &format!("lookalike_nodes{{kind=\"search\",state=\"{state}\"}}"));
+    assert_eq!((nodes("leased"), nodes("running"), value(&page, "lookalike_node_attempts_total")), (0.0, 1.0, 2.0));
+}
+
+#[test]
 fn every_sample_belongs_to_a_family_that_was_announced_and_names_follow_the_conventions() {
     let page = run();
     let mut family = (String::new(), String::new());
@@ -100,9 +116,33 @@ fn every_sample_belongs_to_a_family_that_was_announced_and_names_follow_the_conv
     assert_eq!(escaped("a\\b\"c\nd"), "a\\\\b\\\"c\\nd");
 }
 
+/// A run whose loop went round so many seconds ago.
+struct Round(Option<u64>);
+
+impl Pages for Round {
+    fn page(&self) -> String {
+        "x 1\n".to_owned()
+    }
+
+    fn health(&self) -> Result<(), String> {
+        health(self.0.map(Duration::from_secs))
+    }
+}
+
+#[test]
+fn health_is_that_of_the_loop() {
+    let answer = |age: Option<u64>| String::from_utf8(response(b"GET /healthz HTTP/1.1\r\n\r\n", &Round(age))).unwrap();
+    for well in [None, Some(0), Some(30)] {
+        assert!(answer(well).starts_with("HTTP/1.1 200 OK\r\n"), "{well:?}");
+    }
+    let hangs = answer(Some(31));
+    assert!(hangs.starts_with("HTTP/1.1 503 Service Unavailable\r\n"), "{hangs}");
+    assert!(hangs.ends_with("\r\n\r\nthe loop that hands out work went round 31 s ago\n"), "{hangs}");
+}
+
 #[test]
 fn requests_get_the_page_or_are_told_where_it_is() {
-    let answer = |head: &str| String::from_utf8(response(head.as_bytes(), || "x 1\n".to_owned())).unwrap();
+    let answer = |head: &str| String::from_utf8(response(head.as_bytes(), &Round(None))).unwrap();
     let page = answer("GET /metrics?a=b HTTP/1.1\r\nHost: h\r\n\r\n");
     assert!(page.starts_with("HTTP/1.1 200 OK\r\nContent-Type: text/plain; version=0.0.4"), "{page}");
     assert!(page.contains("\r\nContent-Length: 4\r\n") && page.ends_with("\r\n\r\nx 1\n"), "{page}");

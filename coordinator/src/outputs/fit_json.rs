@@ -173,7 +173,6 @@ fn uncertainty_json(model: &dyn Model, parameters: &[f64], uncertainty: &[Uncert
     json!({ "relative": relative, "state": by_name(model, &state.collect::<Vec<_>>()) })
 }
 
-/// The name of a choice as it is typed on the command line.
 /// A choice as the command line calls it.
 pub(crate) fn name_of(choice: &impl clap::ValueEnum) -> String {
     choice.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned())

@@ -19,7 +19,7 @@ pub(crate) struct OutFolder {
 }
 
 /// The mark of a finished fit.
-const MARK: &str = "fit.json";
+pub(crate) const MARK: &str = "fit.json";
 
 /// What every fit leaves behind.
 pub(crate) const FIT_FILES: [&str; 6] =
@@ -55,7 +55,7 @@ impl OutFolder {
             ),
             (false, true, false) => bail!(
                 "{shown} already holds a run that is not finished ({JOURNAL_FILE}): go on with it with --resume, choose another \
-                 --out, or remove it first"
+                 --out, or remove that folder first"
             ),
         }
     }

@@ -1,7 +1,7 @@
 //! One bar per stage, with the best CSSIM so far.
 
 use super::{
-    Display, print_line, remark,
+    Display, Ending, print_line, remark,
     stage::{Count, Stage, Tally},
 };
 use crate::comm::RunEvent;
@@ -61,7 +61,7 @@ impl Display for Bars {
         }
     }
 
-    fn finish(&mut self, _outcome: Result<(), &str>) {
+    fn finish(&mut self, _ending: Ending<'_>) {
         // A bar that is complete keeps the time at which it was: drawing it again would show the time of now.
         for bar in self.bars.values().filter(|bar| !bar.is_finished()) {
             bar.disable_steady_tick();

@@ -1,7 +1,7 @@
 //! One JSON object per line on stderr, for programs. docs/progress.md is the contract.
 
 use super::{
-    Display,
+    Display, Ending,
     fits::{FitCount, FitEvent},
     print_line,
 };
@@ -52,10 +52,11 @@ impl Display for JsonLines {
         self.print(json!({ "event": "message", "text": text }));
     }
 
-    fn finish(&mut self, outcome: Result<(), &str>) {
-        self.print(match outcome {
-            Ok(()) => json!({ "event": "finished" }),
-            Err(error) => json!({ "event": "failed", "error": error }),
+    fn finish(&mut self, ending: Ending<'_>) {
+        self.print(match ending {
+            Ending::Finished => json!({ "event": "finished" }),
+            Ending::Stopped(reason) => json!({ "event": "stopped", "reason": reason }),
+            Ending::Failed(error) => json!({ "event": "failed", "error": error }),
         });
     }
 }

@@ -1,6 +1,6 @@
 //! A line when a stage is complete, for logs and pipes.
 
-use super::{Display, print_line, remark, stage::Tally};
+use super::{Display, Ending, print_line, remark, stage::Tally};
 use crate::{comm::RunEvent, progress::stage::Stage};
 use lookalike::fit::BestScore;
 use std::{sync::Arc, time::Instant};
@@ -36,5 +36,5 @@ impl Display for Lines {
         print_line(text);
     }
 
-    fn finish(&mut self, _outcome: Result<(), &str>) {}
+    fn finish(&mut self, _ending: Ending<'_>) {}
 }

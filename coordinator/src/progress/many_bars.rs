@@ -2,7 +2,7 @@
 //! ended.
 
 use super::{
-    Display,
+    Display, Ending,
     fits::{FitCount, FitEvent},
     print_line, remark_of_many,
     stage::{Count, Stage, Tally},
@@ -165,7 +165,7 @@ impl Display for ManyBars {
         }
     }
 
-    fn finish(&mut self, _outcome: Result<(), &str>) {
+    fn finish(&mut self, _ending: Ending<'_>) {
         for row in std::mem::take(&mut self.fits).into_values() {
             self.clear(row);
         }

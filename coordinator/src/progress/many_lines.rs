@@ -1,7 +1,7 @@
 //! A line when a fit of a batch has ended, for logs and pipes.
 
 use super::{
-    Display,
+    Display, Ending,
     fits::{FitCount, FitEvent},
     print_line, remark_of_many,
 };
@@ -38,5 +38,5 @@ impl Display for ManyLines {
         print_line(text);
     }
 
-    fn finish(&mut self, _outcome: Result<(), &str>) {}
+    fn finish(&mut self, _ending: Ending<'_>) {}
 }

@@ -17,6 +17,17 @@ use std::{
     sync::Arc,
 };
 
+/// How a run ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Ending<'a> {
+    /// All has come to its end.
+    Finished,
+    /// It was ended early, as it was asked to be; why.
+    Stopped(&'a str),
+    /// It could not go on; why.
+    Failed(&'a str),
+}
+
 /// Something that watches a run.
 pub(crate) trait Display: Send {
     /// Takes note of what happened.
@@ -28,8 +39,8 @@ pub(crate) trait Display: Send {
     /// A line of text for people, above any bars.
     fn say(&mut self, text: &str);
 
-    /// The run is over, well or with an error; nothing may be left moving.
-    fn finish(&mut self, outcome: Result<(), &str>);
+    /// The run is over, and all that it leaves is written; nothing may be left moving.
+    fn finish(&mut self, ending: Ending<'_>);
 }
 
 /// A line on stderr. When nobody reads it any more, the run goes on all the same.
@@ -73,7 +84,7 @@ impl Display for Silent {
         print_line(text);
     }
 
-    fn finish(&mut self, _outcome: Result<(), &str>) {}
+    fn finish(&mut self, _ending: Ending<'_>) {}
 }
 
 /// Nothing but what has to be told: fits that failed.
@@ -92,7 +103,7 @@ impl Display for SilentMany {
         print_line(text);
     }
 
-    fn finish(&mut self, _outcome: Result<(), &str>) {}
+    fn finish(&mut self, _ending: Ending<'_>) {}
 }
 
 /// As [`remark`], for a batch: of a node that fails, its fit tells.
@@ -120,6 +131,11 @@ fn remark(event: &RunEvent) -> Option<String> {
         }
         RunEvent::NodeSuspected { name, deaths } => Some(format!(
             "warning: {deaths} workers have died while they computed {}: from now on it runs alone",
+            name.label
+        )),
+        RunEvent::AnswersDiffer { name, first, second, error } => Some(format!(
+            "warning: {} has an output and an error ({error}), one from {first} and one from {second}: one of these machines is not to \
+             be trusted",
             name.label
         )),
         RunEvent::NodeSpeculated { name, worker } => {

@@ -8,7 +8,7 @@ use lookalike::graph::{Blob, BlobHash, Input, NodeFailure, NodeId, NodeState, Pl
 use proptest::prelude::*;
 
 use super::tests::{Script, node, process};
-use super::{Event, handle, start};
+use super::{Event, Executing, handle, start};
 use crate::comm::{Action, Departure, Outbox, Site};
 use crate::core::{Core, Policy};
 use crate::policy::Speculation;
@@ -44,8 +44,13 @@ enum Deed {
     },
     /// Time passes; who is not heard of is lost.
     PassTime {
-        milliseconds: u64,
+        microseconds: u64,
         heard: u8,
+    },
+    /// A process whose connection broke is back, still at what it executed, as far as this says.
+    Return {
+        which: usize,
+        is_at_it: bool,
     },
     RunHere,
 }
@@ -60,7 +65,10 @@ fn deed() -> impl Strategy<Value = Deed> {
         2 => (0..99_usize).prop_map(|lease| Deed::LateAnswer { lease }),
         1 => (0..9_usize).prop_map(|worker| Deed::Fetch { worker }),
         1 => (0..9_usize).prop_map(|worker| Deed::Drain { worker }),
-        2 => (0..4000_u64, any::<u8>()).prop_map(|(milliseconds, heard)| Deed::PassTime { milliseconds, heard }),
+        1 => (0..4_000_000_u64, any::<u8>()).prop_map(|(microseconds, heard)| Deed::PassTime { microseconds, heard }),
+        // So little that nodes are short.
+        3 => (0..400_u64, any::<u8>()).prop_map(|(microseconds, heard)| Deed::PassTime { microseconds, heard }),
+        2 => (0..9_usize, any::<bool>()).prop_map(|(which, is_at_it)| Deed::Return { which, is_at_it }),
         2 => Just(Deed::RunHere),
     ]
 }
@@ -79,6 +87,12 @@ struct World {
     ever: Vec<(NodeId, u32)>,
     here: BTreeSet<(NodeId, u32)>,
     next_worker: u64,
+    /// The process that each connected worker is.
+    processes: BTreeMap<WorkerId, u64>,
+    /// Processes that live but have lost their connection, with what they execute.
+    cut_off: Vec<(u64, BTreeMap<NodeId, u32>)>,
+    /// Who is just telling what it executes, and what.
+    telling: Option<(WorkerId, BTreeMap<NodeId, u32>)>,
 }
 
 /// Nodes whose number is divisible by this have an application error instead of an output.
@@ -125,6 +139,9 @@ impl World {
             ever: Vec::new(),
             here: BTreeSet::new(),
             next_worker: 1,
+            processes: BTreeMap::new(),
+            cut_off: Vec::new(),
+            telling: None,
         };
         start(&mut world.core, &mut world.planner, world.now, &mut world.outbox).unwrap();
         world.listen();
@@ -144,7 +161,11 @@ impl World {
                     let leases = self.connected.get_mut(&worker).expect("only connected workers get leases");
                     assert_eq!(leases.insert(lease.node, lease.attempt), None, "given twice to {worker}");
                     self.ever.push((lease.node, lease.attempt));
+                    if self.has_told(worker, lease.node).is_some() {
+                        self.executing.insert((worker, lease.node));
+                    }
                 }
+                Action::Cancel { worker, lease } if self.has_told(worker, lease.node) == Some(lease.attempt) => {}
                 Action::Cancel { worker, lease } => {
                     let attempt = self.connected.get_mut(&worker).and_then(|leases| leases.remove(&lease.node));
                     self.executing.remove(&(worker, lease.node));
@@ -160,6 +181,12 @@ impl World {
                 | Action::Tell(_) => {}
             }
         }
+    }
+
+    /// The attempt under which a worker has just told that it executes a node.
+    fn has_told(&self, worker: WorkerId, node: NodeId) -> Option<u32> {
+        let (telling, executing) = self.telling.as_ref()?;
+        executing.get(&node).copied().filter(|_| *telling == worker)
     }
 
     /// Each ready node for workers waits in one place or is held by one or two connected workers, and we agree with the core who.
@@ -182,7 +209,12 @@ impl World {
         }
         for (worker, leases) in &self.connected {
             let member = self.core.members.get(*worker).unwrap();
-            assert!(!member.has_too_much(self.core.policy.spare_leases), "{member:?}");
+            let spare = self.core.policy.spare_leases;
+            assert!(!member.has_too_much(spare), "{member:?}");
+            let told = leases.keys().filter(|node| self.executing.contains(&(*worker, **node))).count();
+            assert!(leases.len() <= told.max(member.threads) + spare + 500 * member.threads, "{member:?}");
+            let is_long = self.core.pace.established("test").is_none();
+            assert!(!is_long || leases.len() <= told.max(member.threads) + spare, "{member:?}");
             assert!(leases.keys().eq(member.leases.keys()));
             let executing = leases.keys().filter(|node| self.executing.contains(&(*worker, **node)));
             assert_eq!(executing.count(), member.executing());
@@ -194,6 +226,7 @@ impl World {
 
     fn disconnect(&mut self, worker: WorkerId) {
         self.connected.remove(&worker);
+        self.processes.remove(&worker);
         self.executing.retain(|(other, _)| *other != worker);
     }
 
@@ -246,10 +279,26 @@ impl World {
     }
 
     fn join(&mut self, threads: usize) {
+        self.join_as(self.next_worker, threads);
+    }
+
+    fn join_as(&mut self, name: u64, threads: usize) -> WorkerId {
         let worker = WorkerId(self.next_worker);
         self.next_worker += 1;
         self.connected.insert(worker, BTreeMap::new());
-        self.tell(Event::WorkerJoined { worker, threads, process: process(worker.0) });
+        self.processes.insert(worker, name);
+        self.tell(Event::WorkerJoined { worker, threads, process: process(name) });
+        worker
+    }
+
+    /// A process is back, and tells what it executes.
+    fn come_back(&mut self, (name, executing): (u64, BTreeMap<NodeId, u32>)) {
+        let worker = self.join_as(name, executing.len().max(1));
+        let told = |(node, attempt): (&NodeId, &u32)| Executing { node: *node, attempt: *attempt, permille: 0 };
+        let beat = Event::Heartbeat { worker, executing: executing.iter().map(told).collect() };
+        self.telling = Some((worker, executing));
+        self.tell(beat);
+        self.telling = None;
     }
 
     fn act(&mut self, deed: Deed) {
@@ -260,7 +309,13 @@ impl World {
                 let violation = Departure::Violation("test".into());
                 let departures =
                     [Departure::Lost, Departure::Silent, Departure::Goodbye, Departure::TooSlow, violation];
-                self.lose(worker, departures[usize::from(departure)].clone());
+                let departure = departures[usize::from(departure)].clone();
+                let at_it =
+                    self.connected[&worker].iter().filter(|(node, _)| self.executing.contains(&(worker, **node)));
+                let at_it = at_it.map(|(node, attempt)| (*node, *attempt)).collect();
+                let name = self.processes[&worker];
+                self.lose(worker, departure);
+                self.cut_off.push((name, at_it));
             }
             Deed::Begin { worker, lease } => {
                 let Some(worker) = self.chosen(worker) else { return };
@@ -293,10 +348,17 @@ impl World {
                 self.connected.insert(worker, kept);
                 self.tell(Event::WorkerDrains { worker });
             }
-            Deed::PassTime { milliseconds, heard } => {
-                self.now += Duration::from_millis(milliseconds);
+            Deed::PassTime { microseconds, heard } => {
+                self.now += Duration::from_micros(microseconds);
                 let heard = self.connected.keys().copied().filter(|worker| heard >> (worker.0 % 8) & 1 == 1);
                 self.pass(heard.collect());
+            }
+            Deed::Return { which, is_at_it } => {
+                if self.cut_off.is_empty() {
+                    return;
+                }
+                let (name, at_it) = self.cut_off.swap_remove(which % self.cut_off.len());
+                self.come_back((name, if is_at_it { at_it } else { BTreeMap::new() }));
             }
             Deed::RunHere => {
                 if let Some(run) = self.here.pop_first() {

@@ -7,7 +7,7 @@ use lookalike::graph::{Blob, Graph, Input, NodeId, NodeKey, NodeSpec, Placement,
 
 use super::tests::{Script, node, process};
 use super::{Event, handle, start};
-use crate::comm::{Action, Departure, Outbox, RunEvent};
+use crate::comm::{Action, Departure, Outbox, RunEvent, Site};
 use crate::core::{Core, Deaths, Policy};
 use crate::recall::{Memory, Recall};
 use crate::runner::RunError;
@@ -157,4 +157,31 @@ fn survivor_gets_what_it_has_in_hand_before_others_get_anything() {
     // An idle worker is given what merely waits somewhere, and not what was begun.
     let third = bench.join(WorkerId(3));
     assert!(third.iter().all(|said| !said.contains(" gets 0.")), "{third:?}");
+}
+
+#[test]
+fn output_that_deaths_make_the_last_word_is_kept() {
+    let nodes = vec![leaf("x", Placement::Worker)];
+    let policy = Policy { verify_fraction: 1.0, ..Policy::default() };
+    let core = Core::new(policy, 1).with_recall(Box::new(Notebook::default()));
+    let mut bench = Bench { core, planner: Script { nodes, ..Script::default() }, outbox: Outbox::default() };
+    start(&mut bench.core, &mut bench.planner, Duration::ZERO, &mut bench.outbox).unwrap();
+    bench.join(A);
+    let output = Blob::new(vec![5]);
+    let finished = Event::Finished { site: Site::Worker(A), node: NodeId(0), attempt: 1, output: output.clone() };
+    bench.handle(finished).unwrap();
+    bench.handle(Event::WorkerLeft { worker: A, departure: Departure::Goodbye }).unwrap();
+    for death in 1..=2 {
+        let worker = WorkerId(10 + death);
+        bench.join(worker);
+        let attempt = bench.core.look(NodeId(0)).unwrap().attempts;
+        bench.handle(Event::Started { worker, node: NodeId(0), attempt }).unwrap();
+        let lost = Event::WorkerLeft { worker, departure: Departure::Lost };
+        handle(&mut bench.core, &mut bench.planner, lost, Duration::ZERO, &mut bench.outbox).unwrap();
+        let actions = bench.outbox.take();
+        let counts = actions.iter().any(|action| matches!(action, Action::Tell(RunEvent::DeathsCounted { .. })));
+        let keeps = actions.contains(&Action::Keep { node: NodeId(0), output: output.clone() });
+        assert_eq!((counts, keeps), (true, death == 2));
+    }
+    assert!(bench.core.is_finished());
 }

@@ -33,6 +33,8 @@ pub(super) struct Script {
     pub(super) blob: Vec<u8>,
     /// Added once node 0 is complete.
     pub(super) follow_up: Option<NodeSpec>,
+    /// Added when it is told to look again.
+    pub(super) late: Option<NodeSpec>,
     /// Released once node 0 is complete.
     pub(super) released: Vec<NodeId>,
     pub(super) released_blob: Option<BlobHash>,
@@ -70,6 +72,10 @@ impl Planner for Script {
         let (kind, label) = graph.spec(node).map(|spec| (spec.kind.clone(), spec.label.clone())).unwrap();
         let error = PlanError::NodeFailed { kind, label, reason: reason.clone() };
         if self.tolerates_failures { Ok(()) } else { Err(error) }
+    }
+
+    fn look_again(&mut self, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
+        self.late.take().map_or(Ok(()), |spec| graph.add_node(spec).map(|_| ()))
     }
 
     fn is_verified_by_repetition(&self, _: &NodeSpec) -> bool {
@@ -222,6 +228,15 @@ fn worker_is_not_given_more_bytes_than_it_may_leave_unread() {
     assert_eq!(bench.start(A, 0, 1), ["worker 1 gets 8.1"]);
     assert_eq!(bench.finish(A, 1, 1, 0), ["worker 1 is thanked for 1.1", "worker 1 gets 9.1"]);
     assert_eq!(bench.core.members.get(A).unwrap().waiting.len(), 8);
+}
+
+#[test]
+fn what_the_planner_adds_when_it_looks_again_is_given_out_at_once() {
+    let late = Some(node("late", vec![], Placement::Worker));
+    let mut bench = Bench::new(Script { late, ..independent(1) });
+    bench.join(A, 2);
+    assert_eq!(bench.handle(Event::LookAgain), ["worker 1 gets 1.1"]);
+    assert!(bench.handle(Event::LookAgain).is_empty());
 }
 
 #[test]

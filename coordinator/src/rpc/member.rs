@@ -305,3 +305,80 @@ fn failure(kind: FailureKind, message: String) -> NodeFailure {
 fn unexpected(expected: &'static str, found: &str) -> WireError {
     WireError::Unexpected { expected, found: found.to_owned() }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use lookalike::protocol::{FrameTag, encode_message, frame_header};
+    use tokio::io::duplex;
+    use tokio::sync::mpsc::channel;
+    use tokio::time::{Instant, sleep};
+
+    const HEARTBEAT: Duration = Duration::from_secs(1);
+
+    fn reader<R: AsyncRead + Unpin>(stream: R, inbound: Sender<Inbound>) -> Reader<R> {
+        let incoming = Incoming::new(stream);
+        Reader {
+            worker: WorkerId(1),
+            epoch: 1,
+            has_reported: true,
+            output: None,
+            unasked_bytes: 0,
+            pending_blobs: Arc::default(),
+            max_pending_blobs: 1,
+            heartbeat: HEARTBEAT,
+            told: incoming.heard(),
+            incoming,
+            inbound,
+        }
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn worker_on_a_slow_line_is_heard_of_though_no_frame_ends_for_long() {
+        let (mut near, far) = duplex(1 << 20);
+        let (inbound, mut events) = channel(1024);
+        let reading = tokio::spawn(async move { reader(far, inbound).read_to_the_end().await });
+        let output = vec![7; 50_000];
+        let lease = LeaseName { node: 3, attempt: 1, epoch: 1 };
+        let hash = lookalike::graph::Blob::new(output.clone()).hash().0;
+        let announced = encode_message(&ToCoordinator::Finished { lease, hash, length: 50_000 }).unwrap();
+        near.write_all(&frame_header(FrameTag::Message, announced.len()).unwrap()).await.unwrap();
+        near.write_all(&announced).await.unwrap();
+        near.write_all(&frame_header(FrameTag::Part, output.len()).unwrap()).await.unwrap();
+        let began = Instant::now();
+        for piece in output.chunks(1000) {
+            sleep(HEARTBEAT / 2).await;
+            near.write_all(piece).await.unwrap();
+        }
+        drop(near);
+        assert_eq!(reading.await.unwrap(), Departure::Lost);
+        let took = began.elapsed();
+        let (mut signs, mut finished) = (0, 0);
+        while let Some(event) = events.recv().await {
+            match event {
+                Inbound::Event(Event::Heartbeat { .. }) => signs += 1,
+                Inbound::Timed { event: Event::Finished { .. }, .. } => finished += 1,
+                other => panic!("{other:?}"),
+            }
+        }
+        assert_eq!((took, finished), (25 * HEARTBEAT, 1));
+        assert!((20..=25).contains(&signs), "{signs} in 25 heartbeats");
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn worker_hears_of_its_coordinator_as_often_as_that_one_of_it() {
+        let (near, far) = duplex(1 << 20);
+        let (mailbox, postman) = mailbox(1000);
+        let writing = tokio::spawn(async move {
+            write(Patient::new(near, HEARTBEAT), postman, HEARTBEAT, &AtomicUsize::new(0)).await
+        });
+        let mut incoming = Incoming::new(far);
+        let began = Instant::now();
+        for _ in 0..5 {
+            assert_eq!(incoming.message::<ToWorker>().await.unwrap(), ToWorker::Heartbeat);
+        }
+        assert_eq!(began.elapsed(), 5 * HEARTBEAT);
+        drop(mailbox);
+        writing.await.unwrap().unwrap();
+    }
+}

@@ -17,6 +17,7 @@ mod here;
 mod interrupt;
 mod memory;
 mod options;
+mod pulse;
 mod survivors;
 
 use std::error::Error as _;
@@ -26,6 +27,7 @@ use std::time::Duration;
 use lookalike::graph::{NodeId, Planner, Registry, WorkerId};
 use lookalike::protocol::{Assignment, LeaseName, RunName, ToWorker};
 use lookalike_worker::world::{Real, World};
+use tokio::sync::Notify;
 use tokio::sync::mpsc::{Receiver, UnboundedReceiver, channel, unbounded_channel};
 use tokio::time::{Instant, MissedTickBehavior, interval, sleep_until};
 use tokio_util::sync::CancellationToken;
@@ -37,6 +39,7 @@ use self::here::Here;
 use self::interrupt::Interrupt;
 use self::memory::{Group, Memory};
 pub use self::options::RunnerOptions;
+pub use self::pulse::Pulse;
 use self::survivors::{Arrival, Survivors};
 use crate::comm::{Action, Lease, Outbox, RunEvent, Site, WorkerProcess};
 use crate::core::{Core, RunSummary};
@@ -157,11 +160,15 @@ impl<W: World, P: Planner, O: FnMut(&RunEvent)> Driver<W, P, O> {
     ) -> Result<(), RunError> {
         // Dropped when this returns: a connection that waits for room must not wait for ever.
         let (sender, mut inbound) = channel(INBOUND_CAPACITY);
+        let (wake, pulse) = (begin.options.wake.clone(), begin.options.pulse.clone());
         let mut failure = self.begin(begin, sender).await?;
         let mut glance = interval(GLANCE);
         glance.set_missed_tick_behavior(MissedTickBehavior::Delay);
+        let mut beat = interval(pulse::INTERVAL);
+        beat.set_missed_tick_behavior(MissedTickBehavior::Delay);
         let mut events = Vec::new();
         loop {
+            pulse.iter().for_each(|pulse| pulse.beat());
             let is_over = failure.is_some() || self.core.is_finished();
             if is_over && self.memory.is_written() {
                 return failure.map_or(Ok(()), Err);
@@ -184,6 +191,8 @@ impl<W: World, P: Planner, O: FnMut(&RunEvent)> Driver<W, P, O> {
                     self.here.tell_progress(&mut self.observer);
                     continue;
                 }
+                () = told(wake.as_deref()), if may_act => events.push(Inbound::Event(Event::LookAgain)),
+                _ = beat.tick(), if pulse.is_some() => continue,
                 () = sleep_or_wait(return_time), if may_act => {}
                 () = sleep_or_wait(deadline), if may_act => {}
             }
@@ -455,6 +464,13 @@ const GLANCE: Duration = Duration::from_millis(250);
 
 /// More threads than this on one worker are a mistake or a lie.
 const MAX_THREADS: usize = 4096;
+
+async fn told(wake: Option<&Notify>) {
+    match wake {
+        Some(wake) => wake.notified().await,
+        None => std::future::pending().await,
+    }
+}
 
 async fn sleep_or_wait(deadline: Option<Instant>) {
     match deadline {

@@ -3,8 +3,11 @@
 use std::net::{Ipv4Addr, SocketAddr};
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
+use std::sync::Arc;
 
-use super::RunError;
+use tokio::sync::Notify;
+
+use super::{Pulse, RunError};
 use crate::core::Policy;
 use crate::journal::JournalOptions;
 use crate::limits::Limits;
@@ -36,6 +39,10 @@ pub struct RunnerOptions {
     pub policy: Policy,
     /// Where to write the run down, so that it can be gone on with; `None` forgets it when this process ends.
     pub journal: Option<JournalOptions>,
+    /// By whom the planner is told to [look again](lookalike::graph::Planner::look_again); `None` never tells it.
+    pub wake: Option<Arc<Notify>>,
+    /// Where the run shows that it goes round, about once a second.
+    pub pulse: Option<Arc<Pulse>>,
     /// Whether Ctrl-C and SIGTERM stop the run in order, with [`RunError::Interrupted`].
     pub handle_signals: bool,
 }
@@ -56,6 +63,8 @@ impl RunnerOptions {
             limits: Limits::default(),
             policy: Policy::default(),
             journal: None,
+            wake: None,
+            pulse: None,
             handle_signals: true,
         }
     }

@@ -64,9 +64,10 @@ impl SlurmJob {
         let script = self.write()?;
         let output = Command::new(sbatch).arg("--parsable").arg(&script).current_dir(&self.folder).output();
         let output = output.map_err(|error| not_started(&error, sbatch, &script))?;
-        let job = job_number(&output, sbatch).with_context(|| {
+        refused(&output, sbatch).with_context(|| {
             format!("the job was not submitted; its script is {}, to be mended and submitted by hand", script.display())
         })?;
+        let job = job_number(&output, sbatch)?;
         Ok(Submitted { log: self.out.join(format!("slurm-{job}.out")), job, script })
     }
 
@@ -81,23 +82,26 @@ impl SlurmJob {
     }
 }
 
-/// What `sbatch --parsable` says: the number, and on clusters of clusters a semicolon and a name.
-fn job_number(output: &Output, sbatch: &str) -> anyhow::Result<String> {
-    let said = |bytes: &[u8]| String::from_utf8_lossy(bytes).trim().to_owned();
+/// What went wrong, where the job was not taken. Warnings of one that was taken are passed on.
+fn refused(output: &Output, sbatch: &str) -> anyhow::Result<()> {
+    let said = String::from_utf8_lossy(&output.stderr).trim().to_owned();
     if !output.status.success() {
-        let words = said(&output.stderr);
-        let words = if words.is_empty() { output.status.to_string() } else { words };
+        let words = if said.is_empty() { output.status.to_string() } else { said };
         return Err(anyhow::anyhow!("{sbatch}: {words}").context(Exit::ClusterFailed));
     }
-    // Warnings of a job that was taken.
-    let warnings = said(&output.stderr);
-    if !warnings.is_empty() {
-        eprintln!("{warnings}");
+    if !said.is_empty() {
+        eprintln!("{said}");
     }
-    let answer = said(&output.stdout);
-    let number = answer.split(';').next().unwrap_or_default();
+    Ok(())
+}
+
+/// What `sbatch --parsable` says: the number, and on clusters of clusters a semicolon and a name. Some sites greet before that.
+fn job_number(output: &Output, sbatch: &str) -> anyhow::Result<String> {
+    let answer = String::from_utf8_lossy(&output.stdout);
+    let last = answer.lines().map(str::trim).rfind(|line| !line.is_empty()).unwrap_or_default();
+    let number = last.split(';').next().unwrap_or_default();
     if number.is_empty() || !number.bytes().all(|byte| byte.is_ascii_digit()) {
-        bail!("expected the number of a job from {sbatch}, found {answer:?}");
+        bail!("{sbatch} took the job, but its number is not in {:?}: see squeue", answer.trim());
     }
     Ok(number.to_owned())
 }

@@ -28,7 +28,8 @@ impl SlurmJob {
         }
         let command = self.command.iter().map(|argument| quoted(argument)).collect::<Vec<_>>().join(" ");
         let program = quoted(text_of(&self.program)?);
-        let begin = format!("export LOOKALIKE={program}\nset -- {command}\n");
+        let results = quoted(text_of(&self.out)?);
+        let begin = format!("export LOOKALIKE={program}\nresults={results}\nset -- {command}\n");
         Ok(TEMPLATE.replacen(OPTIONS, &self.directives()?, 1).replacen(COMMAND_LINE, &begin, 1))
     }
 

@@ -45,12 +45,12 @@ fn options_of_the_user_come_last_and_before_any_command() {
 
 #[test]
 fn shell_reads_the_command_line_as_it_was_given() {
-    let script = job(Path::new("/scratch/run")).script().unwrap();
+    let script = job(Path::new("/scratch/a run")).script().unwrap();
     let begin = script.find("export LOOKALIKE=").unwrap();
-    let lines: String = script[begin..].lines().take(2).map(|line| format!("{line}\n")).collect();
-    let shown = format!("{lines}printf '%s|' \"$LOOKALIKE\" \"$@\"");
+    let lines: String = script[begin..].lines().take(3).map(|line| format!("{line}\n")).collect();
+    let shown = format!("{lines}printf '%s|' \"$LOOKALIKE\" \"$results\" \"$@\"");
     let output = Command::new("bash").args(["-c", &shown]).output().unwrap();
-    let expected = "/opt/look alike/bin/lookalike|batch|it's $HOME.toml|--out|run|";
+    let expected = "/opt/look alike/bin/lookalike|/scratch/a run|batch|it's $HOME.toml|--out|run|";
     assert_eq!(String::from_utf8_lossy(&output.stdout), expected);
 }
 
@@ -93,6 +93,12 @@ fn what_sbatch_says_reaches_the_user_with_the_exit_code() {
     let error = job.submit("no-such-sbatch").unwrap_err();
     assert!(error.to_string().starts_with("cannot find no-such-sbatch"), "{error}");
     assert_eq!(error.downcast_ref::<Exit>(), None);
+    // It took the job, whatever it says.
     let silent = sbatch(folder.path(), "echo welcome");
-    assert!(format!("{:#}", job.submit(&silent).unwrap_err()).contains("found \"welcome\""));
+    let error = format!("{:#}", job.submit(&silent).unwrap_err());
+    assert!(error.contains("took the job, but its number is not in \"welcome\": see squeue"), "{error}");
+    assert!(!error.contains("not submitted"), "{error}");
+    for banner in ["echo 'Welcome to Vega'; echo 4711", "echo; echo '1 job(s) of yours wait'; echo '4711;east'; echo"] {
+        assert_eq!(job.submit(&sbatch(folder.path(), banner)).unwrap().job, "4711", "{banner}");
+    }
 }

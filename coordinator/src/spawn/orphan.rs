@@ -1,6 +1,8 @@
 //! Local workers that have outlived the coordinator that started them, and work for the next one of the run.
 
 use std::collections::BTreeSet;
+use std::ffi::OsStr;
+use std::os::unix::ffi::OsStrExt;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -75,15 +77,20 @@ pub(crate) fn is_worker_alive(process: u32, access: &Path) -> bool {
     }
     // Where there is no such file nobody can tell. A process that has ended and was not waited for has an empty one.
     let line = std::fs::read(format!("/proc/{process}/cmdline"));
-    line.map_or(cfg!(not(target_os = "linux")), |line| is_worker(&line, access))
+    let folder = format!("/proc/{process}/cwd");
+    line.map_or(cfg!(not(target_os = "linux")), |line| is_worker(&line, folder.as_ref(), access))
 }
 
-/// Whether this is the command line of a local worker with this access file.
-fn is_worker(line: &[u8], access: &Path) -> bool {
+/// Whether this is the command line of a local worker with this access file, started in this folder.
+fn is_worker(line: &[u8], folder: &Path, access: &Path) -> bool {
     let words: Vec<&[u8]> = line.split(|byte| *byte == 0).collect();
-    let has_access =
-        words.windows(2).any(|pair| pair[0] == b"--access" && pair[1] == access.as_os_str().as_encoded_bytes());
-    has_access && words.contains(&b"--leash".as_slice())
+    let argument = words.windows(2).find(|pair| pair[0] == b"--access").map(|pair| OsStr::from_bytes(pair[1]));
+    let is_same = |argument: &OsStr| {
+        // Each coordinator may have said it as seen from its own folder.
+        let place = std::fs::canonicalize(folder.join(argument)).ok();
+        argument == access.as_os_str() || (place.is_some() && place == std::fs::canonicalize(access).ok())
+    };
+    words.contains(&b"--leash".as_slice()) && argument.is_some_and(is_same)
 }
 
 fn pid(process: u32) -> Option<Pid> {
@@ -104,15 +111,16 @@ mod tests {
 
     #[test]
     fn worker_of_another_run_is_not_ours() {
-        let line =
-            |access: &str| format!("/bin/lookalike\0worker\0--access\0{access}\0--threads\02\0--leash\0").into_bytes();
-        let ours = Path::new("out/access.json");
-        assert!(is_worker(&line("out/access.json"), ours));
-        assert!(!is_worker(&line("other/access.json"), ours));
-        assert!(
-            !is_worker(b"/bin/lookalike\0worker\0--access\0out/access.json\0", ours),
-            "one that somebody else started"
-        );
-        assert!(!is_worker(b"", ours));
+        let folder = tempfile::tempdir().unwrap();
+        let ours = folder.path().join("access.json");
+        std::fs::write(&ours, "{}").unwrap();
+        let is_ours = |access: &str, rest: &str| {
+            let line = format!("/bin/lookalike\0worker\0--access\0{access}\0--threads\02\0{rest}\0");
+            is_worker(line.as_bytes(), folder.path(), &ours)
+        };
+        assert!(is_ours(ours.to_str().unwrap(), "--leash") && is_ours("./access.json", "--leash"));
+        assert!(!is_ours("other/access.json", "--leash"));
+        assert!(!is_ours("access.json", "--survive"), "somebody else has started it");
+        assert!(!is_worker(b"", folder.path(), &ours));
     }
 }

@@ -1,6 +1,11 @@
 //! How a batch ends when not all goes well: which fits have results, which code.
 
 use super::{QUICK, batch, folder, states, summary};
+use crate::program::lookalike;
+use lookalike_tests::process::{Process, signal};
+use serde_json::{Value, json};
+use std::process::{Command, Output};
+use tempfile::TempDir;
 
 /// Three fits; the second fails when it is to be judged.
 fn one_fails() -> String {
@@ -24,6 +29,20 @@ fn failed_fit_is_code_four_and_the_others_are_complete() {
     assert_eq!(summary["state"], "finished");
     assert!(summary["fits"][1]["error"].as_str().unwrap().contains("11 x 11"), "{summary}");
     assert!(out.join("red-map-ggx/fit.json").exists() && !out.join("tiny-map-ggx").exists());
+    let status = lookalike(folder.path(), "status out").done().stdout;
+    for words in ["out: ended, not all of it well", "ended: 1 of 3 fits failed", "fits        2 of 3 done, 1 failed"] {
+        assert!(status.contains(words), "{words} in {status}");
+    }
+    let told: Value = serde_json::from_str(&lookalike(folder.path(), "status out --json").done().stdout).unwrap();
+    assert_eq!((&told["state"], &told["error"]), (&json!("ended"), &json!("1 of 3 fits failed")));
+    for (fit, summary) in told["fits"].as_array().unwrap().iter().zip(summary["fits"].as_array().unwrap()) {
+        for field in ["name", "state", "cssim", "error"] {
+            assert_eq!(fit[field], summary[field], "{field}");
+        }
+    }
+    // Where nobody can tell whether there is a lock, it is the same.
+    std::fs::remove_file(out.join("run.lock")).unwrap();
+    assert!(lookalike(folder.path(), "status out").done().stdout.contains("ended: 1 of 3 fits failed"));
 }
 
 #[test]
@@ -35,10 +54,48 @@ fn fail_fast_ends_the_batch_with_code_four() {
     let states = states(&summary);
     assert_eq!((states[1].as_str(), summary["state"].as_str()), ("failed", Some("stopped")));
     assert!(states.contains(&"stopped".to_owned()) && answer.stdout.contains("not done"), "{}", answer.stdout);
+    let status = lookalike(folder.path(), "status out").done().stdout;
+    assert!(status.contains("stopped: a fit failed, and --fail-fast ends the batch then"), "{status}");
+    let fits = status.lines().find(|line| line.starts_with("fits ")).unwrap();
+    assert!(!fits.contains("waiting") && !fits.contains("running") && fits.ends_with(" stopped"), "{fits}");
+    let json = batch(&folder, "json", "--workers 1 --fail-fast --progress json").stderr;
+    let last: Value = serde_json::from_str(json.lines().rfind(|line| line.starts_with('{')).unwrap()).unwrap();
+    let reason = "a fit failed, and --fail-fast ends the batch then";
+    assert_eq!((&last["event"], &last["reason"]), (&json!("stopped"), &json!(reason)));
     // The last of the two flags counts.
     let answer = batch(&folder, "on", "--workers 1 --fail-fast --keep-going --samples 16");
     assert_eq!(answer.code, Some(4), "{}", answer.stderr);
     assert_eq!(super::states(&super::summary(&folder.path().join("on"))), ["done", "failed", "done"]);
+}
+
+/// Runs one fit of a batch, whose summaries cannot be written from its first worker on; `act` is told of its process then.
+fn without_summaries(folder: &TempDir, act: impl Fn(u32)) -> (Output, Vec<Value>) {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_lookalike-under-test"));
+    let line = "batch batch.toml --out out --workers 1 --progress json";
+    let process = Process::start(command.args(line.split(' ')).current_dir(folder.path()).env_remove("RUST_LOG"));
+    let coordinator = process.id();
+    process.watch_stderr(|events| {
+        if events.last().is_some_and(|event| event["event"] == "worker-joined") {
+            std::fs::create_dir(folder.path().join("out/summary.json.partial")).unwrap();
+            act(coordinator);
+        }
+    })
+}
+
+#[test]
+fn summaries_that_cannot_be_written_are_code_three_unless_something_was_wrong_before() {
+    let manifest = format!("photos = 'photo.exr'\nenvironments = 'map.exr'\n[defaults]\npolish = false\n{QUICK}");
+    let whole = folder(&manifest);
+    let (output, events) = without_summaries(&whole, |_| ());
+    assert_eq!(output.status.code(), Some(3), "{events:?}");
+    let last = events.iter().rev().find(|event| event["event"].is_string()).unwrap();
+    assert!(last["event"] == "failed" && last["error"].as_str().unwrap().contains("summary.json"), "{last}");
+    assert!(whole.path().join("out/photo-map-ggx/fit.json").exists());
+    let interrupted = folder(&manifest);
+    let (output, events) = without_summaries(&interrupted, |coordinator| signal(coordinator, "INT"));
+    assert_eq!(output.status.code(), Some(130), "{events:?}");
+    let last = events.iter().rev().find(|event| event["event"].is_string()).unwrap();
+    assert_eq!(*last, json!({ "event": "failed", "error": "interrupted", "time_s": last["time_s"] }));
 }
 
 #[test]

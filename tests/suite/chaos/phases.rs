@@ -147,7 +147,7 @@ fn worker_cut_off_for_longer_than_its_lease_brings_an_equal_result_later_and_it_
     // One lease at a time.
     let policy = Policy {
         heartbeat: Duration::from_millis(100),
-        lost_after: Duration::from_millis(700),
+        lost_after: Duration::from_secs(3),
         spare_leases: 0,
         ..Policy::default()
     };

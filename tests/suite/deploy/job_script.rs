@@ -6,6 +6,7 @@ use lookalike_tests::process::{Process, signal, stderr};
 use serde_json::Value;
 use std::{
     fs,
+    net::TcpListener,
     os::unix::fs::PermissionsExt,
     path::Path,
     process::{Command, Output},
@@ -15,14 +16,21 @@ use tempfile::TempDir;
 /// Several shards of the subset's table, so that something can die between them.
 const FLAGS: &str = "--samples 128 --seed 5";
 
-/// The node that a step is for is in its environment, and what ends the step is told to all its processes, as Slurm would have it.
-const SRUN: &str = r#"for argument; do
+/// The node that a step is for is in its environment, of which only Slurm's own is there if the step or its job says so. What ends the step is told to all its processes, as Slurm would have it.
+const SRUN: &str = r#"export="${SLURM_EXPORT_ENV:-ALL}"
+for argument; do
   case "$argument" in
+    --export=*) export="${argument#--export=}" ;;
     --nodelist=*) export SLURMD_NODENAME="${argument#--nodelist=}" ;;
     bash) break ;;
   esac
   shift
 done
+if [ "$export" = NONE ]; then
+  for name in $(env | sed -n 's/^\([A-Za-z_][A-Za-z_0-9]*\)=.*/\1/p'); do
+    case "$name" in SLURM* | SITE | PATH) ;; *) unset "$name" ;; esac
+  done
+fi
 setsid "$@" &
 trap 'kill -TERM -$!; wait $!' TERM
 wait $!"#;
@@ -98,13 +106,28 @@ fn assert_same_as_local(site: &Path, out: &str) {
 #[test]
 fn task_of_an_array_runs_a_worker_on_each_node_and_leaves_the_same_results() {
     let site = site();
-    let job = job(site.path(), &line("run-%a"), &[("SLURM_ARRAY_TASK_ID", "3")]);
+    // As sbatch --export=NONE would have it, and for the steps as well.
+    let job = job(site.path(), &line("run-%a"), &[("SLURM_ARRAY_TASK_ID", "3"), ("SLURM_EXPORT_ENV", "NONE")]);
     let (output, events) = watch(job, |_, _| ());
     assert_eq!(output.status.code(), Some(0), "{events:?}");
     let joined = events.iter().filter(|event| event["event"] == "worker-joined");
     let processes: Vec<_> = joined.map(|event| &event["process"]).collect();
     assert!(processes.len() == 2 && processes[0] != processes[1], "{events:?}");
     assert_same_as_local(site.path(), "run-3");
+}
+
+#[test]
+fn folder_and_address_are_understood_in_all_their_spellings() {
+    let site = site();
+    let taken = TcpListener::bind("127.0.0.1:0").unwrap();
+    let port = taken.local_addr().unwrap().port();
+    drop(taken);
+    let line = format!("fit photo.exr --env map.exr -o=run --progress json {FLAGS} --polish off");
+    let (listen, advertise) = (format!("127.0.0.1:{port}"), format!("localhost:{port}"));
+    let environment = [("LOOKALIKE_LISTEN", listen.as_str()), ("LOOKALIKE_ADVERTISE", advertise.as_str())];
+    let (output, events) = watch(job(site.path(), &line, &environment), |_, _| ());
+    assert_eq!(output.status.code(), Some(0), "{events:?}");
+    assert!(site.path().join("run/fit.json").exists() && !site.path().join("=run").exists());
 }
 
 #[test]

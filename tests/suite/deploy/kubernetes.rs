@@ -157,9 +157,30 @@ fn ends_that_trying_again_would_not_change_fail_the_job_at_once() {
     // Of the exit codes of `lookalike --help`; 3 and 130 and deaths are tried again.
     assert_eq!(final_codes, serde_json::json!([1, 2, 4]));
     assert!(arguments(&container(&pod(JOBS[0]))).contains(&"--resume".to_owned()));
-    // What the API demands of a Job with such a policy.
-    assert_eq!(
-        (&spec["podReplacementPolicy"], &spec["template"]["spec"]["restartPolicy"]),
-        (&"Failed".into(), &"Never".into())
-    );
+}
+
+#[test]
+fn jobs_end_after_failures_of_their_own_and_none_of_their_nodes() {
+    for job in JOBS {
+        let spec = object("Job", job)["spec"].clone();
+        let rules = list(&spec["podFailurePolicy"]["rules"]);
+        let ignored = rules.iter().find(|rule| rule["action"] == "Ignore").unwrap();
+        assert_eq!(ignored["onPodConditions"][0]["type"], "DisruptionTarget", "{job}");
+        // What the API demands of a Job with such a policy.
+        assert_eq!(
+            (&spec["podReplacementPolicy"], &spec["template"]["spec"]["restartPolicy"]),
+            (&"Failed".into(), &"Never".into()),
+            "{job}"
+        );
+        // Workers look for a coordinator that is gone for 30 minutes at a time.
+        assert!(spec["backoffLimit"].as_u64().unwrap() <= 20, "{job}");
+    }
+    let document = fs::read_to_string(source("docs/cluster.md")).unwrap();
+    assert!(document.contains("Delete both Jobs after a failure"));
+}
+
+#[test]
+fn liveness_is_that_of_the_loop_at_the_port_of_the_metrics() {
+    let probe = container(&pod(JOBS[0]))["livenessProbe"]["httpGet"].clone();
+    assert_eq!(probe, serde_json::json!({ "path": "/healthz", "port": "metrics" }));
 }

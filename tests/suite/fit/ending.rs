@@ -1,7 +1,10 @@
 //! How a fit ends when it does not end well: exit codes, messages, no process left behind.
 
 use super::scene::{QUICK, fit, folder};
-use lookalike_tests::process::{Process, signal};
+use lookalike_tests::{
+    journal::JournalView,
+    process::{Process, signal},
+};
 use serde_json::Value;
 use std::{fs, process::Command};
 
@@ -13,6 +16,36 @@ fn missed_max_cssim_is_exit_code_one_with_all_results() {
     assert!(answer.stderr.contains("more than --max-cssim 0"), "{}", answer.stderr);
     assert!(answer.stdout.contains("polished") && folder.path().join("out/fit.json").exists());
     fit(folder.path(), "met", &format!("{QUICK} --max-cssim 1")).done();
+}
+
+#[test]
+fn stream_says_finished_when_all_is_written() {
+    let folder = folder();
+    let mut command = Command::new(env!("CARGO_BIN_EXE_lookalike-under-test"));
+    let line = format!("fit photo.exr --env map.exr --out out {QUICK} --progress json");
+    let process = Process::start(command.args(line.split_whitespace()).current_dir(folder.path()));
+    let finished = "SELECT count(*) FROM run WHERE outputs IS NOT NULL";
+    let mut is_written = None;
+    let (output, events) = process.watch_stderr(|events| {
+        if events.last().is_some_and(|event| event["event"] == "finished") {
+            let out = folder.path().join("out");
+            is_written = Some(out.join("fit.json").exists() && JournalView::of(&out).number(finished) == 1);
+        }
+    });
+    assert_eq!((output.status.code(), is_written), (Some(0), Some(true)), "{events:?}");
+}
+
+#[test]
+fn results_that_cannot_be_written_are_code_three_and_come_with_resume() {
+    let folder = folder();
+    let blocked = folder.path().join("out/match.exr.partial");
+    fs::create_dir_all(&blocked).unwrap();
+    let answer = fit(folder.path(), "out", QUICK);
+    assert_eq!(answer.code, Some(3), "{}", answer.stderr);
+    assert!(answer.stderr.contains("cannot write out/match.exr: is the disk full?"), "{}", answer.stderr);
+    fs::remove_dir(blocked).unwrap();
+    fit(folder.path(), "out", &format!("{QUICK} --resume")).done();
+    assert!(folder.path().join("out/fit.json").exists());
 }
 
 #[test]

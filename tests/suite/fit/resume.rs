@@ -93,10 +93,13 @@ fn finished_fit_is_verified_and_not_done_again() {
         again.stderr
     );
     assert!(fs::read(out.join("fit.json")).unwrap() == before);
+    let told = fit(folder.path(), "out", &format!("{QUICK} --resume --progress json")).done().stderr;
+    let events: Vec<Value> = told.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    assert_eq!(events.iter().map(|event| &event["event"]).collect::<Vec<_>>(), ["start", "message", "finished"]);
     // A changed file is somebody's; a missing one can be made again.
     fs::write(out.join("candidates.csv"), "mine").unwrap();
     fit(folder.path(), "out", &format!("{QUICK} --resume"))
-        .refused(&["candidates.csv is not what the finished run in out wrote", "--resume makes it again"]);
+        .refused(&["candidates.csv is not what the run in out wrote", "--resume makes it again"]);
     let bits = without_timing(&out);
     fs::remove_file(out.join("candidates.csv")).unwrap();
     let mended = fit(folder.path(), "out", &format!("{QUICK} --resume")).done();

@@ -2,7 +2,8 @@
 
 use super::{PROGRAM, WORKER, run_at_the_gate, worker};
 use lookalike::protocol::{
-    Access, CHALLENGE_BYTES, Challenge, PROTOCOL_VERSION, RESPONSE_BYTES, Secret, VERDICT_BYTES, Verdict,
+    Access, CHALLENGE_BYTES, Challenge, PROTOCOL_VERSION, ProofKey, RESPONSE_BYTES, Response, RunName, Secret,
+    ToCoordinator, ToWorker, VERDICT_BYTES, Verdict, Welcome,
 };
 use lookalike_coordinator::access::{Credentials, Identity};
 use lookalike_coordinator::runner::RunnerOptions;
@@ -10,8 +11,10 @@ use lookalike_tests::cluster::{Cluster, options};
 use lookalike_tests::gate::Gate;
 use lookalike_tests::plan::Leaves;
 use lookalike_tests::process::{Process, stderr};
-use lookalike_tests::stranger::{FalseCoordinator, challenge, connect_tls, greet, identity, read_to_the_end, tls_of};
-use lookalike_worker::tls::provider;
+use lookalike_tests::stranger::{
+    FalseCoordinator, TlsServer, challenge, connect_tls, greet, identity, read_message, read_to_the_end, tell, tls_of,
+};
+use lookalike_worker::tls::{channel_binding, provider};
 use rustls::server::{ClientHello, ResolvesServerCert};
 use rustls::sign::CertifiedKey;
 use std::io::{Read, Write};
@@ -217,4 +220,35 @@ fn worker_that_cannot_reach_its_coordinator_tries_until_it_can() {
     assert!(cluster.finish().0.is_some());
     let output = worker.output();
     assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+}
+
+#[test]
+fn coordinator_that_falls_silent_is_left_and_called_again() {
+    let (folder, coordinator) = (tempfile::tempdir().unwrap(), FalseCoordinator::new());
+    let known = identity(SystemTime::now());
+    let address = coordinator.address().to_string();
+    let access = Access { address, certificate: known.pin(), secret: Secret::from_bytes([7; 32]) };
+    let _worker = start(&folder, &access);
+    let (mut names, mut silent) = (Vec::new(), Vec::new());
+    for _ in 0..2 {
+        let mut stream = coordinator.next_tls(&tls_of(&known)).unwrap();
+        let asked = Challenge::new([1; 32]);
+        let judge = |response: &Response, stream: &TlsServer| {
+            response.judge(&asked, &ProofKey::new(&access.secret, &channel_binding(&stream.conn).unwrap()))
+        };
+        challenge(&mut stream, &asked, judge).unwrap();
+        let hello = read_message(&mut stream);
+        let ToCoordinator::Hello(hello) = hello else { panic!("expected a hello, found {hello:?}") };
+        names.push(hello.name);
+        let run = RunName([1; 16]);
+        let welcome = Welcome { worker: 1, run, epoch: 1, heartbeat_ms: 50, silence_ms: 300, drain_ms: 0 };
+        tell(&mut stream, &ToWorker::Welcome(welcome));
+        // Signs of life keep it, though it hears nothing else; then, as of a machine without power, there is not even an end.
+        for _ in 0..20 {
+            tell(&mut stream, &ToWorker::Heartbeat);
+            while !matches!(read_message(&mut stream), ToCoordinator::Heartbeat { .. }) {}
+        }
+        silent.push(stream);
+    }
+    assert_eq!(names[0], names[1], "it is the same process");
 }

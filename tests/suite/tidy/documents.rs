@@ -6,16 +6,18 @@ use super::{
 };
 use std::{collections::BTreeSet, fs, process::Command};
 
-const DOCUMENTS: [&str; 11] = [
+const DOCUMENTS: [&str; 13] = [
     "README.md",
     "ARCHITECTURE.md",
     "CONTRIBUTING.md",
     "CHANGELOG.md",
     "docs/accuracy.md",
+    "docs/batch.md",
     "docs/cluster.md",
     "docs/design.md",
     "docs/journal.md",
     "docs/overhead.md",
+    "docs/progress.md",
     "docs/real-materials.md",
     "docs/security.md",
 ];
@@ -23,7 +25,7 @@ const FOLDERS: [&str; 9] =
     ["common/", "coordinator/", "deploy/", "docs/", "fuzz/", "tests/", "worker/", ".ci/", "experiments/"];
 
 /// A document without its HTML comments.
-fn document(name: &str) -> String {
+pub(super) fn document(name: &str) -> String {
     let text = fs::read_to_string(root().join(name)).unwrap_or_else(|error| panic!("{name}: {error}"));
     let mut parts = text.split("<!--");
     let before = parts.next().unwrap_or_default();
@@ -31,7 +33,7 @@ fn document(name: &str) -> String {
 }
 
 /// What stands between `open` and `close`, each time.
-fn between<'a>(text: &'a str, open: &str, close: &str) -> Vec<&'a str> {
+pub(super) fn between<'a>(text: &'a str, open: &str, close: &str) -> Vec<&'a str> {
     text.split(open).skip(1).filter_map(|rest| Some(rest.split_once(close)?.0)).collect()
 }
 

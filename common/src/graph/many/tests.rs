@@ -81,6 +81,8 @@ struct Bench {
     most_active: usize,
     most_ready: usize,
     is_fail_fast: bool,
+    /// How many may begin until the test says otherwise, but for one that is waited for.
+    there: Option<u32>,
     safe: Vec<u32>,
     ended: Vec<(String, Result<Vec<u8>, String>)>,
 }
@@ -95,7 +97,10 @@ impl Bench {
 impl Parts for Bench {
     type Planner = Fit;
 
-    fn next(&mut self, _wait: bool) -> Result<Next<Fit>, PlanError> {
+    fn next(&mut self, wait: bool) -> Result<Next<Fit>, PlanError> {
+        if !wait && self.there.is_some_and(|there| self.next >= there) {
+            return Ok(Next::NotYet);
+        }
         let Some(planner) = self.coming.pop() else { return Ok(Next::End) };
         let number = self.next;
         self.next += 1;
@@ -163,6 +168,18 @@ fn earlier_parts_end_earlier_and_parts_begin_only_when_they_are_needed() {
     Many::new(Bench::new(fits)).start(&mut GraphEdit::new(&mut graph)).unwrap();
     assert_eq!((graph.len(), graph.spec(NodeId(3)).unwrap().priority), (4, 1));
     assert_eq!(split_label(&graph.spec(NodeId(3)).unwrap().label), (Some("fit-1"), "leaf"));
+}
+
+#[test]
+fn part_that_was_not_there_in_time_begins_when_it_is_and_no_node_has_to_end_for_it() {
+    let mut graph = Graph::new();
+    let mut planner = Many::new(Bench { there: Some(1), ..Bench::new(vec![Fit::new(1, 2), Fit::new(3, 4)]) });
+    planner.start(&mut GraphEdit::new(&mut graph)).unwrap();
+    planner.look_again(&mut GraphEdit::new(&mut graph)).unwrap();
+    assert_eq!(graph.len(), 2, "the second one is not there yet");
+    planner.parts.there = None;
+    planner.look_again(&mut GraphEdit::new(&mut graph)).unwrap();
+    assert_eq!(graph.len(), 4);
 }
 
 #[test]

@@ -125,15 +125,30 @@ impl<'a> Reader<'a> {
             "[defaults] holds settings of all fits, a photo is one fit's: give it in [[fit]]",
         );
         self.defaults = defaults.flags;
-        let top = [content.photos, content.environments, content.models];
-        if let Some(first) = top.iter().flatten().map(|value| value.span().start).min() {
-            self.product(top, first..first, &[], None);
-        }
+        self.top([content.photos, content.environments, content.models]);
         for table in content.set {
             self.set(table);
         }
         for table in content.fit {
             self.fit(table);
+        }
+    }
+
+    /// The product at the top, if there is one.
+    fn top(&mut self, lists: [Option<Spanned<Value>>; 3]) {
+        if lists[0].is_some() {
+            let first = lists.iter().flatten().map(|value| value.span().start).min().unwrap_or(0);
+            return self.product(lists, first..first, &[], None);
+        }
+        let [_, environments, models] = lists;
+        for (list, name, setting) in [(environments, "environments", "env"), (models, "models", "model")] {
+            if let Some(list) = list {
+                let error = anyhow!(
+                    "\"{name}\" at the top is for photos at the top, and there are no photos there; give them, or move it into \
+                     each [[set]], or one of it into [defaults] as \"{setting}\""
+                );
+                self.problem(list.span(), &error);
+            }
         }
     }
 
@@ -188,7 +203,7 @@ impl<'a> Reader<'a> {
     fn name(&mut self, table: &mut Table) -> Option<String> {
         let (key, value) = take(table, "name")?;
         let checked = match value.into_inner() {
-            Value::String(name) => names::check(&name).map(|()| name),
+            Value::String(name) => names::check(&name, names::GIVEN).map(|()| name),
             _ => Err(anyhow!("\"name\" must be text")),
         };
         checked.map_err(|error| self.problem(key, &error)).ok()
@@ -285,6 +300,7 @@ impl<'a> Reader<'a> {
                 names::of_inputs(draft.prefix.as_deref(), &fit.photo, &fit.environment.path, fit.method.model.as_str())
             }
         };
+        names::check(&fit.name, names::MADE)?;
         self.names.claim(&fit.name, line)?;
         self.fits.push(fit);
         Ok(())

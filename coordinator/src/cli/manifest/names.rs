@@ -9,9 +9,8 @@ use std::{collections::BTreeMap, path::Path};
 pub(super) struct Names(BTreeMap<String, usize>);
 
 impl Names {
-    /// Takes a name for a fit of this line.
+    /// Takes a name, which was checked, for a fit of this line.
     pub(super) fn claim(&mut self, name: &str, line: usize) -> anyhow::Result<()> {
-        check(name)?;
         match self.0.insert(name.to_lowercase(), line) {
             None => Ok(()),
             Some(other) if other == line => {
@@ -25,13 +24,30 @@ impl Names {
     }
 }
 
-/// Files that a batch writes beside the folders of its fits, without what follows the dot.
-const TAKEN: [&str; 5] = ["access", "run", "status", "summary", "manifest"];
+/// Files that a batch writes beside the folders of its fits. What SQLite and unfinished writes put after these names is theirs as well.
+const FILES: [&str; 8] = [
+    "access.json",
+    "access.key.pem",
+    "lookalike.sbatch",
+    "run.lock",
+    "run.sqlite",
+    "status.json",
+    "summary.csv",
+    "summary.json",
+];
 
-/// Accepts what is one part of a path everywhere and one word in a log.
-pub(super) fn check(name: &str) -> anyhow::Result<()> {
+/// Names that are devices on Windows, whatever follows a dot after them; COM and LPT with a digit are as well.
+const DEVICES: [&str; 4] = ["con", "prn", "aux", "nul"];
+
+/// What to do about a name that somebody gave.
+pub(super) const GIVEN: &str = "use another one";
+/// What to do about a name that was made of the inputs.
+pub(super) const MADE: &str = "give the fit a name in a [[fit]], or rename the photo";
+
+/// Accepts what is one part of a path everywhere and one word in a log. `advice` says what else to do.
+pub(super) fn check(name: &str, advice: &str) -> anyhow::Result<()> {
     if name.is_empty() || name.len() > MAX_PART_NAME_BYTES {
-        bail!("a name must have 1 to {MAX_PART_NAME_BYTES} bytes, found {}: {name:?}", name.len());
+        bail!("a name must have 1 to {MAX_PART_NAME_BYTES} bytes, found {}: {name:?}; {advice}", name.len());
     }
     if !name.chars().all(is_plain) || name.starts_with(['.', '-']) || name.ends_with('.') {
         let instead = plain(name);
@@ -39,9 +55,16 @@ pub(super) fn check(name: &str) -> anyhow::Result<()> {
             "the name {name:?} would not do for a folder everywhere; use letters, digits and . _ - + only, such as {instead:?}"
         );
     }
-    let stem = name.split('.').next().unwrap_or_default().to_lowercase();
-    if TAKEN.contains(&stem.as_str()) {
-        bail!("the name {name:?} is that of a file which the batch itself writes; use another one");
+    let lower = name.to_lowercase();
+    let is_file =
+        |file: &str| lower.strip_prefix(file).is_some_and(|rest| rest.is_empty() || rest.starts_with(['.', '-']));
+    if FILES.iter().any(|file| is_file(file)) || (lower.starts_with("slurm-") && lower.ends_with(".out")) {
+        bail!("the name {name:?} is that of a file which the batch itself writes; {advice}");
+    }
+    let stem = lower.split('.').next().unwrap_or_default();
+    let is_port = |port: &str| stem.strip_prefix(port).is_some_and(|rest| matches!(rest.as_bytes(), [b'0'..=b'9']));
+    if DEVICES.contains(&stem) || is_port("com") || is_port("lpt") {
+        bail!("the name {name:?} is that of a device on Windows; {advice}");
     }
     Ok(())
 }
@@ -74,7 +97,7 @@ mod tests {
         assert_eq!(name(".exr"), "exr-grace_cross-ggx");
         let with = of_inputs(Some("day"), Path::new("é.png"), Path::new("m.hdr"), "cook-torrance");
         assert_eq!(with, "day-é-m-cook-torrance");
-        assert!(check(&with).is_ok());
+        assert!(check(&with, GIVEN).is_ok());
     }
 
     #[test]
@@ -82,12 +105,37 @@ mod tests {
         for (name, instead) in
             [("a/b", "a_b"), ("../up", "_up"), ("two words", "two_words"), (".hidden", "hidden"), ("a:b", "a_b")]
         {
-            let message = check(name).unwrap_err().to_string();
+            let message = check(name, GIVEN).unwrap_err().to_string();
             assert!(message.contains(&format!("such as {instead:?}")), "{message}");
-            assert!(check(instead).is_ok());
+            assert!(check(instead, GIVEN).is_ok());
         }
-        for name in ["", "summary", "run.sqlite", "Access", "-x", &"x".repeat(500)] {
-            assert!(check(name).is_err(), "{name}");
+        for name in ["", "-x", &"x".repeat(500)] {
+            assert!(check(name, GIVEN).is_err(), "{name}");
+        }
+    }
+
+    #[test]
+    fn names_of_files_and_devices_are_refused_and_no_others() {
+        let files = [
+            "run.sqlite",
+            "Run.sqlite-wal",
+            "status.json.partial",
+            "access.key.pem",
+            "lookalike.sbatch",
+            "slurm-7.out",
+        ];
+        for name in files {
+            let message = check(name, MADE).unwrap_err().to_string();
+            assert!(
+                message.contains("a file which the batch itself writes; give the fit a name in a [[fit]]"),
+                "{message}"
+            );
+        }
+        for name in ["CON", "nul.exr-map-ggx", "com1", "LPT9.a"] {
+            assert!(check(name, GIVEN).unwrap_err().to_string().ends_with("on Windows; use another one"), "{name}");
+        }
+        for name in ["run.0001-map-ggx", "summary", "access-ggx", "slurm-7", "con-map-ggx", "com10", "manifest"] {
+            check(name, GIVEN).unwrap();
         }
     }
 

@@ -108,7 +108,13 @@ fn mistakes_are_told_by_line_and_key() {
         ("", "batch.toml: it lists no fit"),
         ("photos = ", "batch.toml:1: "),
         ("\nfotos = 'a.exr'", "batch.toml:2: unknown field `fotos`, expected one of `photos`"),
-        ("environments = 'm.hdr'", "batch.toml:1: there are no photos"),
+        ("environments = 'm.hdr'", "batch.toml:1: \"environments\" at the top is for photos at the top"),
+        (
+            "models = ['ggx']\n[[set]]\nphotos = 'a.exr'\nenv = 'm.hdr'",
+            "batch.toml:1: \"models\" at the top is for photos at the top, and there are no photos there; give them, or move it into \
+             each [[set]], or one of it into [defaults] as \"model\"",
+        ),
+        ("[[set]]\nmodels = 'ggx'", "batch.toml:1: there are no photos"),
         ("photos = []\nenvironments = 'm.hdr'", "batch.toml:1: \"photos\" is an empty list"),
         (
             "photos = ['a.exr', 3]\nenvironments = 'm.hdr'",
@@ -157,6 +163,13 @@ fn mistakes_are_told_by_line_and_key() {
         let said = refusal(text);
         assert!(said.contains(phrase), "{text:?}: {said}");
     }
+}
+
+#[test]
+fn name_that_is_too_long_by_itself_has_a_way_out() {
+    let said = refusal(&format!("photos = '{}.exr'\nenvironments = 'm.hdr'", "x".repeat(200)));
+    assert!(said.ends_with("; give the fit a name in a [[fit]], or rename the photo"), "{said}");
+    assert_eq!(names(&fits("photos = 'run.0001.exr'\nenvironments = 'm.hdr'", &[])), ["run.0001-m-ggx"]);
 }
 
 #[test]

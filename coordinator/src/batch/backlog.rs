@@ -1,0 +1,90 @@
+//! Fits whose nodes have ended and whose results are not written yet: all that their files need is still in memory.
+
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+
+/// What fits take together.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(super) struct Load {
+    pub(super) fits: usize,
+    /// Pixels of their photos.
+    pub(super) pixels: usize,
+}
+
+impl std::ops::Add for Load {
+    type Output = Self;
+
+    fn add(self, other: Self) -> Self {
+        Self { fits: self.fits + other.fits, pixels: self.pixels + other.pixels }
+    }
+}
+
+/// The fits that are being written. Clones are the same backlog.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Backlog(Arc<(Mutex<Load>, Condvar)>);
+
+impl Backlog {
+    /// One more fit, of so many pixels, until what this returns is dropped.
+    pub(super) fn add(&self, pixels: usize) -> Entry {
+        let mut load = self.lock();
+        *load = *load + Load { fits: 1, pixels };
+        Entry { backlog: self.clone(), pixels }
+    }
+
+    /// What is being written.
+    pub(super) fn load(&self) -> Load {
+        *self.lock()
+    }
+
+    /// Waits until so little is left that `is_little` is content, or nothing.
+    pub(super) fn wait_until(&self, is_little: impl Fn(Load) -> bool) {
+        let is_much = |load: &mut Load| load.fits > 0 && !is_little(*load);
+        drop(self.0.1.wait_while(self.lock(), is_much));
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Load> {
+        // Two numbers that are set together.
+        self.0.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// A fit that is being written.
+#[derive(Debug)]
+pub(super) struct Entry {
+    backlog: Backlog,
+    pixels: usize,
+}
+
+impl Drop for Entry {
+    fn drop(&mut self) {
+        let mut load = self.backlog.lock();
+        *load = Load { fits: load.fits - 1, pixels: load.pixels - self.pixels };
+        drop(load);
+        self.backlog.0.1.notify_all();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn who_waits_goes_on_when_enough_is_written() {
+        let backlog = Backlog::default();
+        let entries: Vec<Entry> = [100, 20, 3].map(|pixels| backlog.add(pixels)).into();
+        assert_eq!(backlog.load(), Load { fits: 3, pixels: 123 });
+        backlog.wait_until(|load| load.fits <= 3);
+        let left = std::thread::scope(|scope| {
+            let waiter = scope.spawn(|| {
+                backlog.wait_until(|load| load.pixels < 10);
+                backlog.load()
+            });
+            let last = entries.into_iter().rev().take(1).collect::<Vec<_>>();
+            let left = waiter.join().unwrap();
+            drop(last);
+            left
+        });
+        assert_eq!(left, Load { fits: 1, pixels: 3 });
+        // Nothing is little enough for anybody.
+        backlog.wait_until(|_| false);
+    }
+}

@@ -1,0 +1,54 @@
+//! What a journal says of the fits of a batch.
+
+use super::*;
+
+fn fit(name: &str, state: &str, outputs: &[(&str, &str)]) -> FitRow {
+    let status = FitStatus { name: name.into(), state: state.into(), ..FitStatus::default() };
+    FitRow { number: 0, status, outputs: outputs.iter().map(|(name, hash)| ((*name).into(), (*hash).into())).collect() }
+}
+
+#[test]
+fn what_fits_have_written_is_there_no_later_than_the_next_transaction() {
+    let folder = tempfile::tempdir().unwrap();
+    let options = options(&folder);
+    let mut journal = Journal::open(&options, NAME, None).unwrap();
+    options.fits.tell(fit("gold", "running", &[]));
+    options.fits.tell(fit("gold", "done", &[("fit.json", "12ab")]));
+    options.fits.tell(fit("chrome", "running", &[]));
+    write(&mut journal, [completed(1)]);
+    // Killed.
+    let copy = copied(&folder);
+    drop(journal);
+    let path = copy.path().join(JOURNAL_FILE);
+    let found = written(&path, &identity()).unwrap();
+    let gold = ("gold".to_owned(), vec![("fit.json".to_owned(), "12ab".to_owned())]);
+    assert_eq!((found.is_finished, found.outputs.into_iter().collect::<Vec<_>>()), (false, vec![gold]));
+    assert!(matches!(written(&path, &identity().with("--gammas", "1")), Err(JournalError::AnotherRun { .. })));
+    let states = || {
+        let fits = Status::of(copy.path()).unwrap().fits;
+        fits.into_iter().map(|fit| (fit.name, fit.state)).collect::<Vec<_>>()
+    };
+    assert_eq!(states(), [("chrome".to_owned(), "running".to_owned()), ("gold".to_owned(), "done".to_owned())]);
+    // Another process has had the lock, and is gone.
+    drop(RunLock::take(copy.path()).unwrap());
+    assert_eq!(states()[0].1, "stopped");
+}
+
+#[test]
+fn run_in_which_fits_failed_has_ended_and_can_be_gone_on_with() {
+    let folder = tempfile::tempdir().unwrap();
+    let options = options(&folder);
+    let mut journal = Journal::open(&options, NAME, None).unwrap();
+    write(&mut journal, [completed(1)]);
+    journal.close(None).unwrap();
+    options.fits.tell(fit("gold", "failed", &[]));
+    let path = folder.path().join(JOURNAL_FILE);
+    settle(&path, &options.fits, Some("1 of 12 fits failed")).unwrap();
+    let status = Status::of(folder.path()).unwrap();
+    assert_eq!((status.state, status.error.as_deref()), (RunState::Ended, Some("1 of 12 fits failed")));
+    assert_eq!((status.fits[0].state.as_str(), status.finished_at.is_some()), ("failed", true));
+    assert_eq!(finished(&path, &identity()).unwrap(), None);
+    let again = Journal::open(&options, NAME, None).unwrap();
+    assert_eq!((again.epoch, again.past.results), (2, 1));
+    assert_eq!(Status::of(folder.path()).unwrap().state, RunState::Running);
+}

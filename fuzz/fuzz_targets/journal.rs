@@ -1,0 +1,131 @@
+//! The journal of a run, any value of any row replaced by another: `lookalike status` and a coordinator that resumes the run say
+//! what is wrong, or go on to the right result.
+#![no_main]
+
+use libfuzzer_sys::fuzz_target;
+use lookalike::graph::{Blob, GraphEdit, NodeFailure, NodeId, NodeSpec, NodeType, Placement, PlanError, Planner, Registry, RunContext};
+use lookalike_coordinator::{
+    journal::{JournalOptions, Status},
+    recall::RunIdentity,
+    runner::{RunnerOptions, run},
+};
+use rusqlite::{Connection, params, types::Value};
+use std::{fs, path::Path, sync::{Arc, LazyLock}};
+use tempfile::TempDir;
+
+/// Doubles its parameters.
+struct Double;
+
+impl NodeType for Double {
+    fn kind(&self) -> &'static str {
+        "double"
+    }
+
+    fn run(&self, parameters: &[u8], _: &[Blob], _: &RunContext) -> Result<Vec<u8>, NodeFailure> {
+        Ok([parameters, parameters].concat())
+    }
+}
+
+/// Three nodes in the coordinator's own process.
+#[derive(Default)]
+struct Three(Vec<(NodeId, Vec<u8>)>);
+
+impl Planner for Three {
+    fn start(&mut self, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
+        for number in 0..3_u8 {
+            graph.add_node(NodeSpec {
+                kind: "double".to_owned(),
+                label: format!("double {number}"),
+                parameters: vec![number],
+                inputs: Vec::new(),
+                placement: Placement::Coordinator,
+                priority: 0,
+            })?;
+        }
+        Ok(())
+    }
+
+    fn completed(&mut self, node: NodeId, output: &Blob, _: &mut GraphEdit<'_>) -> Result<(), PlanError> {
+        self.0.push((node, output.to_vec()));
+        Ok(())
+    }
+}
+
+/// The outputs of a run in this folder.
+fn outputs(folder: &Path, resume: bool) -> Option<Vec<Vec<u8>>> {
+    let mut options = RunnerOptions { handle_signals: false, ..RunnerOptions::new(0, folder.join("access.json")) };
+    let path = folder.join("run.sqlite");
+    options.journal = Some(JournalOptions { resume, ..JournalOptions::new(path, RunIdentity::default()) });
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().expect("a runtime");
+    let registry = Arc::new(Registry::default().with(Double));
+    let (mut planner, _) = runtime.block_on(run(options, Three::default(), registry, |_| ())).ok()?;
+    planner.0.sort();
+    Some(planner.0.into_iter().map(|(_, output)| output).collect())
+}
+
+/// A finished journal, copied before every change.
+static WHOLE: LazyLock<TempDir> = LazyLock::new(|| {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    assert_eq!(outputs(folder.path(), false).as_deref(), Some(&RIGHT.map(Vec::from)[..]));
+    let journal = Connection::open(folder.path().join("run.sqlite")).expect("a journal");
+    journal.pragma_update(None, "journal_mode", "delete").expect("a journal in one file");
+    folder
+});
+
+const RIGHT: [[u8; 2]; 3] = [[0, 0], [1, 1], [2, 2]];
+
+const TABLES: [&str; 7] = ["run", "epochs", "nodes", "attempts", "workers", "local_workers", "results"];
+
+fuzz_target!(|bytes: &[u8]| {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    for file in fs::read_dir(WHOLE.path()).expect("a folder of ours").flatten() {
+        fs::copy(file.path(), folder.path().join(file.file_name())).expect("a file of ours");
+    }
+    {
+        let journal = Connection::open(folder.path().join("run.sqlite")).expect("a journal");
+        // None has worked for it: rows that can be spoilt all the same.
+        journal.execute("INSERT INTO local_workers VALUES (1, 7)", []).expect("the tables of docs/journal.md");
+        for change in bytes.chunks(12) {
+            spoil(&journal, change);
+        }
+    }
+    let _ = Status::of(folder.path());
+    // Nobody is waited for.
+    if let Ok(journal) = Connection::open(folder.path().join("run.sqlite")) {
+        let _ = journal.execute_batch("DELETE FROM workers; DELETE FROM local_workers;");
+    }
+    if let Some(found) = outputs(folder.path(), true) {
+        assert_eq!(found, RIGHT.map(Vec::from));
+    }
+});
+
+/// Replace a column of all rows of a table, or of one.
+fn spoil(journal: &Connection, change: &[u8]) {
+    let [table, column, kind, row, rest @ ..] = change else { return };
+    let table = TABLES[usize::from(*table) % TABLES.len()];
+    let columns: Vec<String> = {
+        let mut names = journal.prepare("SELECT name FROM pragma_table_info(?1)").expect("SQLite");
+        let names = names.query_map([table], |row| row.get(0)).expect("SQLite");
+        names.collect::<Result<_, _>>().expect("names")
+    };
+    let Some(column) = columns.get(usize::from(*column) % columns.len().max(1)) else { return };
+    let mut number = [0; 8];
+    number.iter_mut().zip(rest).for_each(|(to, from)| *to = *from);
+    let number = i64::from_le_bytes(number);
+    let value = match kind % 5 {
+        0 => Value::Null,
+        1 => Value::Integer(number),
+        2 => Value::Real(f64::from_bits(number.cast_unsigned())),
+        3 => Value::Text(String::from_utf8_lossy(rest).into_owned()),
+        _ => Value::Blob(rest.to_vec()),
+    };
+    // What the table refuses stays.
+    let _ = match row % 4 {
+        3 => journal.execute(&format!("UPDATE {table} SET {column} = ?1"), params![value]),
+        row => {
+            let first = if table == "local_workers" || table == "workers" { "process" } else { "rowid" };
+            let one = format!("SELECT {first} FROM {table} LIMIT 1 OFFSET {row}");
+            journal.execute(&format!("UPDATE {table} SET {column} = ?1 WHERE {first} = ({one})"), params![value])
+        }
+    };
+}

@@ -1,0 +1,101 @@
+//! Folders of fits that hold what the batch did not write: neither taken for its results nor written over.
+
+use super::{QUICK, batch, folder, scene, states, summary};
+use crate::program::lookalike;
+use lookalike_tests::process::Process;
+use std::{fs, path::Path, process::Command};
+use tempfile::TempDir;
+
+const NAMES: [&str; 2] = ["photo-map-ggx", "red-map-ggx"];
+
+fn two() -> TempDir {
+    folder(&format!("photos = ['photo.exr', 'red.exr']\nenvironments = 'map.exr'\n[defaults]\npolish = false\n{QUICK}"))
+}
+
+/// A fit alone, with settings that the batch does not have.
+fn alone(folder: &TempDir, out: &str) {
+    let flags = "--samples 16 --gammas 1 --polish off --workers 1 --progress none";
+    lookalike(folder.path(), &format!("fit photo.exr --env map.exr --out {out} {flags}")).done();
+}
+
+/// The batch with `--resume`, killed as soon as its journal has a fit that is written: its name, and that of the other one.
+fn killed_after_a_fit(folder: &TempDir) -> [&'static str; 2] {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_lookalike-under-test"));
+    let line = "batch batch.toml --out out --resume --workers 1 --progress json";
+    let mut process = Process::start(command.args(line.split(' ')).current_dir(folder.path()).env_remove("RUST_LOG"));
+    let journal = || lookalike_tests::journal::JournalView::of(&folder.path().join("out"));
+    let written = "SELECT name FROM fits WHERE outputs IS NOT NULL";
+    let found = process.stderr_until(|_| {
+        folder
+            .path()
+            .join("out/run.sqlite")
+            .exists()
+            .then(|| journal().column::<String>(written))
+            .filter(|f| !f.is_empty())
+    });
+    process.kill();
+    let found = found.expect("the batch ended before");
+    let place = NAMES.iter().position(|name| found[..] == [(*name).to_owned()]).expect("one of two fits");
+    [NAMES[place], NAMES[1 - place]]
+}
+
+fn copy(from: &Path, to: &Path, files: &[&str]) {
+    fs::create_dir_all(to).unwrap();
+    for file in files {
+        fs::copy(from.join(file), to.join(file)).unwrap();
+    }
+}
+
+const FILES: [&str; 6] = ["candidates.csv", "match.exr", "match.png", "reference.png", "difference.png", "fit.json"];
+
+#[test]
+fn results_without_a_journal_are_nobodys_and_refused_all_at_once() {
+    let folder = two();
+    for name in NAMES {
+        alone(&folder, &format!("out/{name}"));
+    }
+    let refusals = [
+        "error: out: 2 problems",
+        "out/photo-map-ggx holds a fit that is not of this run: choose another --out",
+        "out/red-map-ggx holds a fit that is not of this run",
+    ];
+    let before = fs::read(folder.path().join("out/photo-map-ggx/fit.json")).unwrap();
+    for flags in ["", "--resume", "--resume --samples 999"] {
+        batch(&folder, "out", flags).refused(&refusals);
+    }
+    assert_eq!(fs::read(folder.path().join("out/photo-map-ggx/fit.json")).unwrap(), before);
+    assert!(!folder.path().join("out/run.sqlite").exists() && !folder.path().join("out/summary.json").exists());
+    // A fit that is not finished is somebody's as well, and the mark of a finished one is enough.
+    fs::remove_dir_all(folder.path().join("out/red-map-ggx")).unwrap();
+    fs::remove_file(folder.path().join("out/photo-map-ggx/run.sqlite")).unwrap();
+    batch(&folder, "out", "").refused(&["out/photo-map-ggx holds a fit that is not of this run"]);
+    fs::remove_file(folder.path().join("out/photo-map-ggx/fit.json")).unwrap();
+    fs::write(folder.path().join("out/photo-map-ggx/run.sqlite"), "").unwrap();
+    batch(&folder, "out", "").refused(&["out/photo-map-ggx holds a fit that is not of this run"]);
+}
+
+#[test]
+fn batch_that_is_gone_on_with_takes_only_what_its_journal_says_it_wrote() {
+    let folder = two();
+    let [written, open] = killed_after_a_fit(&folder);
+    alone(&folder, "alone");
+    let at = |name: &str| folder.path().join("out").join(name);
+    let _ = fs::remove_dir_all(at(open));
+    copy(&folder.path().join("alone"), &at(open), &FILES);
+    copy(&folder.path().join("alone"), &at(open), &["run.sqlite"]);
+    batch(&folder, "out", "--resume").refused(&[&format!("out/{open} holds a fit that is not of this run")]);
+    fs::remove_file(at(open).join("run.sqlite")).unwrap();
+    let kept = fs::read(at(written).join("match.exr")).unwrap();
+    fs::write(at(written).join("match.exr"), "mine").unwrap();
+    batch(&folder, "out", "--resume")
+        .refused(&[&format!("{written}/match.exr is not what the run in out wrote; keep a changed file elsewhere")]);
+    fs::write(at(written).join("match.exr"), kept).unwrap();
+    batch(&folder, "out", "--resume --workers 1").done();
+    batch(&folder, "whole", "--workers 1").done();
+    assert_eq!(states(&summary(&folder.path().join("out"))), ["done"; 2]);
+    for name in NAMES {
+        let whole = folder.path().join("whole").join(name);
+        assert_eq!(scene::without_timing(&at(name)), scene::without_timing(&whole), "{name}");
+        assert!(fs::read(at(name).join("match.exr")).unwrap() == fs::read(whole.join("match.exr")).unwrap(), "{name}");
+    }
+}
