@@ -78,9 +78,10 @@ impl Cluster {
     pub(super) fn cut(&mut self, node: &str) {
         let index = node.strip_prefix("node").and_then(|number| number.parse::<usize>().ok()).unwrap() - 1;
         end(self.nodes[index].take().expect("a node that lives"));
-        for process in self.processes(|environment| environment.contains(&format!("SLURMD_NODENAME={node}"))) {
-            kill(process);
-        }
+        let there = self.processes(|environment| environment.contains(&format!("SLURMD_NODENAME={node}")));
+        // All at once: whoever lived on for a moment could tell others, or start something again.
+        there.iter().for_each(|process| send("STOP", *process));
+        there.into_iter().for_each(kill);
     }
 
     /// Starts a node that was cut again.
@@ -274,8 +275,12 @@ fn keeper(process: u32) -> Option<u32> {
 }
 
 fn kill(process: u32) {
+    send("KILL", process);
+}
+
+fn send(signal: &str, process: u32) {
     // It may have ended by itself.
-    let _ = Command::new("kill").args(["-KILL", &process.to_string()]).stderr(Stdio::null()).status();
+    let _ = Command::new("kill").args([&format!("-{signal}"), &process.to_string()]).stderr(Stdio::null()).status();
 }
 
 fn end(mut child: Child) {
