@@ -3,14 +3,20 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use lookalike::graph::{Blob, GraphEdit, NodeFailure, NodeId, NodeSpec, NodeType, Placement, PlanError, Planner, Registry, RunContext};
+use lookalike::graph::{
+    Blob, GraphEdit, NodeFailure, NodeId, NodeSpec, NodeType, Placement, PlanError, Planner, Registry, RunContext,
+};
 use lookalike_coordinator::{
-    journal::{JournalOptions, Status},
-    recall::RunIdentity,
-    runner::{RunnerOptions, run},
+    journal::{JournalOptions, RunIdentity, status::Status},
+    runner::{RunError, RunnerOptions, run},
 };
 use rusqlite::{Connection, params, types::Value};
-use std::{fs, path::Path, sync::{Arc, LazyLock}};
+use std::{
+    fs,
+    net::Ipv4Addr,
+    path::Path,
+    sync::{Arc, LazyLock},
+};
 use tempfile::TempDir;
 
 /// Doubles its parameters.
@@ -52,21 +58,22 @@ impl Planner for Three {
 }
 
 /// The outputs of a run in this folder.
-fn outputs(folder: &Path, resume: bool) -> Option<Vec<Vec<u8>>> {
+fn outputs(folder: &Path, resume: bool) -> Result<Vec<Vec<u8>>, RunError> {
     let mut options = RunnerOptions { handle_signals: false, ..RunnerOptions::new(0, folder.join("access.json")) };
+    options.listen = Some((Ipv4Addr::LOCALHOST, 0).into());
     let path = folder.join("run.sqlite");
     options.journal = Some(JournalOptions { resume, ..JournalOptions::new(path, RunIdentity::default()) });
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().expect("a runtime");
     let registry = Arc::new(Registry::default().with(Double));
-    let (mut planner, _) = runtime.block_on(run(options, Three::default(), registry, |_| ())).ok()?;
+    let (mut planner, _) = runtime.block_on(run(options, Three::default(), registry, |_| ()))?;
     planner.0.sort();
-    Some(planner.0.into_iter().map(|(_, output)| output).collect())
+    Ok(planner.0.into_iter().map(|(_, output)| output).collect())
 }
 
 /// A finished journal, copied before every change.
 static WHOLE: LazyLock<TempDir> = LazyLock::new(|| {
     let folder = tempfile::tempdir().expect("a temporary folder");
-    assert_eq!(outputs(folder.path(), false).as_deref(), Some(&RIGHT.map(Vec::from)[..]));
+    assert_eq!(outputs(folder.path(), false).expect("a run"), RIGHT.map(Vec::from));
     let journal = Connection::open(folder.path().join("run.sqlite")).expect("a journal");
     journal.pragma_update(None, "journal_mode", "delete").expect("a journal in one file");
     folder
@@ -94,7 +101,7 @@ fuzz_target!(|bytes: &[u8]| {
     if let Ok(journal) = Connection::open(folder.path().join("run.sqlite")) {
         let _ = journal.execute_batch("DELETE FROM workers; DELETE FROM local_workers;");
     }
-    if let Some(found) = outputs(folder.path(), true) {
+    if let Ok(found) = outputs(folder.path(), true) {
         assert_eq!(found, RIGHT.map(Vec::from));
     }
 });

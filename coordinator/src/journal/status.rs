@@ -370,7 +370,11 @@ impl Counts {
     }
 }
 
+/// The last millisecond of the year 9999, since 1970.
+const LAST_MS: u64 = 253_402_300_799_999;
+
 fn rfc3339(unix_ms: i64) -> String {
-    let since = Duration::from_millis(u64::try_from(unix_ms).unwrap_or(0));
+    // A damaged journal may name any time; beyond the year 9999 there is no name for it.
+    let since = Duration::from_millis(u64::try_from(unix_ms).unwrap_or(0).min(LAST_MS));
     humantime::format_rfc3339_millis(SystemTime::UNIX_EPOCH + since).to_string()
 }

@@ -366,3 +366,16 @@ fn journal_is_readable_by_its_owner_alone() {
         assert_eq!(mode(&folder.path().join(name)), 0o600, "{name}");
     }
 }
+
+#[test]
+fn status_of_a_journal_with_impossible_times_is_no_panic() {
+    let folder = tempfile::tempdir().unwrap();
+    let options = options(&folder);
+    drop(Journal::open(&options, NAME, None).unwrap());
+    for time in [i64::MAX, i64::MIN, 253_402_300_800_000] {
+        let journal = Connection::open(&options.path).unwrap();
+        journal.execute("UPDATE epochs SET seen_ms = ?1", [time]).unwrap();
+        let status = Status::of(folder.path()).unwrap();
+        assert!(["1970-01-01T00:00:00.000Z", "9999-12-31T23:59:59.999Z"].contains(&status.updated_at.as_str()));
+    }
+}
