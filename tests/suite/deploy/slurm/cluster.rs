@@ -79,9 +79,10 @@ impl Cluster {
         let index = node.strip_prefix("node").and_then(|number| number.parse::<usize>().ok()).unwrap() - 1;
         end(self.nodes[index].take().expect("a node that lives"));
         let there = self.processes(|environment| environment.contains(&format!("SLURMD_NODENAME={node}")));
-        // All at once: whoever lived on for a moment could tell others, or start something again.
+        // As if all at once: whoever lives on for a moment can tell others. Children first, as every srun has one that cancels the
+        // step when srun dies, and as a group whose parent dies goes on.
         there.iter().for_each(|process| send("STOP", *process));
-        there.into_iter().for_each(kill);
+        there.into_iter().rev().for_each(kill);
     }
 
     /// Starts a node that was cut again.
