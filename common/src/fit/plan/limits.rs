@@ -2,7 +2,7 @@
 
 use super::FULL_SHARD;
 use crate::{
-    fit::{Method, MethodError},
+    fit::{Integration, Method, MethodError},
     graph::{MAX_BLOB_BYTES, MAX_INPUTS},
     image::Image,
     render::subset::SampleCount,
@@ -20,6 +20,17 @@ pub enum FitError {
     /// The photo has no light to fit to.
     #[error("every usable pixel of the photo is black: check the exposure of the photo and the place of the object")]
     Black,
+    /// More than the coordinator can check without letting its workers wait.
+    #[error(
+        "--integrator direct with {pixels} pixels of {samples} samples each is more than the {MOST_DIRECT} samples per evaluation \
+         that a fit can take: use fewer --samples, or direct:N with a smaller N"
+    )]
+    DirectTooLarge {
+        /// Pixels of stage one.
+        pixels: usize,
+        /// Samples per pixel.
+        samples: u32,
+    },
     /// More than one message can carry.
     #[error("{what} has {found} pixels, more than the {limit} that a fit can take: {remedy}")]
     TooLarge {
@@ -49,9 +60,21 @@ pub(super) fn check_sizes(capture: &Capture, method: &Method) -> Result<(), FitE
             return Err(FitError::TooLarge { what, found, limit, remedy });
         }
     }
+    if let Integration::Direct { samples } = method.integration {
+        let pixels = match method.samples {
+            SampleCount::Draws(draws) => draws as usize,
+            SampleCount::Full => usable,
+        };
+        if (pixels as u64).saturating_mul(u64::from(samples)) > MOST_DIRECT {
+            return Err(FitError::DirectTooLarge { pixels, samples });
+        }
+    }
     Ok(())
 }
 
+/// Most samples of one evaluation by the direct integrator, a second or less: the coordinator, which checks one evaluation of every
+/// search, hears nothing of its workers meanwhile.
+const MOST_DIRECT: u64 = 1 << 20;
 /// Most pixels of a photo: its pictures (32 bytes per pixel) travel in one blob, its table in [`MAX_INPUTS`] shards.
 const MOST_PHOTO: usize = 8_000_000;
 /// Most texels of a map, 12 bytes each in one blob.

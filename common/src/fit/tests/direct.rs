@@ -2,7 +2,10 @@
 
 use super::scene::{StageOne, capture, method, room};
 use crate::{
-    fit::{DirectPixels, FitPlanner, Integration, Method, MethodError, Objective, SearchKind, tests::scene::Bench},
+    fit::{
+        DirectPixels, FitError, FitPlanner, Integration, Method, MethodError, Objective, SearchKind,
+        tests::scene::Bench,
+    },
     graph::{Blob, NodeSpec, PlanError},
     light::LightDistribution,
     metric::cost::Compression,
@@ -31,6 +34,19 @@ fn direct_cost_is_that_of_the_table() {
         assert_eq!(objective().rendered_by(direct).cost(&elsewhere).to_bits(), rendered.to_bits());
         assert!(objective().rendered_by(direct).cost(&[f64::NAN; 7]).is_nan());
     }
+}
+
+#[test]
+fn evaluations_that_would_keep_the_coordinator_busy_are_refused() {
+    let fit = |draws, samples| {
+        let mut method = method("ggx");
+        method.search = SearchKind::Pattern;
+        method.samples = crate::render::subset::SampleCount::Draws(draws);
+        method.integration = Integration::Direct { samples };
+        FitPlanner::new(capture("ggx", &GGX, 0.0), method, 1.0)
+    };
+    assert!(fit(256, 4096).is_ok());
+    assert!(matches!(fit(256, 4097), Err(FitError::DirectTooLarge { pixels: 256, samples: 4097 })));
 }
 
 #[test]
