@@ -8,6 +8,7 @@
 //! [`nodes`] wraps these steps as nodes of the job graph, and [`FitPlanner`] joins them.
 
 mod best;
+mod brute_force;
 mod candidate;
 mod direct;
 mod method;
@@ -22,6 +23,7 @@ mod uncertainty;
 mod wire;
 
 pub use best::BestScore;
+pub use brute_force::brute_force;
 pub use candidate::{Candidate, SAME, distinct, needed_span};
 pub use direct::DirectPixels;
 pub use method::{AtZero, Integration, JudgedBy, MOST_SEARCHES, Method, MethodError, SearchKind, Start, gamma_range};
