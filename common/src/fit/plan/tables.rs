@@ -2,7 +2,7 @@
 
 use super::{FitPlanner, Span, add, encode, index, verify::Shard};
 use crate::{
-    brdf::flat_bounds,
+    brdf::{Model, flat_bounds},
     fit::{
         Method,
         nodes::{self, TransportParameters},
@@ -83,7 +83,8 @@ impl FitPlanner {
             None => stage_one_knots(&self.method),
         };
         let pixels = (list, self.pixels.len(), FULL_SHARD);
-        let shards = self.add_transport(graph, "in full", pixels, knots, Accuracy::FULL)?;
+        let what = if self.tables.is_empty() { "in full" } else { "in full again" };
+        let shards = self.add_transport(graph, what, pixels, knots, Accuracy::FULL)?;
         self.tables.push((span, shards.clone()));
         Ok(shards)
     }
@@ -103,6 +104,13 @@ pub(super) fn stage_one_knots(method: &Method) -> Knots {
     let entry = method.model.lobes().iter().find_map(|b| b.width);
     let (low, high) = entry.map_or((0.5, 1.0), |entry| (lower[entry], upper[entry]));
     Knots::covering(low, high, PER_OCTAVE)
+}
+
+/// The span of all widths that the model has.
+pub(super) fn whole_span(model: &dyn Model) -> Span {
+    let entry = model.lobes().iter().find_map(|b| b.width)?;
+    let (lower, upper) = flat_bounds(model.parameters());
+    Some((lower[entry], upper[entry]))
 }
 
 /// Lets go of full-resolution tables.
