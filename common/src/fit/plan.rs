@@ -59,6 +59,8 @@ pub struct FitOutcome {
     pub uncertainty: Vec<Uncertainty>,
     /// The outcome of stage three, when it ran.
     pub polished: Option<Polished>,
+    /// Evaluations of CSSIM on the coarse picture before stage three; 0 when it did not run.
+    pub explored: usize,
     /// The rendering of the winner of stage two, as [`Self::matched`].
     pub winner_image: Image,
     /// The rendering of the final parameters at full resolution, linear Rec. 709, over black.
@@ -104,6 +106,7 @@ pub struct FitPlanner {
     judged: Vec<Judged>,
     uncertainty: Vec<Uncertainty>,
     polishing: Polishing,
+    explored_evaluations: usize,
     polished: Option<Polished>,
     best: Arc<BestScore>,
     outcome: Option<FitOutcome>,
@@ -166,6 +169,7 @@ impl FitPlanner {
             judged: Vec::new(),
             uncertainty: Vec::new(),
             polishing: Polishing::default(),
+            explored_evaluations: 0,
             polished: None,
             best: Arc::default(),
             outcome: None,
@@ -450,6 +454,7 @@ impl FitPlanner {
             winner: best,
             uncertainty: self.uncertainty.clone(),
             polished: self.polished.clone(),
+            explored: self.explored_evaluations,
             winner_image,
             matched,
             error_map,

@@ -80,7 +80,8 @@ impl Compression {
     /// The compressed value.
     #[must_use]
     pub fn apply(&self, x: f64) -> f64 {
-        let x = x.min(self.ceiling);
+        // What is no number stays none.
+        let x = if x > self.ceiling { self.ceiling } else { x };
         if let Some(scale) = self.logarithm {
             ln(1.0 + x.max(0.0) / scale)
         } else if x >= self.knee {

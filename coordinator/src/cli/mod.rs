@@ -97,7 +97,11 @@ fn dispatch(Cli { log, command }: Cli) -> anyhow::Result<ExitCode> {
         Command::Status(args) => status::run(&args.into_settings()),
         Command::Check(_) => later("lookalike check", "`lookalike fit` refuses inputs that it cannot use"),
         Command::Export(_) => later("lookalike export", "the parameters are in OUT/fit.json"),
-        Command::Study(_) => later("lookalike study", "run `lookalike fit` once per photo"),
+        Command::Study(args) => {
+            let mut settings = args.into_settings()?;
+            settings.cluster.log = Some(log);
+            crate::study::run(settings)
+        }
         Command::Report(_) => later("lookalike report", "the numbers are in OUT/fit.json and OUT/candidates.csv"),
     }
 }

@@ -24,6 +24,7 @@ mod render;
 mod samples;
 mod scene;
 mod status;
+mod study;
 
 pub use access::AccessSettings;
 pub use batch::{BatchFit, BatchSettings, JobSettings, OnFailure, StageTwo};
@@ -43,3 +44,4 @@ pub use render::{Material, RenderSettings};
 pub use samples::Samples;
 pub use scene::{EnvironmentSettings, ViewSettings};
 pub use status::StatusSettings;
+pub use study::StudySettings;

@@ -79,7 +79,9 @@ impl FitPlanner {
     /// Polish starts from what was found, on a table that has its width, and from the winner where that table has the winner's too.
     pub(super) fn explored(&mut self, output: &Blob, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
         let model = self.method.model;
-        let found = verify::polished(model, output)?.parameters;
+        let found = verify::polished(model, output)?;
+        self.explored_evaluations = found.evaluations;
+        let found = found.parameters;
         let won = self.winner_of_stage_two()?;
         let inside =
             |span: Option<(f64, f64)>| span.zip(width(model, &found)).is_none_or(|(s, w)| s.0 <= w && w <= s.1);

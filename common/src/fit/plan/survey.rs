@@ -258,7 +258,7 @@ impl Planner for PhotoPlanner {
             }
             Subject::Model(model, flat) => (Some((model.clone(), flat.clone())), model.clone()),
         };
-        let (samples, seed, geometry) = (self.samples, self.seed, self.geometry.clone());
+        let (samples, seed, geometry) = (self.samples, self.seed, self.geometry);
         let parameters = nodes::RenderParameters { geometry, samples, seed, material };
         graph.add_node(NodeSpec {
             kind: nodes::RENDER.to_owned(),

@@ -46,17 +46,6 @@ enum Format {
 
 #[derive(Debug, Args)]
 #[command(args_override_self = true)]
-pub(crate) struct StudyArgs {
-    /// TOML file that describes the study
-    #[arg(value_name = "STUDY.toml")]
-    study: PathBuf,
-    /// Folder of results
-    #[arg(long, short, value_name = "DIR", help_heading = "Output")]
-    out: PathBuf,
-}
-
-#[derive(Debug, Args)]
-#[command(args_override_self = true)]
 pub(crate) struct ReportArgs {
     /// Folder of the run
     #[arg(value_name = "DIR")]

@@ -14,6 +14,7 @@ mod policy;
 mod render;
 mod scene;
 mod status;
+mod study;
 
 pub(crate) use batch::{BatchArgs, EntryArgs};
 pub(crate) use fit::FitArgs;
@@ -54,8 +55,8 @@ pub(crate) enum Command {
     Check(Box<later::CheckArgs>),
     /// Write the fitted material in another program's format (not there yet)
     Export(later::ExportArgs),
-    /// Rebuild a paper's tables and figures (not there yet)
-    Study(later::StudyArgs),
+    /// Rebuild the paper's tables and figures on measured materials, beside rival methods
+    Study(Box<study::StudyArgs>),
     /// Rebuild the report page of a run (not there yet)
     Report(later::ReportArgs),
     /// Make an access file before the run it is for

@@ -1,0 +1,23 @@
+//! The settings of `lookalike study`.
+
+use super::{ClusterSettings, MetricsAddress, ProgressKind};
+use std::path::PathBuf;
+
+/// A study: experiments on measured materials under known lights, as one run.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StudySettings {
+    /// The file that describes it.
+    pub study: PathBuf,
+    /// The folder of results.
+    pub out: PathBuf,
+    /// Go on with the run that is in the folder, if there is one.
+    pub resume: bool,
+    /// Where metrics are served.
+    pub metrics: Option<MetricsAddress>,
+    /// Who computes.
+    pub cluster: ClusterSettings,
+    /// How progress is shown.
+    pub progress: ProgressKind,
+    /// The command line, for the report.
+    pub command: String,
+}
