@@ -70,10 +70,21 @@ fn no_lobe_reflects_more_than_it_receives() {
                 let value = albedo(basis.lobe, width, cos_o);
                 assert!(value <= 1.0 + NOISE, "{} width {width} cos {cos_o}: {value}", basis.lobe.name());
                 if width <= 0.02 && basis.width.is_some() && cos_o >= 0.5 {
-                    assert!(value > 0.99, "a sharp {} lobe is a mirror: {value}", basis.lobe.name());
+                    let (mirror, loss) = sharp_albedo(basis.lobe, width, cos_o);
+                    assert!((mirror - loss..=mirror + NOISE).contains(&value), "{}: {value}", basis.lobe.name());
                 }
             }
         }
+    }
+}
+
+/// What a sharp lobe reflects, and how much less that may be: a mirror everything, less what masking takes.
+fn sharp_albedo(lobe: &dyn Lobe, width: f64, cos_o: f64) -> (f64, f64) {
+    let kink = width * (1.0 - cos_o * cos_o).sqrt() / cos_o;
+    match lobe.name() {
+        // Blinn-Phong lacks the 1/(v.h) of microfacets. Half of a lobe over the larger cosine lies beyond its kink.
+        "blinn-phong" => (cos_o, kink + 0.002),
+        _ => (1.0, 0.01),
     }
 }
 
@@ -225,7 +236,7 @@ fn accumulation_has_the_bits_of_a_scalar_loop() {
 #[test]
 fn no_model_has_more_than_one_width() {
     for model in MODELS {
-        let mut widths: Vec<usize> = model.lobes().iter().filter_map(|b| b.width).collect();
+        let mut widths: Vec<usize> = model.lobes().iter().filter_map(|b| Some(b.width?.entry)).collect();
         widths.dedup();
         assert!(widths.len() <= 1, "{}", model.name());
     }
@@ -236,5 +247,5 @@ fn bad_parameters_are_named() {
     let message = |p: Vec<f64>| Material::new(&Ggx, p).unwrap_err().to_string();
     assert_eq!(message(vec![0.1, 0.1, 0.1, 0.5, 1.5, 0.5, 0.1]), "parameter 'f0' is 1.5: expected a value in [0, 1]");
     assert!(message(vec![0.1, 0.1, 0.1, 0.5, 0.5, 0.5, f64::NAN]).contains("'alpha' is NaN"));
-    assert!(model("phong").unwrap_err().to_string().contains("expected one of ggx, cook-torrance"));
+    assert!(model("phong").unwrap_err().to_string().contains("expected one of ggx, cook-torrance, ward, blinn-phong"));
 }

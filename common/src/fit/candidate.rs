@@ -1,7 +1,8 @@
 //! Candidates of stage one, and what stage two needs to judge them.
 
 use crate::{
-    brdf::{Model, flat_bounds},
+    brdf::{Model, Scale, flat_bounds},
+    math::elementary::ln,
     search::Termination,
 };
 
@@ -22,15 +23,21 @@ pub struct Candidate {
     pub termination: Termination,
 }
 
-/// Candidates nearer to each other than this share of every parameter's range get one rendering.
+/// Candidates nearer to each other than this share of every parameter's range (of its logarithmic range, where a parameter is searched
+/// by its logarithm) get one rendering.
 pub const SAME: f64 = 1e-6;
 
 /// For every candidate the index of the first one that is the same within [`SAME`]: near-equal candidates are judged once.
 #[must_use]
 pub fn distinct(model: &dyn Model, candidates: &[Candidate]) -> Vec<usize> {
     let (lower, upper) = flat_bounds(model.parameters());
+    let scales = model.parameters().iter().flat_map(|p| std::iter::repeat_n(p.scale, p.channels.count()));
+    let logarithmic: Vec<bool> = scales.map(|scale| scale == Scale::Logarithmic).collect();
     let near = |a: &[f64], b: &[f64]| {
-        a.iter().zip(b).zip(lower.iter().zip(&upper)).all(|((a, b), (l, u))| (a - b).abs() <= SAME * (u - l))
+        (0..a.len()).all(|i| {
+            let [a, b, l, u] = [a[i], b[i], lower[i], upper[i]].map(|x| if logarithmic[i] { ln(x) } else { x });
+            (a - b).abs() <= SAME * (u - l)
+        })
     };
     let mut firsts: Vec<usize> = Vec::with_capacity(candidates.len());
     for (i, candidate) in candidates.iter().enumerate() {
@@ -49,16 +56,16 @@ const MARGIN: f64 = 1.25;
 /// Returns `None` for a model without widths.
 #[must_use]
 pub fn needed_span<'a>(model: &dyn Model, points: impl Iterator<Item = &'a [f64]>) -> Option<(f64, f64)> {
-    let entry = model.lobes().iter().find_map(|b| b.width)?;
-    let (lower, upper) = flat_bounds(model.parameters());
+    let width = model.lobes().iter().find_map(|b| b.width)?;
+    let (lower, upper) = width.span(model.parameters());
     let (mut low, mut high) = (f64::INFINITY, 0.0_f64);
     for point in points {
-        low = low.min(point[entry]);
-        high = high.max(point[entry]);
+        low = low.min(width.at(point));
+        high = high.max(width.at(point));
     }
-    let (low, high) = ((low / MARGIN).max(lower[entry]), (high * MARGIN).min(upper[entry]));
+    let (low, high) = ((low / MARGIN).max(lower), (high * MARGIN).min(upper));
     // At a bound the margin lies on one side only.
-    let (low, high) = (low.min(upper[entry] / (MARGIN * MARGIN)), high.max(lower[entry] * MARGIN * MARGIN));
+    let (low, high) = (low.min(upper / (MARGIN * MARGIN)), high.max(lower * MARGIN * MARGIN));
     Some((low, high))
 }
 

@@ -34,7 +34,6 @@ use super::{
     wire::{CandidateWire, EnvironmentWire, ImageWire, SubsetWire, read, write},
 };
 use crate::{
-    brdf::flat_bounds,
     graph::{Blob, BlobHash, GraphEdit, Input, NodeFailure, NodeId, NodeSpec, Placement, PlanError, Planner},
     image::Image,
     light::{Environment, LightDistribution},
@@ -410,12 +409,12 @@ impl FitPlanner {
     /// A span around the width where polish stands that holds the widths of all earlier rounds: on the next table all of them
     /// are judged again, and the best goes on.
     fn widen_span(&mut self) {
-        let Some(entry) = self.method.model.lobes().iter().find_map(|b| b.width) else { return };
-        let (lower, upper) = flat_bounds(self.method.model.parameters());
-        let widths = || self.polish_starts.iter().map(|start| start[entry]);
-        let last = widths().next_back().unwrap_or(upper[entry]);
+        let Some(width) = self.method.model.lobes().iter().find_map(|b| b.width) else { return };
+        let (lower, upper) = width.span(self.method.model.parameters());
+        let widths = || self.polish_starts.iter().map(|start| width.at(start));
+        let last = widths().next_back().unwrap_or(upper);
         let (low, high) = (widths().fold(last / AROUND, f64::min), widths().fold(last * AROUND, f64::max));
-        self.span = Some((low.max(lower[entry]), high.min(upper[entry])));
+        self.span = Some((low.max(lower), high.min(upper)));
     }
 
     /// The pictures: of the candidates on the table that they were judged on, of the match on the table that it was polished on.

@@ -6,7 +6,7 @@
 
 use super::objective::{flat_roles, observed};
 use crate::{
-    brdf::{Channels, Model, Role, flat_bounds, flat_len, term_count},
+    brdf::{BasisLobe, Channels, Model, Role, flat_bounds, flat_len, term_count},
     math::Rgb,
     render::table::{Planes, TransportTable},
     search::{NormalEquations, bvls},
@@ -41,10 +41,11 @@ fn grids(model: &dyn Model, table: &TransportTable) -> Vec<(usize, Vec<f64>)> {
         Role::Linear => None,
         Role::Scanned(values) => Some((entry, values.to_vec())),
         Role::Width => {
-            let lobe = model.lobes().iter().position(|b| b.width == Some(entry))?;
-            let widths = table.lobes[lobe].knots?.widths();
+            let of_entry = |b: &BasisLobe| b.width.filter(|width| width.entry == entry);
+            let (lobe, width) = model.lobes().iter().enumerate().find_map(|(l, b)| Some((l, of_entry(b)?)))?;
+            let values = table.lobes[lobe].knots?.widths().into_iter().map(width.inverse);
             // The outermost knots equal the bounds up to a rounding.
-            Some((entry, widths.into_iter().map(|w| w.clamp(lower[entry], upper[entry])).collect()))
+            Some((entry, values.map(|x| x.clamp(lower[entry], upper[entry])).collect()))
         }
     });
     scanned.collect()

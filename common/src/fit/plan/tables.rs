@@ -2,7 +2,6 @@
 
 use super::{FitPlanner, Span, add, encode, index, verify::Shard};
 use crate::{
-    brdf::flat_bounds,
     fit::{
         Method,
         nodes::{self, TransportParameters},
@@ -96,9 +95,8 @@ impl FitPlanner {
 
 /// The grid of widths of stage one: the model's whole range.
 pub(super) fn stage_one_knots(method: &Method) -> Knots {
-    let (lower, upper) = flat_bounds(method.model.parameters());
-    let entry = method.model.lobes().iter().find_map(|b| b.width);
-    let (low, high) = entry.map_or((0.5, 1.0), |entry| (lower[entry], upper[entry]));
+    let width = method.model.lobes().iter().find_map(|b| b.width);
+    let (low, high) = width.map_or((0.5, 1.0), |width| width.span(method.model.parameters()));
     Knots::covering(low, high, PER_OCTAVE)
 }
 
