@@ -13,6 +13,7 @@
 //! roughness.
 
 mod angles;
+mod ashikhmin_shirley;
 mod beckmann;
 mod blinn_phong;
 mod cook_torrance;
@@ -28,6 +29,7 @@ mod ward;
 mod width;
 
 pub use angles::Angles;
+pub use ashikhmin_shirley::AshikhminShirley;
 pub use blinn_phong::BlinnPhong;
 pub use cook_torrance::CookTorrance;
 pub use ggx::Ggx;
@@ -40,7 +42,7 @@ pub use ward::Ward;
 pub use width::Width;
 
 /// Every model, by the name users give it. The first is the default.
-pub static MODELS: &[&dyn Model] = &[&Ggx, &CookTorrance, &Ward, &BlinnPhong];
+pub static MODELS: &[&dyn Model] = &[&Ggx, &CookTorrance, &Ward, &BlinnPhong, &AshikhminShirley];
 
 /// Looks a model up by name.
 ///

@@ -41,6 +41,15 @@ pub trait Model: Debug + Sync {
     /// Weight of every term at a flat parameter vector; `weights.len()` is [`term_count`].
     fn weights(&self, parameters: &[f64], weights: &mut [Rgb]);
 
+    /// The weights in the coordinates of the scan, which solves for all entries of [`Role::Linear`](super::Role::Linear) at once:
+    /// affine in all of them together. Another map than [`Self::weights`] only where one linear parameter multiplies another.
+    fn scan_weights(&self, point: &[f64], weights: &mut [Rgb]) {
+        self.weights(point, weights);
+    }
+
+    /// From the coordinates of the scan to parameters within their bounds, of the same weights if such exist.
+    fn from_scan(&self, _point: &mut [f64]) {}
+
     /// Calls `push(term, channel, entry, value)` for every derivative of a weight with respect to an entry of the flat
     /// parameter vector that is not always zero.
     fn weight_derivatives(&self, parameters: &[f64], push: &mut dyn FnMut(usize, usize, usize, f64));

@@ -72,7 +72,7 @@ pub fn needed_span<'a>(model: &dyn Model, points: impl Iterator<Item = &'a [f64]
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::brdf::Ggx;
+    use crate::brdf::{BlinnPhong, Ggx};
 
     fn candidate(alpha: f64) -> Candidate {
         let parameters = vec![0.1, 0.2, 0.3, 0.04, 0.04, 0.04, alpha];
@@ -96,5 +96,21 @@ mod tests {
         assert_eq!(span(&[0.1, 0.2]), (0.1 / 1.25, 0.2 * 1.25));
         assert_eq!(span(&[0.005]), (0.005, 0.005 * 1.25 * 1.25));
         assert_eq!(span(&[1.0]), (1.0 / (1.25 * 1.25), 1.0));
+    }
+
+    #[test]
+    fn the_margin_is_one_of_widths_whatever_the_parameter() {
+        let alpha = |n: f64| (2.0 / (n + 2.0)).sqrt();
+        let point = |n: f64| vec![0.1, 0.2, 0.3, 0.04, 0.04, 0.04, n];
+        let span = |points: &[Vec<f64>]| needed_span(&BlinnPhong, points.iter().map(|p| &p[..])).unwrap();
+        assert_eq!(span(&[point(40.0), point(400.0)]), (alpha(400.0) / 1.25, alpha(40.0) * 1.25));
+        assert_eq!(span(&[point(1e5)]), (alpha(1e5), alpha(1e5) * 1.25 * 1.25));
+        assert_eq!(span(&[point(1.0)]), (alpha(1.0) / (1.25 * 1.25), alpha(1.0)));
+    }
+
+    #[test]
+    fn exponents_are_near_by_their_logarithm() {
+        let with = |n: f64| Candidate { parameters: vec![0.1, 0.2, 0.3, 0.04, 0.04, 0.04, n], ..candidate(0.1) };
+        assert_eq!(distinct(&BlinnPhong, &[with(5.0), with(5.05), with(9e4), with(9e4 + 0.1)]), [0, 1, 2, 2]);
     }
 }

@@ -2,7 +2,8 @@
 //!
 //! For every width of the table's grid, and every scanned value of the parameters that multiply others, the remaining
 //! parameters enter linearly: at gamma = 1 their best values are a small bounded linear least-squares problem per
-//! channel. Terms of fixed weight move to the right-hand side.
+//! channel. Terms of fixed weight move to the right-hand side. A model where one of these multiplies another gives coordinates in which
+//! they do not (`Model::scan_weights`).
 
 use super::objective::{flat_roles, observed};
 use crate::{
@@ -60,7 +61,7 @@ fn solve_linear(model: &dyn Model, terms: &[Planes], weights: &[f64], photo: &[[
             probe[entry] = 1.0;
         }
         let mut w = vec![Rgb::ZERO; terms.len()];
-        model.weights(&probe, &mut w);
+        model.scan_weights(&probe, &mut w);
         w
     };
     let fixed = at(None, point);
@@ -81,6 +82,7 @@ fn solve_linear(model: &dyn Model, terms: &[Planes], weights: &[f64], photo: &[[
         let Ok(solution) = bvls::solve(&normal, &bound(&lower), &bound(&upper)) else { return false };
         entries.iter().zip(&solution.point).for_each(|(&e, &x)| point[e] = x);
     }
+    model.from_scan(point);
     true
 }
 

@@ -46,7 +46,7 @@ fn points() -> Vec<Point> {
 }
 
 /// Lobes that are divided by the larger of `n.l` and `n.v`: it has a kink where these are equal, which is in the mirror direction.
-const KINKED: [&str; 1] = ["blinn-phong"];
+const KINKED: [&str; 2] = ["blinn-phong", "ashikhmin-shirley"];
 
 /// The largest error over lobes, with a kink or without, of light around directions near and off the mirror direction, as a share of the lobe's value there.
 fn error(size: f64, width: f64, second_order: bool, kinked: bool) -> f64 {
