@@ -105,7 +105,7 @@ impl Model for AshikhminShirley {
         weights[2] = Rgb::ONE;
     }
 
-    fn from_scan(&self, p: &mut [f64]) {
+    fn parameters_of_scan(&self, p: &mut [f64]) {
         for c in 0..3 {
             let rest = 1.0 - p[F0 + c];
             p[KD + c] = if p[KD + c] < rest { p[KD + c] / rest } else { 1.0 };
@@ -136,6 +136,11 @@ impl Lobe for DiffuseLobe {
 
     fn equivalent_alpha(&self, _width: f64) -> Option<f64> {
         None
+    }
+
+    /// Towards the horizon its curvature along the light's cosine reaches 5; the cosine has none.
+    fn care(&self) -> f64 {
+        4.0
     }
 
     fn eval(&self, angles: &Angles, _width: f64) -> f64 {
@@ -169,6 +174,11 @@ impl Lobe for SpecularLobe {
 
     fn equivalent_alpha(&self, width: f64) -> Option<f64> {
         Some(width)
+    }
+
+    /// Off the mirror direction `1/(v.h)` and the larger cosine vary as much as the distribution of a wide lobe.
+    fn care(&self) -> f64 {
+        2.0
     }
 
     fn eval(&self, angles: &Angles, width: f64) -> f64 {

@@ -48,7 +48,7 @@ pub trait Model: Debug + Sync {
     }
 
     /// From the coordinates of the scan to parameters within their bounds, of the same weights if such exist.
-    fn from_scan(&self, _point: &mut [f64]) {}
+    fn parameters_of_scan(&self, _point: &mut [f64]) {}
 
     /// Calls `push(term, channel, entry, value)` for every derivative of a weight with respect to an entry of the flat
     /// parameter vector that is not always zero.

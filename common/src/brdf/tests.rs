@@ -221,7 +221,7 @@ fn the_scan_ends_at_parameters_of_the_weights_that_it_found() {
         for n in 0..200 {
             let solution = random_parameters(*model, n);
             let mut p = solution.clone();
-            model.from_scan(&mut p);
+            model.parameters_of_scan(&mut p);
             assert!((0..p.len()).all(|i| (lower[i]..=upper[i]).contains(&p[i])), "{} {p:?}", model.name());
             let [mut scanned, mut mapped] = [(); 2].map(|()| vec![Rgb::ZERO; term_count(*model)]);
             model.scan_weights(&solution, &mut scanned);

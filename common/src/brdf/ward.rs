@@ -117,6 +117,11 @@ impl Lobe for WardLobe {
         Some(width)
     }
 
+    /// Off the mirror direction `1/(v.h)^2` varies as much as the distribution of a wide lobe.
+    fn care(&self) -> f64 {
+        2.0
+    }
+
     fn eval(&self, angles: &Angles, width: f64) -> f64 {
         kernel(angles, &Spread::default(), width)
     }

@@ -82,7 +82,7 @@ fn solve_linear(model: &dyn Model, terms: &[Planes], weights: &[f64], photo: &[[
         let Ok(solution) = bvls::solve(&normal, &bound(&lower), &bound(&upper)) else { return false };
         entries.iter().zip(&solution.point).for_each(|(&e, &x)| point[e] = x);
     }
-    model.from_scan(point);
+    model.parameters_of_scan(point);
     true
 }
 

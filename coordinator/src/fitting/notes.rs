@@ -1,7 +1,7 @@
 //! What a user should know about a result beyond its numbers.
 
 use lookalike::{
-    brdf::{Model, Role, flat_bounds, flat_names},
+    brdf::{Model, flat_bounds, flat_names},
     fit::{FitOutcome, Method, Uncertainty, gamma_range},
 };
 
