@@ -36,13 +36,20 @@ pub enum Start {
     Paper,
 }
 
-/// What the compression of Eq. 1 does at and below zero.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum AtZero {
+/// What Eq. 1 compares: the power `1/gamma`, how it continues at and below zero, and what studies put in its place.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Compress {
     /// Continues as its tangent line.
     Tangent,
-    /// `max(x, 0)`, the paper's.
+    /// Of `max(x, 0)`, the paper's.
     Clamp,
+    /// Of the radiance clamped to what a display shows, between 0 and this radiance.
+    ClampTo {
+        /// The radiance of white, above 0.
+        white: f64,
+    },
+    /// Instead of a power, the logarithm [`Compression::logarithm`](crate::metric::cost::Compression::logarithm); gamma says nothing.
+    Logarithm,
 }
 
 /// Which score selects and polishes.
@@ -73,8 +80,8 @@ pub struct Method {
     pub integration: Integration,
     /// Where searches start.
     pub start: Start,
-    /// Compression at and below zero.
-    pub at_zero: AtZero,
+    /// What Eq. 1 compares.
+    pub compress: Compress,
     /// Whether stage three runs.
     pub polish: bool,
     /// Which score selects and polishes.
@@ -94,7 +101,7 @@ impl Default for Method {
             search: SearchKind::LeastSquares,
             integration: Integration::Tables,
             start: Start::Scan,
-            at_zero: AtZero::Tangent,
+            compress: Compress::Tangent,
             polish: true,
             judge: JudgedBy::Image,
             seed: 0,

@@ -1,7 +1,7 @@
 //! The plan of one fit: which nodes there are and what follows from their outputs (design section 7).
 //!
 //! ```text
-//! transport(subset) shards -> search(gamma) x 21 -> transport(full) shards -> select -> polish -> report
+//! transport(subset) shards -> search(gamma) x 21 -> transport(full) shards -> select -> explore -> polish -> report
 //! ```
 //!
 //! The graph depends on the inputs alone, never on the number of workers or the order in which nodes finish.
@@ -10,6 +10,7 @@ mod direct;
 mod limits;
 mod pictures;
 mod pixels;
+mod polishing;
 mod tables;
 mod verify;
 
@@ -18,16 +19,14 @@ pub use limits::FitError;
 use self::{
     limits::check_sizes,
     pictures::Pictures,
-    pixels::{covered_pixels, intensities, photo_at},
+    pixels::{Grid, covered_pixels, intensities, photo_at},
+    polishing::Polishing,
     tables::{FULL_SHARD, SUBSET_SHARD, release_tables, stage_one_knots},
     verify::{Shard, SubsetTables},
 };
 use super::{
-    BestScore, Candidate, Judged, JudgedBy, Method, Objective, Polished, SearchKind, Start,
-    method::AtZero,
-    needed_span,
-    nodes::{self, PolishParameters, ReportParameters, SearchParameters, SelectParameters, ViewWire},
-    polish::MAX_EVALUATIONS,
+    BestScore, Candidate, Judged, JudgedBy, Method, Objective, Polished, SearchKind, Start, needed_span,
+    nodes::{self, CompressWire, ReportParameters, SearchParameters, SelectParameters, ViewWire},
     stage_one::objective_of,
     uncertainty::{Uncertainty, uncertainties},
     winner,
@@ -46,12 +45,6 @@ use crate::{
 };
 use serde::Serialize;
 use std::{collections::BTreeMap, sync::Arc};
-
-/// How often polish may run on towards a width beyond its table.
-const MAX_POLISH_ROUNDS: usize = 4;
-
-/// Reach of the next table around a width that polish took to the edge of this one.
-const AROUND: f64 = 1.6;
 
 /// The outcome of a fit.
 #[derive(Debug, Clone)]
@@ -107,10 +100,7 @@ pub struct FitPlanner {
     pictures: Pictures,
     judged: Vec<Judged>,
     uncertainty: Vec<Uncertainty>,
-    /// The winner of stage two and the outcome of every round of polish.
-    polish_starts: Vec<Vec<f64>>,
-    polish_rounds: usize,
-    polish_evaluations: usize,
+    polishing: Polishing,
     polished: Option<Polished>,
     best: Arc<BestScore>,
     outcome: Option<FitOutcome>,
@@ -124,6 +114,7 @@ type Span = Option<(f64, f64)>;
 enum Step {
     Searching,
     Selecting(NodeId),
+    Exploring(NodeId),
     Polishing(NodeId),
     Reporting,
 }
@@ -170,9 +161,7 @@ impl FitPlanner {
             pictures: Pictures::default(),
             judged: Vec::new(),
             uncertainty: Vec::new(),
-            polish_starts: Vec::new(),
-            polish_rounds: 0,
-            polish_evaluations: 0,
+            polishing: Polishing::default(),
             polished: None,
             best: Arc::default(),
             outcome: None,
@@ -240,7 +229,7 @@ impl FitPlanner {
                     mean_radiance: self.mean_radiance,
                     pattern: self.method.search == SearchKind::Pattern,
                     paper_start: self.method.start == Start::Paper,
-                    clamp_at_zero: self.method.at_zero == AtZero::Clamp,
+                    compress: CompressWire::of(self.method.compress),
                     direct: direct.clone(),
                 };
                 let of_subset = if self.subsets.len() == 1 { String::new() } else { format!(", subset {s}") };
@@ -271,11 +260,22 @@ impl FitPlanner {
     ) -> Result<NodeId, PlanError> {
         let view = match self.view {
             Some(view) => view,
-            None => add(graph, "view", &self.view_wire())?,
+            None => add(graph, "view", &self.view_wire(Grid::FULL, self.pixels.clone()))?,
         };
         self.view = Some(view);
         let mut inputs = vec![Input::Blob(view)];
         inputs.extend(self.full_table(graph, span)?);
+        self.add_on_view(graph, kind, inputs, parameters)
+    }
+
+    /// A node of `kind` on a view and its table.
+    fn add_on_view<T: Serialize>(
+        &self,
+        graph: &mut GraphEdit<'_>,
+        kind: &str,
+        inputs: Vec<Input>,
+        parameters: &T,
+    ) -> Result<NodeId, PlanError> {
         graph.add_node(NodeSpec {
             kind: kind.to_owned(),
             label: kind.to_owned(),
@@ -286,14 +286,17 @@ impl FitPlanner {
         })
     }
 
-    fn view_wire(&self) -> ViewWire {
+    /// The photo as a grid of its pixels shows it; `pixels` are those of the table.
+    fn view_wire(&self, grid: Grid, pixels: Vec<Pixel>) -> ViewWire {
+        let photo = self.capture.photo();
         ViewWire {
             model: self.method.model.name().to_owned(),
-            photo: ImageWire::of(self.capture.photo()),
-            coverage: self.capture.scoring_coverage(),
+            photo: ImageWire::of(&grid.image(photo)),
+            coverage: grid.values(&self.capture.scoring_coverage(), photo.width()),
             exposure: self.exposure,
             judge_object: self.method.judge == JudgedBy::Object,
-            pixels: self.pixels.clone(),
+            stride: grid.stride(),
+            pixels,
         }
     }
 
@@ -370,51 +373,12 @@ impl FitPlanner {
             .map_err(|error| PlanError::Other(error.into()))?;
         self.tables_of_subsets.forget(winner.subset as usize);
         self.release_subset_tables(graph);
-        self.polish_starts = vec![self.judged[best].candidate.parameters.clone()];
-        self.best.set(self.method.judge.pick(self.judged[best].cssim, self.judged[best].cssim_object));
-        if self.method.polish { self.add_polish(graph) } else { self.add_report(graph) }
+        self.best.set(self.score_of_winner(best));
+        if self.method.polish { self.add_exploration(&winner.parameters, graph) } else { self.add_report(graph) }
     }
 
-    fn add_polish(&mut self, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
-        let left = MAX_EVALUATIONS.saturating_sub(self.polish_evaluations);
-        let parameters = PolishParameters { starts: self.polish_starts.clone(), max_evaluations: index(left) };
-        self.step = Step::Polishing(self.add_judging(graph, nodes::POLISH, self.span, &parameters)?);
-        Ok(())
-    }
-
-    /// Polish ends, or goes on with a wider table where it ran into the edge of this one.
-    fn polished(&mut self, output: &Blob, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
-        let model = self.method.model;
-        let mut polished = verify::polished(model, output)?;
-        self.polish_rounds += 1;
-        self.polish_evaluations += polished.evaluations;
-        polished.evaluations = self.polish_evaluations;
-        // Another table pays only with evaluations left for a poll in every direction.
-        let enough_left = self.polish_evaluations + 2 * polished.parameters.len() < MAX_EVALUATIONS;
-        let goes_on = polished.at_table_edge && self.polish_rounds < MAX_POLISH_ROUNDS && enough_left;
-        self.polish_starts.push(polished.parameters.clone());
-        self.best.set(self.method.judge.pick(polished.cssim, polished.cssim_object));
-        self.polished = Some(polished);
-        if goes_on {
-            self.widen_span();
-            // The pictures are made of the first table and the last.
-            let between = self.tables.split_off(1);
-            release_tables(between, graph);
-            self.add_polish(graph)
-        } else {
-            self.add_report(graph)
-        }
-    }
-
-    /// A span around the width where polish stands that holds the widths of all earlier rounds: on the next table all of them
-    /// are judged again, and the best goes on.
-    fn widen_span(&mut self) {
-        let Some(width) = self.method.model.lobes().iter().find_map(|b| b.width) else { return };
-        let (lower, upper) = width.span(self.method.model.parameters());
-        let widths = || self.polish_starts.iter().map(|start| width.at(start));
-        let last = widths().next_back().unwrap_or(upper);
-        let (low, high) = (widths().fold(last / AROUND, f64::min), widths().fold(last * AROUND, f64::max));
-        self.span = Some((low.max(lower), high.min(upper)));
+    fn score_of_winner(&self, winner: usize) -> f64 {
+        self.method.judge.pick(self.judged[winner].cssim, self.judged[winner].cssim_object)
     }
 
     /// The pictures: of the candidates on the table that they were judged on, of the match on the table that it was polished on.
@@ -475,7 +439,9 @@ impl Planner for FitPlanner {
     fn start(&mut self, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
         let light = self.light.take().map_or_else(|| encode_light(self.capture.environment()), Ok)?;
         self.environment = Some(graph.keep(light)?);
-        self.add_searches(graph)
+        self.add_searches(graph)?;
+        // Nothing but the scene decides this table: workers that are idle can begin with it.
+        if self.method.polish { self.add_coarse_table(graph) } else { Ok(()) }
     }
 
     fn completed(&mut self, node: NodeId, output: &Blob, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
@@ -489,6 +455,7 @@ impl Planner for FitPlanner {
         }
         match self.step {
             Step::Selecting(select) if select == node => self.selected(output, graph),
+            Step::Exploring(explore) if explore == node => self.explored(output, graph),
             Step::Polishing(polish) if polish == node => self.polished(output, graph),
             Step::Reporting if self.pictures.is_of(node) => self.reported(node, output),
             _ => Ok(()),

@@ -3,7 +3,7 @@
 use super::{
     candidate::Candidate,
     direct::DirectPixels,
-    method::{AtZero, Method, SearchKind, Start},
+    method::{Compress, Method, SearchKind, Start},
     objective::{Objective, flat_roles},
     scan::scan,
 };
@@ -108,9 +108,11 @@ pub(super) fn objective_of<'a>(
     photo: &[[f32; 3]],
     mean_radiance: f64,
 ) -> Objective<'a> {
-    let compression = match method.at_zero {
-        AtZero::Tangent => Compression::new(gamma, mean_radiance),
-        AtZero::Clamp => Compression::clamped(gamma),
+    let compression = match method.compress {
+        Compress::Tangent => Compression::new(gamma, mean_radiance),
+        Compress::Clamp => Compression::clamped(gamma),
+        Compress::ClampTo { white } => Compression::clamped_to(gamma, white),
+        Compress::Logarithm => Compression::logarithm(mean_radiance),
     };
     Objective::new(method.model, table, subset, photo, compression)
 }

@@ -27,6 +27,8 @@ pub struct FullView<'a> {
     pub pixels: &'a [Pixel],
     /// How much of each pixel of the image shows the object, `height x width`.
     pub coverage: &'a [f32],
+    /// The image shows one pixel, the middle, of every square of so many columns and rows of the scene's pixels; 1 for all of them.
+    pub stride: u32,
     /// Columns of the image.
     pub width: usize,
     /// Rows of the image.
@@ -43,7 +45,7 @@ impl FullView<'_> {
         let mut image = Image::new(self.width, self.height);
         let out = image.pixels_mut();
         for (i, &[column, row]) in self.pixels.iter().enumerate() {
-            let place = row as usize * self.width + column as usize;
+            let place = (row / self.stride) as usize * self.width + (column / self.stride) as usize;
             let coverage = f64::from(self.coverage[place]);
             out[place] = std::array::from_fn(|c| to_f32(planes[c][i] * coverage));
         }

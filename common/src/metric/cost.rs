@@ -5,7 +5,7 @@
 //! without clamping. A power below 1 has an infinite slope at zero, so below a small e the power continues as its
 //! tangent line: once continuously differentiable, finite gradient, negative values keep their order. The same for A and B.
 
-use crate::math::elementary::pow;
+use crate::math::elementary::{ln, pow};
 
 /// The compression `x^(1/gamma)`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -15,7 +15,14 @@ pub struct Compression {
     knee: f64,
     value_at_knee: f64,
     slope_at_knee: f64,
+    /// Radiance above this counts as this.
+    ceiling: f64,
+    /// The logarithm's scale, where it takes the place of the power.
+    logarithm: Option<f64>,
 }
+
+/// The scale of [`Compression::logarithm`], as a share of the photo's mean radiance.
+pub const LOGARITHM_SCALE: f64 = 0.01;
 
 /// Where the tangent line takes over, as a share of the photo's mean radiance (design section 1).
 pub const KNEE: f64 = 1e-6;
@@ -30,7 +37,8 @@ impl Compression {
         assert!(gamma > 0.0 && mean_radiance > 0.0, "gamma {gamma}, mean radiance {mean_radiance}");
         let (exponent, knee) = (1.0 / gamma, KNEE * mean_radiance);
         let value = pow(knee, exponent);
-        Self { exponent, knee, value_at_knee: value, slope_at_knee: exponent * value / knee }
+        let slope = exponent * value / knee;
+        Self { value_at_knee: value, slope_at_knee: slope, knee, ..Self::power(exponent) }
     }
 
     /// The paper's compression: `max(x, 0)^(1/gamma)`.
@@ -40,13 +48,42 @@ impl Compression {
     #[must_use]
     pub fn clamped(gamma: f64) -> Self {
         assert!(gamma > 0.0, "gamma {gamma}");
-        Self { exponent: 1.0 / gamma, knee: 0.0, value_at_knee: 0.0, slope_at_knee: 0.0 }
+        Self::power(1.0 / gamma)
+    }
+
+    /// The compression of radiance clamped to \[0, white\].
+    ///
+    /// # Panics
+    /// Unless gamma and white are positive.
+    #[must_use]
+    pub fn clamped_to(gamma: f64, white: f64) -> Self {
+        assert!(white > 0.0, "white {white}");
+        Self { ceiling: white, ..Self::clamped(gamma) }
+    }
+
+    /// `ln(1 + max(x, 0) / e)`, e being [`LOGARITHM_SCALE`] times the photo's mean radiance: the rival from the fitting of measured
+    /// BRDFs (Loew et al., *BRDF Models for Accurate and Efficient Rendering of Glossy Surfaces*, ACM TOG 31(1), 2012).
+    ///
+    /// # Panics
+    /// Unless the mean radiance is positive.
+    #[must_use]
+    pub fn logarithm(mean_radiance: f64) -> Self {
+        assert!(mean_radiance > 0.0, "mean radiance {mean_radiance}");
+        Self { logarithm: Some(LOGARITHM_SCALE * mean_radiance), ..Self::power(1.0) }
+    }
+
+    /// The power of `max(x, 0)`.
+    fn power(exponent: f64) -> Self {
+        Self { exponent, knee: 0.0, value_at_knee: 0.0, slope_at_knee: 0.0, ceiling: f64::INFINITY, logarithm: None }
     }
 
     /// The compressed value.
     #[must_use]
     pub fn apply(&self, x: f64) -> f64 {
-        if x >= self.knee {
+        let x = x.min(self.ceiling);
+        if let Some(scale) = self.logarithm {
+            ln(1.0 + x.max(0.0) / scale)
+        } else if x >= self.knee {
             if self.exponent == 1.0 { x } else { pow(x, self.exponent) }
         } else {
             self.value_at_knee + self.slope_at_knee * (x - self.knee)
@@ -57,7 +94,11 @@ impl Compression {
     #[must_use]
     pub fn apply_with_slope(&self, x: f64) -> (f64, f64) {
         let value = self.apply(x);
-        let slope = if x > self.knee {
+        let slope = if x >= self.ceiling {
+            0.0
+        } else if let Some(scale) = self.logarithm {
+            if x > 0.0 { 1.0 / (scale + x) } else { 0.0 }
+        } else if x > self.knee {
             if self.exponent == 1.0 { 1.0 } else { self.exponent * value / x }
         } else {
             self.slope_at_knee
@@ -97,7 +138,8 @@ mod tests {
     #[test]
     fn slopes_are_derivatives() {
         for gamma in [1.0, 1.7, 3.0] {
-            for c in [Compression::new(gamma, 1.0), Compression::clamped(gamma)] {
+            let clamped = [Compression::clamped(gamma), Compression::clamped_to(gamma, 21.0)];
+            for c in [Compression::new(gamma, 1.0), clamped[0], clamped[1], Compression::logarithm(0.4)] {
                 for x in [1e-4, 0.03, 0.7, 20.0] {
                     let h = 1e-6 * x;
                     let numeric = (c.apply(x + h) - c.apply(x - h)) / (2.0 * h);
@@ -105,6 +147,9 @@ mod tests {
                 }
             }
         }
+        assert_eq!(Compression::clamped_to(2.0, 4.0).apply_with_slope(9.0), (2.0, 0.0));
+        assert_eq!(Compression::logarithm(100.0).apply(0.0), 0.0);
+        assert!((Compression::logarithm(100.0).apply(1.0) - 2.0_f64.ln()).abs() < 1e-15);
         assert_eq!(Compression::clamped(2.0).apply_with_slope(-1.0), (0.0, 0.0));
         assert_eq!(Compression::clamped(2.0).apply_with_slope(0.0), (0.0, 0.0));
     }

@@ -33,6 +33,8 @@ impl Accuracy {
     pub const SUBSET: Self = Self { tolerance: 5e-4, footprint: 1.0 };
     /// Full-resolution tables of stage two and polish.
     pub const FULL: Self = Self { tolerance: 3e-3, footprint: 3.0 };
+    /// Tables on which polish looks for the lobe to start from.
+    pub const COARSE: Self = Self { tolerance: 1e-2, footprint: 10.0 };
 }
 
 /// What a table is to hold: lobes of `model`, widths on `knots`.

@@ -7,6 +7,7 @@
 //! | [`Scale::Unscaled`] | t | \[lower, upper\], either may be infinite |
 //! | [`Scale::Linear`] | lower + t (upper - lower) | \[0, 1\] |
 //! | [`Scale::Logarithmic`] | lower (upper / lower)^t | \[0, 1\] |
+//! | [`Scale::OffsetLogarithmic`] | lower + s ((1 + 1/k)^t - 1), s = k (upper - lower), k = [`OFFSET`] | \[0, 1\] |
 //!
 //! The scaling is ours, not MATLAB's: `patternsearch` has `ScaleMesh`, which derives a scale from the start, and takes
 //! no account of bounds. Scaling by the bounds makes one mesh size mean the same fraction of every parameter's range,
@@ -27,7 +28,13 @@ pub enum Scale {
     Linear,
     /// The logarithm of the range becomes \[0, 1\]; both bounds must be finite and above 0.
     Logarithmic,
+    /// About linear in the first hundredth of the range ([`OFFSET`]), about logarithmic above it: equal steps look about equal where
+    /// the parameter is a reflectance, and the lower bound may be 0. Both bounds must be finite.
+    OffsetLogarithmic,
 }
+
+/// Where [`Scale::OffsetLogarithmic`] turns from linear to logarithmic, as a share of the range.
+pub const OFFSET: f64 = 0.01;
 
 /// A box: lower <= upper in every coordinate, each with its scale. Never empty.
 #[derive(Debug, Clone, PartialEq)]
@@ -108,6 +115,7 @@ impl Bounds {
             _ if lower == upper => 0.0,
             Scale::Linear => ((x - lower) / (upper - lower)).clamp(0.0, 1.0),
             Scale::Logarithmic => ((ln(x) - ln(lower)) / (ln(upper) - ln(lower))).clamp(0.0, 1.0),
+            Scale::OffsetLogarithmic => (ln(1.0 + (x - lower) / offset(lower, upper)) / stretch()).clamp(0.0, 1.0),
         }
     }
 
@@ -126,6 +134,7 @@ impl Bounds {
             Scale::Unscaled => t,
             Scale::Linear => lower + t * (upper - lower),
             Scale::Logarithmic => exp(ln(lower) + t * (ln(upper) - ln(lower))),
+            Scale::OffsetLogarithmic => lower + offset(lower, upper) * (exp(t * stretch()) - 1.0),
         };
         x.clamp(lower, upper)
     }
@@ -138,6 +147,7 @@ impl Bounds {
             Scale::Unscaled => 1.0,
             Scale::Linear => upper - lower,
             Scale::Logarithmic => x * (ln(upper) - ln(lower)),
+            Scale::OffsetLogarithmic => (x - lower + offset(lower, upper)) * stretch(),
         }
     }
 
@@ -147,7 +157,7 @@ impl Bounds {
         match self.scales[index] {
             Scale::Unscaled => (self.lower[index], self.upper[index]),
             _ if self.lower[index] == self.upper[index] => (0.0, 0.0),
-            Scale::Linear | Scale::Logarithmic => (0.0, 1.0),
+            Scale::Linear | Scale::Logarithmic | Scale::OffsetLogarithmic => (0.0, 1.0),
         }
     }
 
@@ -174,13 +184,23 @@ impl Bounds {
     }
 }
 
+/// `s` of [`Scale::OffsetLogarithmic`].
+fn offset(lower: f64, upper: f64) -> f64 {
+    OFFSET * (upper - lower)
+}
+
+/// The logarithm of `1 + 1/k` of [`Scale::OffsetLogarithmic`].
+fn stretch() -> f64 {
+    ln(1.0 + 1.0 / OFFSET)
+}
+
 fn check_range(index: usize, lower: f64, upper: f64, scale: Scale) -> Result<(), SearchError> {
     let ordered = lower <= upper && lower < f64::INFINITY && upper > f64::NEG_INFINITY;
     if !ordered {
         return Err(SearchError::EmptyRange { index, lower, upper });
     }
     let expected = match scale {
-        Scale::Linear if !(upper - lower).is_finite() => "finite bounds",
+        Scale::Linear | Scale::OffsetLogarithmic if !(upper - lower).is_finite() => "finite bounds",
         Scale::Logarithmic if !(lower > 0.0 && upper.is_finite()) => "finite bounds above 0",
         _ => return Ok(()),
     };
@@ -192,14 +212,14 @@ mod tests {
     use super::*;
 
     fn example() -> Bounds {
-        let scales = vec![Scale::Linear, Scale::Logarithmic, Scale::Unscaled, Scale::Linear];
-        Bounds::new(vec![-1.0, 0.005, f64::NEG_INFINITY, 0.7], vec![3.0, 1.0, 9.0, 0.7], scales).unwrap()
+        let scales = vec![Scale::Linear, Scale::Logarithmic, Scale::Unscaled, Scale::Linear, Scale::OffsetLogarithmic];
+        Bounds::new(vec![-1.0, 0.005, f64::NEG_INFINITY, 0.7, 0.0], vec![3.0, 1.0, 9.0, 0.7, 2.0], scales).unwrap()
     }
 
     #[test]
     fn bounds_map_to_bounds_exactly_and_the_middle_to_the_mean_of_its_scale() {
         let bounds = example();
-        for i in [0, 1, 3] {
+        for i in [0, 1, 3, 4] {
             let (first, last) = bounds.scaled_range(i);
             assert_eq!(bounds.to_natural(i, first), bounds.lower()[i]);
             assert_eq!(bounds.to_natural(i, last), bounds.upper()[i]);
@@ -209,13 +229,16 @@ mod tests {
         assert_eq!(bounds.to_natural(0, 0.5), 1.0);
         assert!((bounds.to_natural(1, 0.5) - 0.005_f64.sqrt()).abs() < 1e-15);
         assert_eq!(bounds.to_natural(2, -40.0), -40.0);
+        // A hundredth of the range lies at ln 2 / ln 101.
+        assert!((bounds.to_scaled(4, 0.02) - 0.150_190).abs() < 1e-6);
+        assert!((bounds.to_natural(4, bounds.to_scaled(4, 0.02)) - 0.02).abs() < 1e-15);
         assert_eq!(bounds.scaled_range(3), (0.0, 0.0));
     }
 
     #[test]
     fn scaled_derivative_is_the_slope_of_the_map() {
         let bounds = example();
-        for (i, t) in [(0, 0.3), (1, 0.3), (2, 0.3)] {
+        for (i, t) in [(0, 0.3), (1, 0.3), (2, 0.3), (4, 0.0001), (4, 0.3)] {
             let h = 1e-6;
             let slope = (bounds.to_natural(i, t + h) - bounds.to_natural(i, t - h)) / (2.0 * h);
             let derivative = bounds.scaled_derivative(i, bounds.to_natural(i, t));

@@ -30,6 +30,7 @@ pub mod least_squares;
 pub mod multi_start;
 pub mod normal_equations;
 pub mod pattern;
+pub mod quasi_newton;
 pub mod sandwich;
 mod semidefinite;
 pub mod termination;

@@ -4,7 +4,7 @@ use crate::settings::{self, MethodSettings};
 use anyhow::Context;
 use lookalike::{
     brdf,
-    fit::{AtZero, Integration, JudgedBy, Method, SearchKind, Start},
+    fit::{Compress, Integration, JudgedBy, Method, SearchKind, Start},
     render::subset::{SampleCount, Sampling},
 };
 
@@ -37,9 +37,9 @@ pub(crate) fn method(settings: &MethodSettings) -> anyhow::Result<Method> {
             settings::Start::Scan => Start::Scan,
             settings::Start::Paper => Start::Paper,
         },
-        at_zero: match settings.compress_at_zero {
-            settings::CompressAtZero::Tangent => AtZero::Tangent,
-            settings::CompressAtZero::Clamp => AtZero::Clamp,
+        compress: match settings.compress_at_zero {
+            settings::CompressAtZero::Tangent => Compress::Tangent,
+            settings::CompressAtZero::Clamp => Compress::Clamp,
         },
         polish: settings.polish,
         judge: match settings.judge {

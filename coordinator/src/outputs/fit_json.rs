@@ -89,7 +89,7 @@ impl FitRecord<'_> {
             "search": name_of(&self.settings.search),
             "integrator": self.settings.integrator.to_string(),
             "start": format!("{:?}", self.method.start).to_lowercase(),
-            "at_zero": format!("{:?}", self.method.at_zero).to_lowercase(),
+            "at_zero": format!("{:?}", self.method.compress).to_lowercase(),
             "gammas": self.method.gammas,
             "judge": name_of(&self.settings.judge),
             "display_exposure": self.display_exposure,

@@ -21,7 +21,7 @@ impl Stage {
 
     pub(super) fn title(self) -> &'static str {
         match self {
-            Self::SubsetTables => "subset transport",
+            Self::SubsetTables => "first transport",
             Self::Searches => "stage one: searches",
             Self::FullTables => "full transport",
             Self::Judging => "stage two: CSSIM",
@@ -49,7 +49,7 @@ impl Stage {
             "transport" => Self::SubsetTables,
             "search" => Self::Searches,
             "select" => Self::Judging,
-            "polish" => Self::Polish,
+            "explore" | "polish" => Self::Polish,
             "report" => Self::Pictures,
             _ => return None,
         })

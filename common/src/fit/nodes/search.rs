@@ -7,7 +7,7 @@ use super::view::concatenated;
 use crate::{
     brdf,
     fit::{
-        AtZero, DirectPixels, Method, SearchKind, Start, search_gamma,
+        Compress, DirectPixels, Method, SearchKind, Start, search_gamma,
         wire::{CandidateWire, EnvironmentWire, ImageWire, SubsetWire, read, write},
     },
     graph::{Blob, NodeFailure, NodeType, RunContext},
@@ -27,8 +27,38 @@ pub(in crate::fit) struct SearchParameters {
     pub(in crate::fit) mean_radiance: f64,
     pub(in crate::fit) pattern: bool,
     pub(in crate::fit) paper_start: bool,
-    pub(in crate::fit) clamp_at_zero: bool,
+    pub(in crate::fit) compress: CompressWire,
     pub(in crate::fit) direct: Option<DirectWire>,
+}
+
+/// [`Compress`].
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub(in crate::fit) enum CompressWire {
+    Tangent,
+    Clamp,
+    ClampTo(f64),
+    Logarithm,
+}
+
+impl CompressWire {
+    pub(in crate::fit) fn of(compress: Compress) -> Self {
+        match compress {
+            Compress::Tangent => Self::Tangent,
+            Compress::Clamp => Self::Clamp,
+            Compress::ClampTo { white } => Self::ClampTo(white),
+            Compress::Logarithm => Self::Logarithm,
+        }
+    }
+
+    fn compress(self) -> Result<Compress, NodeFailure> {
+        Ok(match self {
+            Self::Tangent => Compress::Tangent,
+            Self::Clamp => Compress::Clamp,
+            Self::ClampTo(white) if white.is_finite() && white > 0.0 => Compress::ClampTo { white },
+            Self::ClampTo(white) => return Err(NodeFailure::new(format!("white {white} must be positive"))),
+            Self::Logarithm => Compress::Logarithm,
+        })
+    }
 }
 
 /// The direct integrator in place of the table.
@@ -113,7 +143,7 @@ impl NodeType for Search {
             model,
             search: if parameters.pattern { SearchKind::Pattern } else { SearchKind::LeastSquares },
             start: if parameters.paper_start { Start::Paper } else { Start::Scan },
-            at_zero: if parameters.clamp_at_zero { AtZero::Clamp } else { AtZero::Tangent },
+            compress: parameters.compress.compress()?,
             ..Method::default()
         };
         let mean = parameters.mean_radiance;

@@ -26,6 +26,8 @@ pub(in crate::fit) struct ViewWire {
     pub(in crate::fit) coverage: Vec<f32>,
     pub(in crate::fit) exposure: f64,
     pub(in crate::fit) judge_object: bool,
+    /// The photo shows one pixel, the middle, of every square of so many columns and rows of the scene's pixels; 1 for all of them.
+    pub(in crate::fit) stride: u32,
     /// The pixels of the full-resolution table.
     pub(in crate::fit) pixels: Vec<Pixel>,
 }
@@ -38,6 +40,7 @@ pub(super) struct View {
     pub(super) by: JudgedBy,
     pixels: Vec<Pixel>,
     coverage: Vec<f32>,
+    stride: u32,
     width: usize,
     height: usize,
 }
@@ -64,8 +67,9 @@ impl Scene {
     }
 
     pub(super) fn full(&self) -> FullView<'_> {
-        let View { model, pixels, coverage, width, height, .. } = &*self.view;
-        FullView { model: *model, table: &self.table, pixels, coverage, width: *width, height: *height }
+        let View { model, pixels, coverage, stride, width, height, .. } = &*self.view;
+        let (stride, width, height) = (*stride, *width, *height);
+        FullView { model: *model, table: &self.table, pixels, coverage, stride, width, height }
     }
 }
 
@@ -78,11 +82,13 @@ impl View {
         let judge = Judge::new(&photo, &scored, wire.exposure, &JudgeOptions::default())
             .map_err(|error| NodeFailure::new(format!("the photo cannot be judged: {error}")))?;
         let (width, height) = (photo.width(), photo.height());
-        if let Some(p) = wire.pixels.iter().find(|p| p[0] as usize >= width || p[1] as usize >= height) {
+        let stride = wire.stride.max(1);
+        let outside = |p: &&Pixel| (p[0] / stride) as usize >= width || (p[1] / stride) as usize >= height;
+        if let Some(p) = wire.pixels.iter().find(outside) {
             return Err(NodeFailure::new(format!("pixel {p:?} lies outside the {width} x {height} photo")));
         }
         let by = if wire.judge_object { JudgedBy::Object } else { JudgedBy::Image };
-        Ok(Self { model, judge, by, pixels: wire.pixels, coverage: wire.coverage, width, height })
+        Ok(Self { model, judge, by, pixels: wire.pixels, coverage: wire.coverage, stride, width, height })
     }
 }
 

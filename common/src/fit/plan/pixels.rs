@@ -2,6 +2,7 @@
 
 use super::index;
 use crate::{
+    image::Image,
     math::{luminance, widen},
     render::{
         subset::{self, PixelSubset},
@@ -33,4 +34,68 @@ pub(super) fn covered_pixels(capture: &Capture) -> Vec<Pixel> {
     let mut pixels: Vec<Pixel> = covered.map(|(i, _)| [index(i % width), index(i / width)]).collect();
     pixels.sort_by_key(|pixel| tile_order(*pixel));
     pixels
+}
+
+/// Every pixel of a photo, or one of every square of pixels, its middle.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Grid(u32);
+
+impl Grid {
+    /// Every pixel.
+    pub(super) const FULL: Self = Self(1);
+
+    /// The coarsest grid that still has `size` columns and rows, where the photo has as many.
+    pub(super) fn of_size(photo: &Image, size: usize) -> Self {
+        Self(index((photo.width().min(photo.height()) / size).max(1)))
+    }
+
+    /// Columns and rows of a square.
+    pub(super) fn stride(self) -> u32 {
+        self.0
+    }
+
+    /// The places of the grid along `length` pixels.
+    fn places(self, length: usize) -> impl Iterator<Item = usize> + Clone {
+        let stride = self.0 as usize;
+        (stride / 2..length).step_by(stride)
+    }
+
+    /// Whether a pixel is on the grid.
+    pub(super) fn holds(self, [column, row]: Pixel) -> bool {
+        column % self.0 == self.0 / 2 && row % self.0 == self.0 / 2
+    }
+
+    /// The photo's pixels on the grid.
+    pub(super) fn image(self, photo: &Image) -> Image {
+        let (columns, rows) = (self.places(photo.width()), self.places(photo.height()));
+        let pixels: Vec<[f32; 3]> =
+            rows.clone().flat_map(|r| columns.clone().map(move |c| photo.pixel(c, r))).collect();
+        Image::from_pixels(columns.count(), rows.count(), pixels)
+    }
+
+    /// The values, row by row of `width`, on the grid.
+    pub(super) fn values(self, values: &[f32], width: usize) -> Vec<f32> {
+        let columns = self.places(width);
+        self.places(values.len() / width).flat_map(|r| columns.clone().map(move |c| values[r * width + c])).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_grid_takes_the_middle_of_every_square_and_cuts_what_is_left_over() {
+        let photo = Image::from_pixels(7, 5, (0..35u8).map(|i| [f32::from(i); 3]).collect());
+        let grid = Grid(3);
+        let image = grid.image(&photo);
+        assert_eq!((image.width(), image.height()), (2, 2));
+        assert_eq!(image.pixels().iter().map(|p| p[0]).collect::<Vec<_>>(), [8.0, 11.0, 29.0, 32.0]);
+        let values: Vec<f32> = (0..35u8).map(f32::from).collect();
+        assert_eq!(grid.values(&values, 7), [8.0, 11.0, 29.0, 32.0]);
+        assert!(grid.holds([4, 1]) && !grid.holds([3, 1]));
+        assert_eq!(Grid::FULL.image(&photo), photo);
+        assert_eq!(Grid::of_size(&photo, 2), Grid(2));
+        assert_eq!(Grid::of_size(&photo, 64), Grid::FULL);
+    }
 }

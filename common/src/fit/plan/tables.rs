@@ -21,6 +21,9 @@ pub(super) const SUBSET_SHARD: usize = 32;
 /// Pixels per shard of the full-resolution table.
 pub(super) const FULL_SHARD: usize = 2048;
 
+/// Pixels per shard of the coarse picture's table: small enough to spread over several workers.
+pub(super) const COARSE_SHARD: usize = 512;
+
 /// Knots per factor of two of width in full-resolution tables (design section 7: at least 5).
 const FULL_PER_OCTAVE: f64 = 5.0;
 

@@ -44,7 +44,8 @@ pub(super) fn capture(name: &str, parameters: &[f64], noise: f64) -> Arc<Capture
     let knots = Knots::covering(width / 1.3, width * 1.3, PER_OCTAVE);
     let plan = TransportPlan { model, knots, accuracy: Accuracy::FULL };
     let table = plan.integrate(&geometry, &LightPyramid::new(room()), &pixels);
-    let view = FullView { model, table: &table, pixels: &pixels, coverage: &coverage, width: SIZE, height: SIZE };
+    let view =
+        FullView { model, table: &table, pixels: &pixels, coverage: &coverage, stride: 1, width: SIZE, height: SIZE };
     let mut photo = view.render(parameters);
     for (i, pixel) in photo.pixels_mut().iter_mut().enumerate() {
         for (c, value) in pixel.iter_mut().enumerate() {

@@ -1,0 +1,135 @@
+//! Where stage three starts. Eq. 1 may have no minimum at all near the lobe that looks best: blue acrylic under Eucalyptus Grove gets a
+//! wide lobe at every gamma, while CSSIM is a sixth lower with a sharp one. So CSSIM is searched on a coarse picture from a few very
+//! different lobes, and the best of what is found there is where polish starts from on the full picture.
+
+use super::{
+    method::JudgedBy,
+    polish::{Polished, polish},
+    stage_one::paper_start,
+    stage_two::FullView,
+};
+use crate::{
+    brdf::{Model, flat_bounds},
+    math::elementary::{exp, ln},
+    metric::Judge,
+    search::{Progress, SearchError},
+};
+use std::ops::ControlFlow;
+
+/// Most evaluations of CSSIM on the coarse picture, from each start.
+pub(super) const MAX_EXPLORATIONS: usize = 300;
+
+/// The lobes that are tried beside that of the winner, as widths of GGX.
+const WIDTHS: [f64; 2] = [0.03, 0.1];
+
+/// The sharpest lobe that a coarse picture can tell from a mirror, as a width of GGX.
+const SHARPEST: f64 = 0.015;
+
+/// How far from a bound, as a share of its range, a start keeps away: at a bound the search may not see what lies inside.
+const INSIDE: f64 = 0.01;
+
+/// The starts: the winner, the winner with other lobes, and the paper's generic start.
+pub(super) fn starts(model: &dyn Model, won: &[f64]) -> Vec<Vec<f64>> {
+    let (lower, upper) = flat_bounds(model.parameters());
+    let width = model.lobes().iter().find_map(|basis| basis.width);
+    let with_width = |alpha: f64| {
+        let mut start = won.to_vec();
+        if let Some(width) = width {
+            start[width.entry] = (width.inverse)(width_of(model, alpha));
+        }
+        start
+    };
+    let mut starts = vec![won.to_vec()];
+    starts.extend(WIDTHS.map(with_width));
+    starts.push(paper_start(model));
+    for start in &mut starts {
+        for (i, x) in start.iter_mut().enumerate() {
+            let margin = if width.is_some_and(|width| width.entry == i) { 0.0 } else { INSIDE * (upper[i] - lower[i]) };
+            *x = x.clamp(lower[i] + margin, upper[i] - margin);
+        }
+    }
+    starts
+}
+
+/// Explores from every start; the lowest score wins, the first of equals.
+///
+/// # Errors
+/// When no start can be rendered and scored.
+pub(super) fn explore(
+    view: &FullView<'_>,
+    judge: &Judge,
+    by: JudgedBy,
+    starts: &[Vec<f64>],
+    max_evaluations: usize,
+    observe: &mut dyn FnMut(&Progress<'_>) -> ControlFlow<()>,
+) -> Result<Polished, SearchError> {
+    let score = |p: &Polished| by.pick(p.cssim, p.cssim_object);
+    let (mut best, mut failure, mut evaluations) = (None::<Polished>, SearchError::NoParameters, 0);
+    for start in starts {
+        match polish(view, judge, by, std::slice::from_ref(start), max_evaluations, observe) {
+            Ok(found) => {
+                evaluations += found.evaluations;
+                if best.as_ref().is_none_or(|best| score(&found) < score(best)) {
+                    best = Some(found);
+                }
+            }
+            Err(error) => failure = error,
+        }
+    }
+    best.map(|best| Polished { evaluations, ..best }).ok_or(failure)
+}
+
+/// The span of widths whose lobes a coarse picture shows; `None` for a model without widths.
+pub(super) fn explored_span(model: &dyn Model) -> Option<(f64, f64)> {
+    let widths: Vec<f64> = grid(model)?.into_iter().filter(|(_, alpha)| *alpha >= SHARPEST).map(|(w, _)| w).collect();
+    let (low, high) = (widths.iter().copied().reduce(f64::min)?, widths.iter().copied().reduce(f64::max)?);
+    (low < high).then_some((low, high))
+}
+
+/// The width of the lobe that is about as wide as GGX of this alpha.
+fn width_of(model: &dyn Model, alpha: f64) -> f64 {
+    let distance = |a: f64| (ln(a) - ln(alpha)).abs();
+    let nearest = grid(model).unwrap_or_default().into_iter().min_by(|a, b| distance(a.1).total_cmp(&distance(b.1)));
+    nearest.map_or(alpha, |(width, _)| width)
+}
+
+/// Widths over the model's range, evenly in their logarithm, each with the GGX alpha of its lobe.
+fn grid(model: &dyn Model) -> Option<Vec<(f64, f64)>> {
+    const STEPS: u32 = 200;
+    let basis = model.lobes().iter().find(|basis| basis.width.is_some())?;
+    let (low, high) = basis.width?.span(model.parameters());
+    let width = |i: u32| match i {
+        0 => low,
+        STEPS => high,
+        _ => exp(ln(low) + (ln(high) - ln(low)) * f64::from(i) / f64::from(STEPS)),
+    };
+    (0..=STEPS).map(|i| Some((width(i), basis.lobe.equivalent_alpha(width(i))?))).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::brdf::{Ggx, MODELS};
+
+    #[test]
+    fn starts_are_different_lobes_inside_the_box() {
+        let won = vec![0.0, 0.0, 0.3, 1.0, 0.2, 0.0, 0.4];
+        let starts = starts(&Ggx, &won);
+        assert_eq!(starts.len(), 4);
+        assert_eq!(starts[0], [0.01, 0.01, 0.3, 0.99, 0.2, 0.01, 0.4]);
+        assert!((starts[1][6] / 0.03 - 1.0).abs() < 0.02 && (starts[2][6] / 0.1 - 1.0).abs() < 0.02);
+        assert_eq!(starts[3], [0.3; 7]);
+    }
+
+    #[test]
+    fn every_model_has_a_span_to_explore_within_its_bounds() {
+        for model in MODELS {
+            let width = model.lobes().iter().find_map(|basis| basis.width).unwrap();
+            let (lower, upper) = width.span(model.parameters());
+            let (low, high) = explored_span(*model).unwrap();
+            assert!(lower <= low && low < high && high <= upper, "{}", model.name());
+        }
+        let (low, high) = explored_span(&Ggx).unwrap();
+        assert!((0.015..0.0155).contains(&low) && high == 1.0);
+    }
+}
