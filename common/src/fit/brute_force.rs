@@ -1,16 +1,9 @@
 //! The baseline that the method is measured against (\[BP20b\] section 1): minimise CSSIM itself, at full resolution, by pattern
 //! search with MATLAB's defaults from a generic start.
-//!
-//! It renders from the full-resolution table over the model's whole range of widths, so that what took a rendering and a score per
-//! evaluation takes milliseconds; whoever states its cost charges every evaluation a rendering by the direct integrator.
 
-use super::{
-    method::{JudgedBy, SearchKind},
-    stage_one::search_bounds,
-    stage_two::FullView,
-};
+use super::{method::SearchKind, stage_one::search_bounds};
 use crate::{
-    metric::Judge,
+    brdf::Model,
     search::{
         Progress, SearchError,
         pattern::{self, Minimum, PatternOptions},
@@ -18,21 +11,20 @@ use crate::{
 };
 use std::ops::ControlFlow;
 
-/// Minimises the score over the model's whole box from `start`; `observe` sees every evaluation and may end the search.
+/// Minimises a score over the model's whole box from `start`, with at most `limit` evaluations, else MATLAB's 2000 per parameter;
+/// `observe` sees every evaluation and may end the search. A value that is not finite is a rejected point.
 ///
 /// # Errors
-/// When the start lies outside the box, or its rendering cannot be scored.
+/// When the start lies outside the box, or its score is not finite.
 pub fn brute_force(
-    view: &FullView<'_>,
-    judge: &Judge,
-    by: JudgedBy,
+    model: &dyn Model,
+    score: impl FnMut(&[f64]) -> f64,
     start: &[f64],
+    limit: Option<usize>,
     observe: &mut dyn FnMut(&Progress<'_>) -> ControlFlow<()>,
 ) -> Result<Minimum, SearchError> {
-    let bounds = search_bounds(view.model, SearchKind::Pattern)?;
-    let options = PatternOptions::matlab(bounds.dimension());
-    // A rendering that cannot be scored is a rejected point.
-    let objective =
-        |point: &[f64]| judge.score(&view.render(point)).map_or(f64::NAN, |s| by.pick(s.cssim, s.cssim_object));
-    pattern::minimise_observed(objective, start, &bounds, &options, observe)
+    let bounds = search_bounds(model, SearchKind::Pattern)?;
+    let mut options = PatternOptions::matlab(bounds.dimension());
+    options.max_evaluations = limit.unwrap_or(options.max_evaluations);
+    pattern::minimise_observed(score, start, &bounds, &options, observe)
 }

@@ -29,7 +29,10 @@ pub use candidate::{Candidate, SAME, distinct, needed_span};
 pub use direct::DirectPixels;
 pub use method::{Compress, Integration, JudgedBy, MOST_SEARCHES, Method, MethodError, SearchKind, Start, gamma_range};
 pub use objective::Objective;
-pub use plan::{FitError, FitOutcome, FitPlanner, encode_light};
+pub use plan::{
+    Appraisal, FitError, FitOutcome, FitPlanner, PhotoPlanner, Subject, SurveyOutcome, SurveyPlanner, SurveyRequest,
+    encode_light,
+};
 pub use polish::{MAX_EVALUATIONS, Polished, polish};
 pub use stage_one::{SearchFailure, search_gamma};
 pub use stage_two::{FullView, Judged, judge_candidates, winner};

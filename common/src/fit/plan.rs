@@ -11,17 +11,19 @@ mod limits;
 mod pictures;
 mod pixels;
 mod polishing;
+mod survey;
 mod tables;
 mod verify;
 
 pub use limits::FitError;
+pub use survey::{Appraisal, PhotoPlanner, Subject, SurveyOutcome, SurveyPlanner, SurveyRequest};
 
 use self::{
     limits::check_sizes,
     pictures::Pictures,
     pixels::{Grid, covered_pixels, intensities, photo_at},
     polishing::Polishing,
-    tables::{FULL_SHARD, SUBSET_SHARD, release_tables, stage_one_knots},
+    tables::{FULL_SHARD, SUBSET_SHARD, release_tables, stage_one_knots, whole_span},
     verify::{Shard, SubsetTables},
 };
 use super::{
@@ -79,6 +81,7 @@ pub struct FitPlanner {
     extra_gammas: Vec<f64>,
     /// Where candidates are judged, polish runs and pictures are made.
     stage_two: Placement,
+    is_judged_on_whole_range: bool,
     /// The encoded light, if somebody else has encoded it.
     light: Option<Blob>,
     environment: Option<BlobHash>,
@@ -146,6 +149,7 @@ impl FitPlanner {
             pixels,
             extra_gammas: Vec::new(),
             stage_two: Placement::Coordinator,
+            is_judged_on_whole_range: false,
             light: None,
             environment: None,
             distribution: None,
@@ -207,6 +211,19 @@ impl FitPlanner {
         Arc::clone(&self.best)
     }
 
+    /// Judges on the table over the model's whole range of widths instead of the candidates': studies, whose many fits share it.
+    #[must_use]
+    pub fn judging_on_whole_range(mut self) -> Self {
+        self.is_judged_on_whole_range = true;
+        self
+    }
+
+    fn keep_light(&mut self, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
+        let light = self.light.take().map_or_else(|| encode_light(self.capture.environment()), Ok)?;
+        self.environment = Some(graph.keep(light)?);
+        Ok(())
+    }
+
     fn add_searches(&mut self, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
         let model = self.method.model;
         let (direct, of_scene) = self.direct_searches(graph)?;
@@ -258,6 +275,12 @@ impl FitPlanner {
         span: Span,
         parameters: &T,
     ) -> Result<NodeId, PlanError> {
+        let inputs = self.inputs_on_full_table(graph, span)?;
+        self.add_on_view(graph, (kind, kind), inputs, parameters)
+    }
+
+    /// The view and the full-resolution table over a span.
+    fn inputs_on_full_table(&mut self, graph: &mut GraphEdit<'_>, span: Span) -> Result<Vec<Input>, PlanError> {
         let view = match self.view {
             Some(view) => view,
             None => add(graph, "view", &self.view_wire(Grid::FULL, self.pixels.clone()))?,
@@ -265,20 +288,20 @@ impl FitPlanner {
         self.view = Some(view);
         let mut inputs = vec![Input::Blob(view)];
         inputs.extend(self.full_table(graph, span)?);
-        self.add_on_view(graph, kind, inputs, parameters)
+        Ok(inputs)
     }
 
-    /// A node of `kind` on a view and its table.
+    /// A node of a kind, with a label, on a view and its table.
     fn add_on_view<T: Serialize>(
         &self,
         graph: &mut GraphEdit<'_>,
-        kind: &str,
+        (kind, label): (&str, &str),
         inputs: Vec<Input>,
         parameters: &T,
     ) -> Result<NodeId, PlanError> {
         graph.add_node(NodeSpec {
             kind: kind.to_owned(),
-            label: kind.to_owned(),
+            label: label.to_owned(),
             parameters: encode("parameters", parameters)?,
             inputs,
             placement: self.stage_two,
@@ -351,7 +374,8 @@ impl FitPlanner {
 
     fn searched(&mut self, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
         let points = self.candidates.values().map(|c| &c.parameters[..]);
-        self.span = needed_span(self.method.model, points);
+        let needed = needed_span(self.method.model, points);
+        self.span = if self.is_judged_on_whole_range { whole_span(self.method.model) } else { needed };
         let candidates = self.candidates.values().map(CandidateWire::of).collect();
         let node = self.add_judging(graph, nodes::SELECT, self.span, &SelectParameters { candidates })?;
         self.step = Step::Selecting(node);
@@ -437,8 +461,7 @@ impl FitPlanner {
 
 impl Planner for FitPlanner {
     fn start(&mut self, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
-        let light = self.light.take().map_or_else(|| encode_light(self.capture.environment()), Ok)?;
-        self.environment = Some(graph.keep(light)?);
+        self.keep_light(graph)?;
         self.add_searches(graph)?;
         // Nothing but the scene decides this table: workers that are idle can begin with it.
         if self.method.polish { self.add_coarse_table(graph) } else { Ok(()) }

@@ -6,6 +6,7 @@ use crate::{
     graph::NodeFailure,
     image::Image,
     light::Environment,
+    metric::Score,
     protocol::{decode, encode},
     render::{
         knots::Knots,
@@ -13,7 +14,7 @@ use crate::{
         table::{LobeTable, TransportTable},
         transport::Pixel,
     },
-    search::Termination,
+    search::{Termination, pattern::Minimum},
 };
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 
@@ -218,6 +219,18 @@ impl PolishedWire {
             evaluations: polished.evaluations as u64,
             termination: polished.termination.name().to_owned(),
             at_table_edge: polished.at_table_edge,
+        }
+    }
+
+    /// A minimum that a pattern search on the score has found.
+    pub(super) fn of_minimum(minimum: Minimum, score: &Score) -> Self {
+        Self {
+            parameters: minimum.point,
+            cssim: score.cssim,
+            cssim_object: score.cssim_object,
+            evaluations: minimum.evaluations as u64,
+            termination: minimum.termination.name().to_owned(),
+            at_table_edge: false,
         }
     }
 

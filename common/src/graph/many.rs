@@ -27,6 +27,9 @@ pub struct Part<P> {
     pub name: String,
     /// What plans its nodes.
     pub planner: P,
+    /// It holds its nodes until the run ends, for the parts that ask for the same, even when it waits for nothing any more; it never counts as
+    /// completed.
+    pub stays: bool,
 }
 
 /// The answer to "what is next?".
@@ -153,7 +156,7 @@ impl<S: Parts> Many<S> {
     ) -> Result<(), PlanError> {
         let Some(part) = self.active.get_mut(&number) else { return Ok(()) };
         match step(&mut part.planner, &mut graph.on_behalf(self.sharing.part(number, &part.name))) {
-            Ok(()) if self.sharing.is_idle(number) => {
+            Ok(()) if self.sharing.is_idle(number) && !part.stays => {
                 self.end(number, graph).map_or(Ok(()), |part| self.parts.completed(part))
             }
             Ok(()) => Ok(()),

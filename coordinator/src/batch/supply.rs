@@ -95,7 +95,7 @@ impl Supply {
         let settings = fit.method.clone();
         let inputs = Inputs { capture, settings, method, exposure, inputs, max_cssim: fit.max_cssim };
         self.active.insert(number, Active { inputs, pixels });
-        Ok(Some(Part { number, name: fit.name.clone(), planner }))
+        Ok(Some(Part { number, name: fit.name.clone(), planner, stays: false }))
     }
 
     /// Whether the next fit should begin beside those that are in memory.

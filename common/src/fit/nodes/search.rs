@@ -72,15 +72,15 @@ pub(in crate::fit) struct DirectWire {
 
 /// A scene for the direct integrator.
 #[derive(Debug)]
-struct Scene {
-    geometry: Geometry,
-    light: Arc<LightDistribution>,
-    samples: u32,
-    seed: u64,
+pub(super) struct DirectScene {
+    pub(super) geometry: Geometry,
+    pub(super) light: Arc<LightDistribution>,
+    pub(super) samples: u32,
+    pub(super) seed: u64,
 }
 
-impl Scene {
-    fn read(wire: &DirectWire, inputs: &[Blob], context: &RunContext) -> Result<Self, NodeFailure> {
+impl DirectScene {
+    pub(super) fn read(wire: &DirectWire, inputs: &[Blob], context: &RunContext) -> Result<Self, NodeFailure> {
         let [environment, normals @ ..] = inputs else {
             return Err(NodeFailure::new("the direct integrator takes an environment, found none"));
         };
@@ -128,7 +128,7 @@ impl NodeType for Search {
                 "the direct integrator takes a table and an environment, found too few inputs",
             ));
         };
-        let scene = parameters.direct.as_ref().map(|wire| Scene::read(wire, of_scene, context)).transpose()?;
+        let scene = parameters.direct.as_ref().map(|wire| DirectScene::read(wire, of_scene, context)).transpose()?;
         let table = concatenated(model, shards, context)?;
         if table.pixels != subset.pixels.len() {
             let (expected, found) = (subset.pixels.len(), table.pixels);

@@ -38,11 +38,12 @@ pub(super) struct View {
     pub(super) model: &'static dyn Model,
     pub(super) judge: Judge,
     pub(super) by: JudgedBy,
-    pixels: Vec<Pixel>,
-    coverage: Vec<f32>,
+    pub(super) photo: Image,
+    pub(super) pixels: Vec<Pixel>,
+    pub(super) coverage: Vec<f32>,
     stride: u32,
-    width: usize,
-    height: usize,
+    pub(super) width: usize,
+    pub(super) height: usize,
 }
 
 /// A view with the table that fills it.
@@ -74,7 +75,7 @@ impl Scene {
 }
 
 impl View {
-    fn decode(bytes: &[u8]) -> Result<Self, NodeFailure> {
+    pub(super) fn decode(bytes: &[u8]) -> Result<Self, NodeFailure> {
         let wire: ViewWire = read("view", bytes)?;
         let photo: Image = wire.photo.image()?;
         let model = brdf::model(&wire.model).map_err(|error| NodeFailure::new(error.to_string()))?;
@@ -88,7 +89,7 @@ impl View {
             return Err(NodeFailure::new(format!("pixel {p:?} lies outside the {width} x {height} photo")));
         }
         let by = if wire.judge_object { JudgedBy::Object } else { JudgedBy::Image };
-        Ok(Self { model, judge, by, pixels: wire.pixels, coverage: wire.coverage, stride, width, height })
+        Ok(Self { model, judge, by, photo, pixels: wire.pixels, coverage: wire.coverage, stride, width, height })
     }
 }
 

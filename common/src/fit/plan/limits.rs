@@ -2,6 +2,7 @@
 
 use super::FULL_SHARD;
 use crate::{
+    brdf::{Model, flat_bounds},
     fit::{Integration, Method, MethodError},
     graph::{MAX_BLOB_BYTES, MAX_INPUTS},
     image::Image,
@@ -31,6 +32,14 @@ pub enum FitError {
         /// Samples per pixel.
         samples: u32,
     },
+    /// A point that is none of the model's.
+    #[error("the parameters {point:?} are none of {model}")]
+    Point {
+        /// As given.
+        point: Vec<f64>,
+        /// The model.
+        model: &'static str,
+    },
     /// More than one message can carry.
     #[error("{what} has {found} pixels, more than the {limit} that a fit can take: {remedy}")]
     TooLarge {
@@ -43,6 +52,23 @@ pub enum FitError {
         /// What to do.
         remedy: &'static str,
     },
+}
+
+/// Refuses parameter vectors outside the model's bounds.
+pub(super) fn check_points<'a>(
+    model: &'static dyn Model,
+    points: impl Iterator<Item = &'a Vec<f64>>,
+) -> Result<(), FitError> {
+    let (lower, upper) = flat_bounds(model.parameters());
+    let is_inside = |point: &Vec<f64>| {
+        point.len() == lower.len() && point.iter().zip(lower.iter().zip(&upper)).all(|(x, (l, u))| (l..=u).contains(&x))
+    };
+    for point in points {
+        if !is_inside(point) {
+            return Err(FitError::Point { point: point.clone(), model: model.name() });
+        }
+    }
+    Ok(())
 }
 
 /// Refuses what would not fit into a blob, or into memory, before any work is done.

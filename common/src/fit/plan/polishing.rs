@@ -70,7 +70,7 @@ impl FitPlanner {
         let inputs = [vec![Input::Blob(*view)], table.clone()].concat();
         let parameters =
             PolishParameters { starts: starts(self.method.model, won), max_evaluations: index(MAX_EXPLORATIONS) };
-        let node = self.add_on_view(graph, nodes::EXPLORE, inputs, &parameters)?;
+        let node = self.add_on_view(graph, (nodes::EXPLORE, nodes::EXPLORE), inputs, &parameters)?;
         table.iter().filter_map(Input::node).for_each(|shard| graph.release(shard));
         self.step = Step::Exploring(node);
         Ok(())

@@ -2,6 +2,7 @@
 
 use super::{FitPlanner, Span, add, encode, index, verify::Shard};
 use crate::{
+    brdf::Model,
     fit::{
         Method,
         nodes::{self, TransportParameters},
@@ -82,7 +83,8 @@ impl FitPlanner {
             None => stage_one_knots(&self.method),
         };
         let pixels = (list, self.pixels.len(), FULL_SHARD);
-        let shards = self.add_transport(graph, "in full", pixels, knots, Accuracy::FULL)?;
+        let what = if self.tables.is_empty() { "in full" } else { "in full again" };
+        let shards = self.add_transport(graph, what, pixels, knots, Accuracy::FULL)?;
         self.tables.push((span, shards.clone()));
         Ok(shards)
     }
@@ -98,9 +100,14 @@ impl FitPlanner {
 
 /// The grid of widths of stage one: the model's whole range.
 pub(super) fn stage_one_knots(method: &Method) -> Knots {
-    let width = method.model.lobes().iter().find_map(|b| b.width);
-    let (low, high) = width.map_or((0.5, 1.0), |width| width.span(method.model.parameters()));
+    let (low, high) = whole_span(method.model).unwrap_or((0.5, 1.0));
     Knots::covering(low, high, PER_OCTAVE)
+}
+
+/// The span of all widths that the model has.
+pub(super) fn whole_span(model: &dyn Model) -> Span {
+    let width = model.lobes().iter().find_map(|b| b.width)?;
+    Some(width.span(model.parameters()))
 }
 
 /// Lets go of full-resolution tables.

@@ -104,7 +104,7 @@ impl Parts for Bench {
         let Some(planner) = self.coming.pop() else { return Ok(Next::End) };
         let number = self.next;
         self.next += 1;
-        Ok(Next::Part(Box::new(Part { number, name: format!("fit-{number}"), planner })))
+        Ok(Next::Part(Box::new(Part { number, name: format!("fit-{number}"), planner, stays: false })))
     }
 
     fn wants_more(&self, active: usize, ready: usize) -> bool {
