@@ -17,11 +17,10 @@
 //! `ks` and `f0` trade against each other: only `ks f0`, the specular colour at normal incidence, is well determined.
 
 use super::{
-    Angles, BasisLobe, Channels, Incident, Lambert, Lobe, Model, Parameter, Role, Scale, Split, Spread,
-    lobe::{accumulate, second_order},
+    Angles, BasisLobe, Channels, Incident, Lambert, Lobe, Model, Parameter, Role, Scale, Split, Spread, Width,
+    beckmann::beckmann, lobe::accumulate,
 };
-use crate::math::{Rgb, elementary::exp_nonpositive};
-use std::f64::consts::PI;
+use crate::math::Rgb;
 
 /// The model `cook-torrance`.
 #[derive(Debug, Clone, Copy)]
@@ -76,7 +75,7 @@ static PARAMETERS: [Parameter; 4] = [
 ];
 
 static LOBES: [BasisLobe; 2] =
-    [BasisLobe { lobe: &Lambert, width: None }, BasisLobe { lobe: &CookTorranceLobe, width: Some(M) }];
+    [BasisLobe { lobe: &Lambert, width: None }, BasisLobe { lobe: &CookTorranceLobe, width: Some(Width::itself(M)) }];
 
 impl Model for CookTorrance {
     fn name(&self) -> &'static str {
@@ -108,6 +107,10 @@ impl Model for CookTorrance {
             push(1, c, F0, p[KS + c]);
             push(2, c, KS + c, 1.0);
         }
+    }
+
+    fn diffuse_albedo(&self, p: &[f64]) -> Rgb {
+        Rgb::from_slice(&p[KD..])
     }
 
     fn normal_incidence_specular(&self, p: &[f64]) -> Rgb {
@@ -144,20 +147,10 @@ impl Lobe for CookTorranceLobe {
 }
 
 /// `D G / (4 n.v)`; zero below the horizon of the light and for half vectors below the surface.
-///
-/// Spread: with `u = sin^2(th)` and `c = 1 - u`, `ln D = 1/m^2 - 1/(c m^2) - 2 ln c + ..`, whose slope is `g = 2/c - 1/(c m)^2` and
-/// curvature `2/c^2 - 2/(c^3 m^2)`; `D'/D = g` and `D''/D = g^2 + g'`.
 #[inline(always)]
 fn kernel(g: &Angles, spread: &Spread, m: f64) -> f64 {
-    let m2 = m * m;
-    let cos2 = (g.cos_h * g.cos_h).max(f64::MIN_POSITIVE);
     let cos_i = g.cos_i.max(0.0);
-    let distribution = exp_nonpositive(-g.sin2_h / (cos2 * m2)) / (PI * m2 * cos2 * cos2);
+    let (distribution, blur) = beckmann(g, spread, m);
     let masking = (2.0 * g.cos_h.max(0.0) * g.cos_o.min(cos_i) / g.cos_d).min(1.0);
-    let inverse = 1.0 / cos2;
-    let sharpness = inverse / m2;
-    let slope = (2.0 - sharpness) * inverse;
-    let curvature = slope * slope + 2.0 * (1.0 - sharpness) * inverse * inverse;
-    let blur = second_order(slope * spread.du + 0.5 * curvature * spread.du2);
     distribution * masking * blur / (4.0 * g.cos_o)
 }

@@ -14,7 +14,7 @@
 //! | `alpha` | microfacet width (an artist's roughness is its square root) | [0.005, 1] |
 
 use super::{
-    Angles, BasisLobe, Channels, Incident, Lambert, Lobe, Model, Parameter, Role, Scale, Split, Spread,
+    Angles, BasisLobe, Channels, Incident, Lambert, Lobe, Model, Parameter, Role, Scale, Split, Spread, Width,
     lobe::{accumulate, second_order},
 };
 use crate::math::Rgb;
@@ -62,7 +62,7 @@ static PARAMETERS: [Parameter; 3] = [
 ];
 
 static LOBES: [BasisLobe; 2] =
-    [BasisLobe { lobe: &Lambert, width: None }, BasisLobe { lobe: &GgxLobe, width: Some(ALPHA) }];
+    [BasisLobe { lobe: &Lambert, width: None }, BasisLobe { lobe: &GgxLobe, width: Some(Width::itself(ALPHA)) }];
 
 impl Model for Ggx {
     fn name(&self) -> &'static str {
@@ -92,6 +92,10 @@ impl Model for Ggx {
             push(0, c, KD + c, 1.0);
             push(1, c, F0 + c, 1.0);
         }
+    }
+
+    fn diffuse_albedo(&self, p: &[f64]) -> Rgb {
+        Rgb::from_slice(&p[KD..])
     }
 
     fn normal_incidence_specular(&self, p: &[f64]) -> Rgb {

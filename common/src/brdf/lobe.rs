@@ -54,6 +54,12 @@ pub trait Lobe: Debug + Sync {
     /// hemisphere.
     fn equivalent_alpha(&self, width: f64) -> Option<f64>;
 
+    /// How much more the lobe varies than GGX or the cosine of the same width, by which its quadrature is refined: it takes that much less
+    /// of the tolerance.
+    fn care(&self) -> f64 {
+        1.0
+    }
+
     /// `f cos(theta_i)` in 1/sr, without Fresnel term; zero for light from below the horizon.
     fn eval(&self, angles: &Angles, width: f64) -> f64;
 

@@ -13,6 +13,9 @@
 //! roughness.
 
 mod angles;
+mod ashikhmin_shirley;
+mod beckmann;
+mod blinn_phong;
 mod cook_torrance;
 mod ggx;
 mod lambert;
@@ -20,9 +23,14 @@ mod lobe;
 pub mod merl;
 mod model;
 mod parameter;
+mod power;
 mod reflectance;
+mod ward;
+mod width;
 
 pub use angles::Angles;
+pub use ashikhmin_shirley::AshikhminShirley;
+pub use blinn_phong::BlinnPhong;
 pub use cook_torrance::CookTorrance;
 pub use ggx::Ggx;
 pub use lambert::Lambert;
@@ -30,9 +38,11 @@ pub use lobe::{Incident, Lobe, Split, Spread};
 pub use model::{BasisLobe, Model, lobe_terms, term_count};
 pub use parameter::{Channels, Parameter, ParameterError, Role, Scale, flat_bounds, flat_len, flat_names, offset_of};
 pub use reflectance::{Material, Reflectance};
+pub use ward::Ward;
+pub use width::Width;
 
 /// Every model, by the name users give it. The first is the default.
-pub static MODELS: &[&dyn Model] = &[&Ggx, &CookTorrance];
+pub static MODELS: &[&dyn Model] = &[&Ggx, &CookTorrance, &Ward, &BlinnPhong, &AshikhminShirley];
 
 /// Looks a model up by name.
 ///

@@ -1,16 +1,24 @@
 //! What a reflectance model declares.
 
-use super::{Lobe, Parameter, Split};
+use super::{Lobe, Parameter, Split, Width};
 use crate::math::Rgb;
 use std::fmt::Debug;
 
-/// A lobe of a model, and which entry of the flat parameter vector is its width.
+/// A lobe of a model, and where its width comes from.
 #[derive(Debug, Clone, Copy)]
 pub struct BasisLobe {
     /// The shape.
     pub lobe: &'static dyn Lobe,
-    /// Entry of the flat parameter vector that holds its width; `None` for a lobe of fixed shape.
-    pub width: Option<usize>,
+    /// How its width follows from the parameters; `None` for a lobe of fixed shape.
+    pub width: Option<Width>,
+}
+
+impl BasisLobe {
+    /// The lobe's width at a flat parameter vector; `None` for a lobe of fixed shape.
+    #[must_use]
+    pub fn width_at(&self, parameters: &[f64]) -> Option<f64> {
+        self.width.map(|width| width.at(parameters))
+    }
 }
 
 /// A reflectance model: parameters, basis lobes, and the map between them.
@@ -33,12 +41,24 @@ pub trait Model: Debug + Sync {
     /// Weight of every term at a flat parameter vector; `weights.len()` is [`term_count`].
     fn weights(&self, parameters: &[f64], weights: &mut [Rgb]);
 
+    /// The weights in the coordinates of the scan, which solves for all entries of [`Role::Linear`](super::Role::Linear) at once:
+    /// affine in all of them together. Another map than [`Self::weights`] only where one linear parameter multiplies another.
+    fn scan_weights(&self, point: &[f64], weights: &mut [Rgb]) {
+        self.weights(point, weights);
+    }
+
+    /// From the coordinates of the scan to parameters within their bounds, of the same weights if such exist.
+    fn parameters_of_scan(&self, _point: &mut [f64]) {}
+
     /// Calls `push(term, channel, entry, value)` for every derivative of a weight with respect to an entry of the flat
     /// parameter vector that is not always zero.
     fn weight_derivatives(&self, parameters: &[f64], push: &mut dyn FnMut(usize, usize, usize, f64));
 
-    /// A name of the colour of the specular lobe at normal incidence and its value, for reports: `f0`, or `ks f0`.
+    /// The colour of the specular lobe at normal incidence, for reports: `f0`, or `ks f0`.
     fn normal_incidence_specular(&self, parameters: &[f64]) -> Rgb;
+
+    /// The diffuse albedo at normal incidence, for reports.
+    fn diffuse_albedo(&self, parameters: &[f64]) -> Rgb;
 }
 
 /// Terms of one lobe.

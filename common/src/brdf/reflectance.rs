@@ -1,6 +1,6 @@
 //! Anything that can be rendered: a model with parameters, a measured table, a synthetic target.
 
-use super::{Angles, Model, ParameterError, flat_bounds, flat_len, flat_names, lobe_terms, term_count};
+use super::{Angles, BasisLobe, Model, ParameterError, flat_bounds, flat_len, flat_names, lobe_terms, term_count};
 use crate::math::{Rgb, Vec3};
 use std::fmt::Debug;
 
@@ -59,8 +59,8 @@ impl Material {
         &self.parameters
     }
 
-    fn width(&self, entry: Option<usize>) -> f64 {
-        entry.map_or(0.0, |entry| self.parameters[entry])
+    fn width(&self, basis: &BasisLobe) -> f64 {
+        basis.width_at(&self.parameters).unwrap_or(0.0)
     }
 }
 
@@ -73,7 +73,7 @@ impl Reflectance for Material {
         let f5 = angles.f5();
         let (mut sum, mut term) = (Rgb::ZERO, 0);
         for basis in self.model.lobes() {
-            let value = basis.lobe.eval(&angles, self.width(basis.width));
+            let value = basis.lobe.eval(&angles, self.width(basis));
             if lobe_terms(basis.lobe) == 1 {
                 sum += self.weights[term] * value;
             } else {
@@ -85,7 +85,7 @@ impl Reflectance for Material {
     }
 
     fn sampling_alphas(&self) -> Vec<f64> {
-        let widths = self.model.lobes().iter().map(|b| b.lobe.equivalent_alpha(self.width(b.width)).unwrap_or(1.0));
+        let widths = self.model.lobes().iter().map(|b| b.lobe.equivalent_alpha(self.width(b)).unwrap_or(1.0));
         widths.collect()
     }
 }

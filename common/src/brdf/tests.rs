@@ -70,10 +70,22 @@ fn no_lobe_reflects_more_than_it_receives() {
                 let value = albedo(basis.lobe, width, cos_o);
                 assert!(value <= 1.0 + NOISE, "{} width {width} cos {cos_o}: {value}", basis.lobe.name());
                 if width <= 0.02 && basis.width.is_some() && cos_o >= 0.5 {
-                    assert!(value > 0.99, "a sharp {} lobe is a mirror: {value}", basis.lobe.name());
+                    let (mirror, loss) = sharp_albedo(basis.lobe, width, cos_o);
+                    assert!((mirror - loss..=mirror + NOISE).contains(&value), "{}: {value}", basis.lobe.name());
                 }
             }
         }
+    }
+}
+
+/// What a sharp lobe reflects, and how much less that may be: a mirror everything, less what masking takes.
+fn sharp_albedo(lobe: &dyn Lobe, width: f64, cos_o: f64) -> (f64, f64) {
+    let kink = width * (1.0 - cos_o * cos_o).sqrt() / cos_o;
+    match lobe.name() {
+        // Blinn-Phong lacks the 1/(v.h) of microfacets. Half of a lobe over the larger cosine lies beyond its kink.
+        "blinn-phong" => (cos_o, kink + 0.002),
+        "ashikhmin-shirley" => (1.0, kink + 0.002),
+        _ => (1.0, 0.01),
     }
 }
 
@@ -162,29 +174,65 @@ fn weight_derivatives_are_derivatives() {
     }
 }
 
+/// All entries of linear parameters.
+fn linear_entries(model: &dyn Model) -> Vec<usize> {
+    let roles = model.parameters().iter().flat_map(|p| std::iter::repeat_n(p.role, p.channels.count()));
+    roles.enumerate().filter(|(_, role)| *role == Role::Linear).map(|(entry, _)| entry).collect()
+}
+
 #[test]
 fn parameters_called_linear_are_affine_in_the_weights() {
     for model in MODELS {
-        let p = random_parameters(*model, 1);
-        let mut entry = 0;
-        for parameter in model.parameters() {
-            for _ in 0..parameter.channels.count() {
-                if parameter.role == Role::Linear {
-                    let at = |x: f64| {
-                        let mut q = p.clone();
-                        q[entry] = x;
-                        let mut weights = vec![Rgb::ZERO; term_count(*model)];
-                        model.weights(&q, &mut weights);
-                        weights
-                    };
-                    let (zero, half, one) = (at(0.0), at(0.5), at(1.0));
-                    for t in 0..zero.len() {
-                        assert!((half[t] - (zero[t] + one[t]) * 0.5).length() < 1e-12, "{}", model.name());
-                    }
-                }
-                entry += 1;
+        let entries = linear_entries(*model);
+        let base = random_parameters(*model, 1);
+        let at = |scan: bool, x: &dyn Fn(usize) -> f64| {
+            let mut q = base.clone();
+            entries.iter().for_each(|&entry| q[entry] = x(entry));
+            let mut weights = vec![Rgb::ZERO; term_count(*model)];
+            if scan {
+                model.scan_weights(&q, &mut weights)
+            } else {
+                model.weights(&q, &mut weights)
             }
+            weights
+        };
+        let affine = |scan: bool, a: &dyn Fn(usize) -> f64, b: &dyn Fn(usize) -> f64| {
+            let (zero, half, one) = (at(scan, a), at(scan, &|e| 0.5 * (a(e) + b(e))), at(scan, b));
+            for t in 0..zero.len() {
+                assert!((half[t] - (zero[t] + one[t]) * 0.5).length() < 1e-12, "{} scan {scan}", model.name());
+            }
+        };
+        // One at a time while all others are held; in the coordinates of the scan all at once.
+        for &one in &entries {
+            affine(false, &|e| if e == one { 0.0 } else { base[e] }, &|e| if e == one { 1.0 } else { base[e] });
         }
+        for n in 2..20 {
+            let other = random_parameters(*model, n);
+            affine(true, &|e| base[e], &|e| other[e]);
+        }
+    }
+}
+
+#[test]
+fn the_scan_ends_at_parameters_of_the_weights_that_it_found() {
+    for model in MODELS {
+        let (lower, upper) = flat_bounds(model.parameters());
+        let (mut within, mut outside) = (0, 0);
+        for n in 0..200 {
+            let solution = random_parameters(*model, n);
+            let mut p = solution.clone();
+            model.parameters_of_scan(&mut p);
+            assert!((0..p.len()).all(|i| (lower[i]..=upper[i]).contains(&p[i])), "{} {p:?}", model.name());
+            let [mut scanned, mut mapped] = [(); 2].map(|()| vec![Rgb::ZERO; term_count(*model)]);
+            model.scan_weights(&solution, &mut scanned);
+            model.weights(&p, &mut mapped);
+            let same = scanned.iter().zip(&mapped).all(|(a, b)| (*a - *b).length() < 1e-12);
+            // What is not the same stands at a bound.
+            let at_bound = linear_entries(*model).iter().any(|&i| p[i] == lower[i] || p[i] == upper[i]);
+            assert!(same || at_bound, "{} {solution:?} {p:?}", model.name());
+            if same { within += 1 } else { outside += 1 }
+        }
+        assert!(within > 0 && (outside == 0 || model.name() == "ashikhmin-shirley"), "{}", model.name());
     }
 }
 
@@ -225,7 +273,7 @@ fn accumulation_has_the_bits_of_a_scalar_loop() {
 #[test]
 fn no_model_has_more_than_one_width() {
     for model in MODELS {
-        let mut widths: Vec<usize> = model.lobes().iter().filter_map(|b| b.width).collect();
+        let mut widths: Vec<usize> = model.lobes().iter().filter_map(|b| Some(b.width?.entry)).collect();
         widths.dedup();
         assert!(widths.len() <= 1, "{}", model.name());
     }
@@ -236,5 +284,10 @@ fn bad_parameters_are_named() {
     let message = |p: Vec<f64>| Material::new(&Ggx, p).unwrap_err().to_string();
     assert_eq!(message(vec![0.1, 0.1, 0.1, 0.5, 1.5, 0.5, 0.1]), "parameter 'f0' is 1.5: expected a value in [0, 1]");
     assert!(message(vec![0.1, 0.1, 0.1, 0.5, 0.5, 0.5, f64::NAN]).contains("'alpha' is NaN"));
-    assert!(model("phong").unwrap_err().to_string().contains("expected one of ggx, cook-torrance"));
+    assert!(
+        model("phong")
+            .unwrap_err()
+            .to_string()
+            .contains("expected one of ggx, cook-torrance, ward, blinn-phong, ashikhmin-shirley")
+    );
 }

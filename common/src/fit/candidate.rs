@@ -1,7 +1,8 @@
 //! Candidates of stage one, and what stage two needs to judge them.
 
 use crate::{
-    brdf::{Model, flat_bounds},
+    brdf::{Model, Scale, flat_bounds},
+    math::elementary::ln,
     search::Termination,
 };
 
@@ -22,15 +23,21 @@ pub struct Candidate {
     pub termination: Termination,
 }
 
-/// Candidates nearer to each other than this share of every parameter's range get one rendering.
+/// Candidates nearer to each other than this share of every parameter's range (of its logarithmic range, where a parameter is searched
+/// by its logarithm) get one rendering.
 pub const SAME: f64 = 1e-6;
 
 /// For every candidate the index of the first one that is the same within [`SAME`]: near-equal candidates are judged once.
 #[must_use]
 pub fn distinct(model: &dyn Model, candidates: &[Candidate]) -> Vec<usize> {
     let (lower, upper) = flat_bounds(model.parameters());
+    let scales = model.parameters().iter().flat_map(|p| std::iter::repeat_n(p.scale, p.channels.count()));
+    let logarithmic: Vec<bool> = scales.map(|scale| scale == Scale::Logarithmic).collect();
     let near = |a: &[f64], b: &[f64]| {
-        a.iter().zip(b).zip(lower.iter().zip(&upper)).all(|((a, b), (l, u))| (a - b).abs() <= SAME * (u - l))
+        (0..a.len()).all(|i| {
+            let [a, b, l, u] = [a[i], b[i], lower[i], upper[i]].map(|x| if logarithmic[i] { ln(x) } else { x });
+            (a - b).abs() <= SAME * (u - l)
+        })
     };
     let mut firsts: Vec<usize> = Vec::with_capacity(candidates.len());
     for (i, candidate) in candidates.iter().enumerate() {
@@ -49,23 +56,23 @@ const MARGIN: f64 = 1.25;
 /// Returns `None` for a model without widths.
 #[must_use]
 pub fn needed_span<'a>(model: &dyn Model, points: impl Iterator<Item = &'a [f64]>) -> Option<(f64, f64)> {
-    let entry = model.lobes().iter().find_map(|b| b.width)?;
-    let (lower, upper) = flat_bounds(model.parameters());
+    let width = model.lobes().iter().find_map(|b| b.width)?;
+    let (lower, upper) = width.span(model.parameters());
     let (mut low, mut high) = (f64::INFINITY, 0.0_f64);
     for point in points {
-        low = low.min(point[entry]);
-        high = high.max(point[entry]);
+        low = low.min(width.at(point));
+        high = high.max(width.at(point));
     }
-    let (low, high) = ((low / MARGIN).max(lower[entry]), (high * MARGIN).min(upper[entry]));
+    let (low, high) = ((low / MARGIN).max(lower), (high * MARGIN).min(upper));
     // At a bound the margin lies on one side only.
-    let (low, high) = (low.min(upper[entry] / (MARGIN * MARGIN)), high.max(lower[entry] * MARGIN * MARGIN));
+    let (low, high) = (low.min(upper / (MARGIN * MARGIN)), high.max(lower * MARGIN * MARGIN));
     Some((low, high))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::brdf::Ggx;
+    use crate::brdf::{BlinnPhong, Ggx};
 
     fn candidate(alpha: f64) -> Candidate {
         let parameters = vec![0.1, 0.2, 0.3, 0.04, 0.04, 0.04, alpha];
@@ -89,5 +96,21 @@ mod tests {
         assert_eq!(span(&[0.1, 0.2]), (0.1 / 1.25, 0.2 * 1.25));
         assert_eq!(span(&[0.005]), (0.005, 0.005 * 1.25 * 1.25));
         assert_eq!(span(&[1.0]), (1.0 / (1.25 * 1.25), 1.0));
+    }
+
+    #[test]
+    fn the_margin_is_one_of_widths_whatever_the_parameter() {
+        let alpha = |n: f64| (2.0 / (n + 2.0)).sqrt();
+        let point = |n: f64| vec![0.1, 0.2, 0.3, 0.04, 0.04, 0.04, n];
+        let span = |points: &[Vec<f64>]| needed_span(&BlinnPhong, points.iter().map(|p| &p[..])).unwrap();
+        assert_eq!(span(&[point(40.0), point(400.0)]), (alpha(400.0) / 1.25, alpha(40.0) * 1.25));
+        assert_eq!(span(&[point(1e5)]), (alpha(1e5), alpha(1e5) * 1.25 * 1.25));
+        assert_eq!(span(&[point(1.0)]), (alpha(1.0) / (1.25 * 1.25), alpha(1.0)));
+    }
+
+    #[test]
+    fn exponents_are_near_by_their_logarithm() {
+        let with = |n: f64| Candidate { parameters: vec![0.1, 0.2, 0.3, 0.04, 0.04, 0.04, n], ..candidate(0.1) };
+        assert_eq!(distinct(&BlinnPhong, &[with(5.0), with(5.05), with(9e4), with(9e4 + 0.1)]), [0, 1, 2, 2]);
     }
 }

@@ -31,11 +31,11 @@ const INSIDE: f64 = 0.01;
 /// The starts: the winner, the winner with other lobes, and the paper's generic start.
 pub(super) fn starts(model: &dyn Model, won: &[f64]) -> Vec<Vec<f64>> {
     let (lower, upper) = flat_bounds(model.parameters());
-    let entry = model.lobes().iter().find_map(|basis| basis.width);
+    let width = model.lobes().iter().find_map(|basis| basis.width);
     let with_width = |alpha: f64| {
         let mut start = won.to_vec();
-        if let Some(entry) = entry {
-            start[entry] = width_of(model, alpha);
+        if let Some(width) = width {
+            start[width.entry] = (width.inverse)(width_of(model, alpha));
         }
         start
     };
@@ -44,7 +44,7 @@ pub(super) fn starts(model: &dyn Model, won: &[f64]) -> Vec<Vec<f64>> {
     starts.push(paper_start(model));
     for start in &mut starts {
         for (i, x) in start.iter_mut().enumerate() {
-            let margin = if Some(i) == entry { 0.0 } else { INSIDE * (upper[i] - lower[i]) };
+            let margin = if width.is_some_and(|width| width.entry == i) { 0.0 } else { INSIDE * (upper[i] - lower[i]) };
             *x = x.clamp(lower[i] + margin, upper[i] - margin);
         }
     }
@@ -97,8 +97,7 @@ fn width_of(model: &dyn Model, alpha: f64) -> f64 {
 fn grid(model: &dyn Model) -> Option<Vec<(f64, f64)>> {
     const STEPS: u32 = 200;
     let basis = model.lobes().iter().find(|basis| basis.width.is_some())?;
-    let (lower, upper) = flat_bounds(model.parameters());
-    let (low, high) = (lower[basis.width?], upper[basis.width?]);
+    let (low, high) = basis.width?.span(model.parameters());
     let width = |i: u32| match i {
         0 => low,
         STEPS => high,
@@ -125,10 +124,10 @@ mod tests {
     #[test]
     fn every_model_has_a_span_to_explore_within_its_bounds() {
         for model in MODELS {
-            let entry = model.lobes().iter().find_map(|basis| basis.width).unwrap();
-            let (lower, upper) = flat_bounds(model.parameters());
+            let width = model.lobes().iter().find_map(|basis| basis.width).unwrap();
+            let (lower, upper) = width.span(model.parameters());
             let (low, high) = explored_span(*model).unwrap();
-            assert!(lower[entry] <= low && low < high && high <= upper[entry], "{}", model.name());
+            assert!(lower <= low && low < high && high <= upper, "{}", model.name());
         }
         let (low, high) = explored_span(&Ggx).unwrap();
         assert!((0.015..0.0155).contains(&low) && high == 1.0);

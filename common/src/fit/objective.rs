@@ -89,7 +89,7 @@ impl<'a> Objective<'a> {
         self.model.weight_derivatives(point, &mut |term, channel, entry, value| {
             derivatives[channel].push((entry, term, value));
         });
-        let widths = width_entries(self.model);
+        let widths = width_entries(self.model, point);
         let mut row = vec![0.0; point.len()];
         for p in 0..self.table.pixels {
             let scale = self.weights[p].sqrt();
@@ -99,8 +99,8 @@ impl<'a> Objective<'a> {
                 for &(entry, term, derivative) in channel {
                     row[entry] += derivative * self.terms[term][c][p];
                 }
-                for &(entry, term) in &widths {
-                    row[entry] += weights[term][c] * self.slopes[term][c][p] / point[entry];
+                for &(entry, term, width, derivative) in &widths {
+                    row[entry] += weights[term][c] * self.slopes[term][c][p] / width * derivative;
                 }
                 row.iter_mut().for_each(|x| *x *= scale * slope);
                 add(p, &row, scale * (value - self.reference[c][p]));
@@ -131,18 +131,19 @@ pub(super) fn observed(value: f32) -> f64 {
     f64::from(value).max(0.0)
 }
 
-/// Pairs (entry of the width, term) of every lobe that has a width.
-fn width_entries(model: &dyn Model) -> Vec<(usize, usize)> {
-    let mut pairs = Vec::new();
+/// For every term of a lobe that has a width: the entry that the width follows from, the term, the width and its derivative by the entry.
+fn width_entries(model: &dyn Model, point: &[f64]) -> Vec<(usize, usize, f64, f64)> {
+    let mut list = Vec::new();
     let mut first = 0;
     for basis in model.lobes() {
         let terms = crate::brdf::lobe_terms(basis.lobe);
-        if let Some(entry) = basis.width {
-            pairs.extend((first..first + terms).map(|t| (entry, t)));
+        if let Some(width) = basis.width {
+            let derivative = (width.derivative)(point[width.entry]);
+            list.extend((first..first + terms).map(|t| (width.entry, t, width.at(point), derivative)));
         }
         first += terms;
     }
-    pairs
+    list
 }
 
 /// The role of every entry of the flat parameter vector.
@@ -205,7 +206,7 @@ mod tests {
                 let compression = Compression::new(gamma, 0.5);
                 let mut objective = Objective::new(*model, &table, &subset, &photo, compression);
                 let point: Vec<f64> = lower.iter().zip(&upper).map(|(l, u)| l + 0.37 * (u - l)).collect();
-                let steps = vec![1e-5; point.len()];
+                let steps: Vec<f64> = point.iter().map(|x| 1e-5 * x.max(1.0)).collect();
                 let check = check_gradient(&mut objective, &point, &steps);
                 // Central differences leave h^2 f''' and roundings of the cost over h.
                 assert!(check.error < 1e-6, "{} gamma {gamma}: {check:?}", model.name());

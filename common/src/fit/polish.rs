@@ -67,8 +67,8 @@ pub fn polish(
     let score = judge
         .score(&view.render(&minimum.point))
         .map_err(|_| SearchError::NotFinite { what: "the CSSIM", point: minimum.point.clone() })?;
-    let at_table_edge = view.model.lobes().iter().filter_map(|b| b.width).any(|entry| {
-        let (x, step) = (bounds.to_scaled(entry, minimum.point[entry]), EDGE);
+    let at_table_edge = view.model.lobes().iter().filter_map(|b| b.width).any(|width| {
+        let (x, step) = (bounds.to_scaled(width.entry, minimum.point[width.entry]), EDGE);
         (table_is_tighter[0] && x < step) || (table_is_tighter[1] && x > 1.0 - step)
     });
     Ok(Polished {
@@ -110,8 +110,9 @@ fn polish_bounds(view: &FullView<'_>) -> Result<(Bounds, [bool; 2]), SearchError
     let model_bounds = search_bounds(view.model, SearchKind::LeastSquares)?;
     let (mut lower, mut upper) = (model_bounds.lower().to_vec(), model_bounds.upper().to_vec());
     let mut tighter = [false, false];
-    for (entry, role) in flat_roles(view.model).into_iter().enumerate() {
-        if let (Role::Width, Some((first, last))) = (role, view.table.span()) {
+    for width in view.model.lobes().iter().filter_map(|b| b.width) {
+        if let Some(span) = view.table.span() {
+            let (entry, (first, last)) = (width.entry, width.entries(span));
             tighter = [first > lower[entry] * (1.0 + 1e-9), last < upper[entry] * (1.0 - 1e-9)];
             // Where the table reaches the model's bound, its outermost knot may miss it by a rounding: the bound counts.
             if tighter[0] {

@@ -2,11 +2,12 @@
 //!
 //! For every width of the table's grid, and every scanned value of the parameters that multiply others, the remaining
 //! parameters enter linearly: at gamma = 1 their best values are a small bounded linear least-squares problem per
-//! channel. Terms of fixed weight move to the right-hand side.
+//! channel. Terms of fixed weight move to the right-hand side. A model where one of these multiplies another gives coordinates in which
+//! they do not (`Model::scan_weights`).
 
 use super::objective::{flat_roles, observed};
 use crate::{
-    brdf::{Channels, Model, Role, flat_bounds, flat_len, term_count},
+    brdf::{BasisLobe, Channels, Model, Role, flat_bounds, flat_len, term_count},
     math::Rgb,
     render::table::{Planes, TransportTable},
     search::{NormalEquations, bvls},
@@ -41,10 +42,11 @@ fn grids(model: &dyn Model, table: &TransportTable) -> Vec<(usize, Vec<f64>)> {
         Role::Linear => None,
         Role::Scanned(values) => Some((entry, values.to_vec())),
         Role::Width => {
-            let lobe = model.lobes().iter().position(|b| b.width == Some(entry))?;
-            let widths = table.lobes[lobe].knots?.widths();
+            let of_entry = |b: &BasisLobe| b.width.filter(|width| width.entry == entry);
+            let (lobe, width) = model.lobes().iter().enumerate().find_map(|(l, b)| Some((l, of_entry(b)?)))?;
+            let values = table.lobes[lobe].knots?.widths().into_iter().map(width.inverse);
             // The outermost knots equal the bounds up to a rounding.
-            Some((entry, widths.into_iter().map(|w| w.clamp(lower[entry], upper[entry])).collect()))
+            Some((entry, values.map(|x| x.clamp(lower[entry], upper[entry])).collect()))
         }
     });
     scanned.collect()
@@ -59,7 +61,7 @@ fn solve_linear(model: &dyn Model, terms: &[Planes], weights: &[f64], photo: &[[
             probe[entry] = 1.0;
         }
         let mut w = vec![Rgb::ZERO; terms.len()];
-        model.weights(&probe, &mut w);
+        model.scan_weights(&probe, &mut w);
         w
     };
     let fixed = at(None, point);
@@ -80,6 +82,7 @@ fn solve_linear(model: &dyn Model, terms: &[Planes], weights: &[f64], photo: &[[
         let Ok(solution) = bvls::solve(&normal, &bound(&lower), &bound(&upper)) else { return false };
         entries.iter().zip(&solution.point).for_each(|(&e, &x)| point[e] = x);
     }
+    model.parameters_of_scan(point);
     true
 }
 

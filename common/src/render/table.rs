@@ -87,7 +87,7 @@ impl TransportTable {
         out.iter_mut().for_each(|plane| plane.fill(0.0));
         let mut first_term = 0;
         for (basis, table) in model.lobes().iter().zip(&self.lobes) {
-            let (first, coefficients) = slice_weights(table, basis.width.map(|entry| parameters[entry]));
+            let (first, coefficients) = slice_weights(table, basis.width_at(parameters));
             for (channel, plane) in out.iter_mut().enumerate() {
                 for (k, coefficient) in coefficients.iter().enumerate() {
                     for t in 0..table.terms {
@@ -105,7 +105,7 @@ impl TransportTable {
     pub fn terms(&self, model: &dyn Model, parameters: &[f64], slope: bool, out: &mut [Planes]) {
         let mut first_term = 0;
         for (basis, table) in model.lobes().iter().zip(&self.lobes) {
-            let width = basis.width.map(|entry| parameters[entry]);
+            let width = basis.width_at(parameters);
             let (first, coefficients) = if slope { slice_slopes(table, width) } else { slice_weights(table, width) };
             for t in 0..table.terms {
                 for (channel, plane) in out[first_term + t].iter_mut().enumerate() {

@@ -126,7 +126,7 @@ impl TransportPlan {
         (band, widths): (Band, &[f64]),
         cut: &mut Cut,
     ) -> Vec<Vec<f64>> {
-        let tolerance = self.accuracy.tolerance * pyramid.mean_radiance();
+        let tolerance = self.accuracy.tolerance * pyramid.mean_radiance() / lobe.care();
         let mut sums = vec![vec![0.0; lobe_terms(lobe) * 3 * widths.len()]; pixels.len()];
         let points: Vec<Seen> =
             pixels.iter().enumerate().flat_map(|(i, &pixel)| self.points(geometry, i, pixel, band)).collect();

@@ -1,7 +1,7 @@
 //! What a user should know about a result beyond its numbers.
 
 use lookalike::{
-    brdf::{Model, Role, flat_bounds, flat_names},
+    brdf::{Model, flat_bounds, flat_names},
     fit::{FitOutcome, Method, Uncertainty, gamma_range},
 };
 
@@ -36,7 +36,7 @@ fn at_bounds(model: &dyn Model, parameters: &[f64], is_determined: impl Fn(usize
     let (lower, upper) = flat_bounds(model.parameters());
     let names = flat_names(model.parameters());
     // A colour of zero is an answer (no diffuse part); an upper bound or a width at its end is a limit of the model.
-    let is_width = |i: usize| model.lobes().iter().any(|b| b.width == Some(i));
+    let is_width = |i: usize| model.lobes().iter().any(|b| b.width.is_some_and(|width| width.entry == i));
     let limited = |&i: &usize| parameters[i] == upper[i] || (is_width(i) && parameters[i] == lower[i]);
     let limited: Vec<String> = (0..parameters.len())
         .filter(limited)
@@ -70,18 +70,11 @@ fn undetermined(model: &dyn Model, uncertainty: &[Uncertainty]) -> Option<String
 
 /// Colours are free, so a fit may reflect more light than it receives.
 fn bright(model: &dyn Model, parameters: &[f64]) -> Option<String> {
-    let specular = model.normal_incidence_specular(parameters);
-    let mut first = 0;
-    for parameter in model.parameters() {
-        if parameter.role == Role::Linear && parameter.name == "kd" {
-            let most = (0..3).map(|c| parameters[first + c] + specular[c]).fold(0.0, f64::max);
-            return (most > 1.0).then(|| {
-                format!("diffuse and specular reflectance add up to {most:.2} in a channel: more light than is received; check the exposure of photo and map")
-            });
-        }
-        first += parameter.channels.count();
-    }
-    None
+    let sum = model.diffuse_albedo(parameters) + model.normal_incidence_specular(parameters);
+    let most = (0..3).map(|c| sum[c]).fold(0.0, f64::max);
+    (most > 1.0).then(|| {
+        format!("diffuse and specular reflectance add up to {most:.2} in a channel: more light than is received; check the exposure of photo and map")
+    })
 }
 
 #[cfg(test)]

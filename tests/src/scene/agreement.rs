@@ -135,8 +135,8 @@ fn part(model: &dyn Model, table: &TransportTable, lobe: usize, width: f64, chan
     let mut planes = vec![table.planes(); term_count(model)];
     // Terms depend on the widths alone.
     let (mut parameters, _) = flat_bounds(model.parameters());
-    if let Some(entry) = lobes[lobe].width {
-        parameters[entry] = width;
+    if let Some(of) = lobes[lobe].width {
+        parameters[of.entry] = (of.inverse)(width);
     }
     table.terms(model, &parameters, false, &mut planes);
     let terms = match (lobe_terms(lobes[lobe].lobe), channel) {

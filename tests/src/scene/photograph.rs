@@ -80,7 +80,7 @@ impl Photograph {
 /// Radiance without noise.
 fn radiance(scene: &Scene, material: &Material, pixels: &[Pixel]) -> Vec<Rgb> {
     let (model, parameters) = (material.model(), material.parameters());
-    let width = model.lobes().iter().find_map(|basis| basis.width).map_or(0.5, |entry| parameters[entry]);
+    let width = model.lobes().iter().find_map(|basis| basis.width_at(parameters)).unwrap_or(0.5);
     let plan = TransportPlan { model, knots: Knots::covering(0.8 * width, 1.25 * width, 24.0), accuracy: FINE };
     let table = plan.integrate(&scene.geometry, &scene.pyramid, pixels);
     let mut planes = table.planes();

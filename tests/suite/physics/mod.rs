@@ -6,7 +6,7 @@ mod probes;
 mod tables;
 
 use lookalike::{
-    brdf::MODELS,
+    brdf::Model,
     math::Rgb,
     render::{
         knots::{Knots, PER_OCTAVE},
@@ -46,10 +46,12 @@ fn knots(per_octave: f64) -> Knots {
     Knots::covering(0.005, 1.0, per_octave)
 }
 
-/// One comparison of every lobe of every model.
+/// One comparison of every lobe of some models.
 struct Case<'a> {
     /// For the print.
     name: &'a str,
+    /// Whose lobes.
+    models: &'a [&'static dyn Model],
     /// Widths; the nearest mid-knots are taken.
     alphas: &'a [f64],
     /// Pixels of full coverage, spread over the object.
@@ -68,7 +70,7 @@ impl Case<'_> {
         let widths = mid_knots(&knots(PER_OCTAVE), self.alphas);
         let mut failures = Vec::new();
         let mut seen: Vec<&str> = Vec::new();
-        for model in MODELS {
+        for model in self.models {
             // A lobe that several models share is integrated once.
             let is_new = |name: &str| !seen.contains(&name);
             let references = References::new(scene, *model, &pixels, &widths, self.rigour.effort, is_new);

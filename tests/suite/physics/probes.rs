@@ -1,7 +1,7 @@
 //! Tables against the direct integrator under real light: minutes, so behind `--features slow`.
 
 use super::{Case, THOROUGH, TOLERANCE};
-use lookalike::{render::transport::Accuracy, scene::Camera};
+use lookalike::{brdf::MODELS, render::transport::Accuracy, scene::Camera};
 use lookalike_tests::scene::{
     Scene,
     probes::{GRACE, NOON_GRASS, Probe, RNL, STUDIO, UFFIZI},
@@ -17,7 +17,8 @@ fn agree(probe: Probe) {
     let Some(environment) = probe.load() else { return };
     let scene = Scene::sphere(256, Camera::Orthographic, environment).unwrap();
     let accuracies = [(Accuracy::SUBSET, TOLERANCE), (Accuracy::FULL, FULL_TOLERANCE)];
-    Case { name: probe.0, alphas: &ALPHAS, pixels: 64, accuracies: &accuracies, rigour: THOROUGH }.check(&scene);
+    Case { name: probe.0, models: MODELS, alphas: &ALPHAS, pixels: 64, accuracies: &accuracies, rigour: THOROUGH }
+        .check(&scene);
 }
 
 #[test]

@@ -3,7 +3,7 @@
 
 use super::{FitPlanner, Grid, Step, add, index, release_tables, verify};
 use crate::{
-    brdf::{Model, flat_bounds},
+    brdf::Model,
     fit::{
         explore::{MAX_EXPLORATIONS, explored_span, starts},
         needed_span,
@@ -156,16 +156,16 @@ impl FitPlanner {
     /// are judged again, and the best goes on.
     fn widen_span(&mut self) {
         let model = self.method.model;
-        let Some(entry) = model.lobes().iter().find_map(|b| b.width) else { return };
-        let (lower, upper) = flat_bounds(model.parameters());
-        let widths = || self.polishing.starts.iter().map(|start| start[entry]);
-        let last = widths().next_back().unwrap_or(upper[entry]);
+        let Some(width) = model.lobes().iter().find_map(|b| b.width) else { return };
+        let (lower, upper) = width.span(model.parameters());
+        let widths = || self.polishing.starts.iter().map(|start| width.at(start));
+        let last = widths().next_back().unwrap_or(upper);
         let (low, high) = (widths().fold(last / AROUND, f64::min), widths().fold(last * AROUND, f64::max));
-        self.span = Some((low.max(lower[entry]), high.min(upper[entry])));
+        self.span = Some((low.max(lower), high.min(upper)));
     }
 }
 
 /// The width of a parameter vector's lobes.
 fn width(model: &dyn Model, parameters: &[f64]) -> Option<f64> {
-    model.lobes().iter().find_map(|basis| basis.width).map(|entry| parameters[entry])
+    model.lobes().iter().find_map(|basis| basis.width_at(parameters))
 }

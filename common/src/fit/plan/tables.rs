@@ -2,7 +2,7 @@
 
 use super::{FitPlanner, Span, add, encode, index, verify::Shard};
 use crate::{
-    brdf::{Model, flat_bounds},
+    brdf::Model,
     fit::{
         Method,
         nodes::{self, TransportParameters},
@@ -100,17 +100,14 @@ impl FitPlanner {
 
 /// The grid of widths of stage one: the model's whole range.
 pub(super) fn stage_one_knots(method: &Method) -> Knots {
-    let (lower, upper) = flat_bounds(method.model.parameters());
-    let entry = method.model.lobes().iter().find_map(|b| b.width);
-    let (low, high) = entry.map_or((0.5, 1.0), |entry| (lower[entry], upper[entry]));
+    let (low, high) = whole_span(method.model).unwrap_or((0.5, 1.0));
     Knots::covering(low, high, PER_OCTAVE)
 }
 
 /// The span of all widths that the model has.
 pub(super) fn whole_span(model: &dyn Model) -> Span {
-    let entry = model.lobes().iter().find_map(|b| b.width)?;
-    let (lower, upper) = flat_bounds(model.parameters());
-    Some((lower[entry], upper[entry]))
+    let width = model.lobes().iter().find_map(|b| b.width)?;
+    Some(width.span(model.parameters()))
 }
 
 /// Lets go of full-resolution tables.

@@ -47,6 +47,19 @@ fn polish_starts_from_the_best_and_never_ends_worse_on_its_table() {
     }
 }
 
+/// The exponent of Blinn-Phong grows as the lobe gets narrower: the span of its table and the edges of that are turned round.
+#[test]
+fn a_fit_and_its_polish_find_an_exponent_inside_the_span_of_their_table() {
+    let material = [0.3, 0.2, 0.1, 0.5, 0.4, 0.3, 60.0];
+    let planner = FitPlanner::new(capture("blinn-phong", &material, 0.0), method("blinn-phong"), 1.0).unwrap();
+    let outcome = Bench::default().run(planner, |_| 0, |_, output| output).unwrap().into_outcome().unwrap();
+    let (winner, polished) = (&outcome.judged[outcome.winner], outcome.polished.unwrap());
+    for found in [&winner.candidate.parameters, &polished.parameters] {
+        assert!((found[6] / 60.0 - 1.0).abs() < 0.05, "{winner:?} {polished:?}");
+    }
+    assert!(!polished.at_table_edge && polished.cssim <= winner.cssim, "{winner:?} {polished:?}");
+}
+
 #[test]
 fn a_round_of_polish_that_ends_worse_than_the_winner_is_not_the_result() {
     let planner = FitPlanner::new(capture("ggx", &MATERIAL, 0.05), method("ggx"), 1.0).unwrap();

@@ -1,7 +1,7 @@
 //! A sphere of 24 x 24 pixels in a small room, photographed without noise, and a run of a planner in any order.
 
 use crate::{
-    brdf::{Model, flat_bounds, model},
+    brdf::{Model, model},
     fit::{FitPlanner, FullView, Method, nodes},
     graph::{
         Blob, BlobHash, Change, DecodedCache, FailureReason, Graph, GraphEdit, NodeId, NodeSpec, PlanError, Planner,
@@ -40,7 +40,7 @@ pub(super) fn capture(name: &str, parameters: &[f64], noise: f64) -> Arc<Capture
     let places = (0..SIZE * SIZE).map(|i| [i % SIZE, i / SIZE]);
     let coverage: Vec<f32> = places.clone().map(|[c, r]| geometry.coverage(c, r)).collect();
     let pixels: Vec<Pixel> = places.map(|place| place.map(|x| u32::try_from(x).unwrap())).collect();
-    let width = parameters[model.lobes().iter().find_map(|basis| basis.width).unwrap()];
+    let width = model.lobes().iter().find_map(|basis| basis.width_at(parameters)).unwrap();
     let knots = Knots::covering(width / 1.3, width * 1.3, PER_OCTAVE);
     let plan = TransportPlan { model, knots, accuracy: Accuracy::FULL };
     let table = plan.integrate(&geometry, &LightPyramid::new(room()), &pixels);
@@ -72,9 +72,9 @@ impl StageOne {
         let model: &'static dyn Model = model(name).unwrap();
         let places = (0..SIZE * SIZE).map(|i| [i % SIZE, i / SIZE]).filter(|[c, r]| geometry.coverage(*c, *r) >= 1.0);
         let pixels: Vec<Pixel> = places.step_by(7).map(|place| place.map(|x| u32::try_from(x).unwrap())).collect();
-        let (lower, upper) = flat_bounds(model.parameters());
         let width = model.lobes().iter().find_map(|basis| basis.width).unwrap();
-        let knots = Knots::covering(lower[width], upper[width], PER_OCTAVE);
+        let (lower, upper) = width.span(model.parameters());
+        let knots = Knots::covering(lower, upper, PER_OCTAVE);
         let plan = TransportPlan { model, knots, accuracy: Accuracy::FULL };
         let table = plan.integrate(&geometry, &LightPyramid::new(room()), &pixels);
         let mut planes = table.planes();

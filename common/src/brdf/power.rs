@@ -1,0 +1,34 @@
+//! The cosine of the half vector's angle to a power, the lobe of Blinn-Phong and Ashikhmin-Shirley.
+
+use super::{Angles, Spread, Width, lobe::second_order};
+use crate::math::elementary::{exp_nonpositive, ln_positive};
+
+/// The width that an exponent in the flat parameter vector stands for: `alpha = sqrt(2 / (n + 2))`, as curved at its peak as GGX.
+pub(super) const fn width(entry: usize) -> Width {
+    Width { entry, of: |n| (2.0 / (n + 2.0)).sqrt(), inverse: exponent, derivative }
+}
+
+fn derivative(n: f64) -> f64 {
+    -0.5 * (2.0 / (n + 2.0)).sqrt() / (n + 2.0)
+}
+
+/// The exponent of a width of at most 1: `n = 2 / alpha^2 - 2`.
+#[inline(always)]
+pub(super) fn exponent(alpha: f64) -> f64 {
+    2.0 / (alpha * alpha) - 2.0
+}
+
+/// `(n.h)^n`, and the factor that its mean over the spread of light has.
+///
+/// Spread: with `u = sin^2(th)` and `k = n/2` it is `(1 - u)^k`; its first derivative by `u`, as a share of it, is `-k / (1 - u)`, its
+/// second `k (k - 1) / (1 - u)^2`.
+#[inline(always)]
+pub(super) fn cosine(g: &Angles, spread: &Spread, alpha: f64) -> (f64, f64) {
+    // Not 1 - u where the half vector lies almost in the surface: it may round to nothing.
+    let cos2 = (1.0 - g.sin2_h).max(1e-300);
+    let k = 0.5 * exponent(alpha);
+    let inverse = 1.0 / cos2;
+    let slope = k * inverse;
+    let blur = second_order(0.5 * slope * (k - 1.0) * inverse * spread.du2 - slope * spread.du);
+    (exp_nonpositive(k * ln_positive(cos2).min(0.0)), blur)
+}
