@@ -25,6 +25,7 @@ pub mod runner;
 pub mod settings;
 pub mod slurm;
 pub mod spawn;
+mod study;
 pub mod tls;
 
 pub use cli::Exit;

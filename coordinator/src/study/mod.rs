@@ -1,0 +1,4 @@
+//! A study: the paper's tables and figures, measured again.
+
+mod report;
+mod row;
