@@ -56,6 +56,8 @@ pub(super) struct Entry {
     pub(super) text: String,
     /// Whether it is the best of its row.
     pub(super) best: bool,
+    /// The verdict that it is, where it is one.
+    pub(super) verdict: Option<Verdict>,
 }
 
 /// A chart and the data behind it.
@@ -130,6 +132,18 @@ impl Section {
     }
 }
 
+impl Entry {
+    /// A plain text.
+    pub(super) fn of(text: impl Into<String>) -> Self {
+        Self { text: text.into(), ..Self::default() }
+    }
+
+    /// A verdict's word.
+    pub(super) fn verdict(verdict: Verdict) -> Self {
+        Self { verdict: Some(verdict), ..Self::of(verdict.word()) }
+    }
+}
+
 impl Table {
     /// An empty table, of which the first `labels` columns are words.
     pub(super) fn new(caption: &str, labels: usize, columns: impl IntoIterator<Item = impl Into<String>>) -> Self {
@@ -139,7 +153,7 @@ impl Table {
 
     /// Adds a row of texts.
     pub(super) fn row(&mut self, texts: impl IntoIterator<Item = impl Into<String>>) {
-        self.rows.push(texts.into_iter().map(|text| Entry { text: text.into(), best: false }).collect());
+        self.rows.push(texts.into_iter().map(Entry::of).collect());
     }
 
     /// Adds a row of labels and scores, of which the lowest as printed is marked.
@@ -147,16 +161,16 @@ impl Table {
         let printed: Vec<String> = scores.iter().map(|score| super::text::score(*score)).collect();
         let lowest = scores.iter().flatten().copied().filter(|score| score.is_finite()).min_by(f64::total_cmp);
         let lowest = lowest.map(|score| super::text::score(Some(score)));
-        let mut row: Vec<Entry> = labels.into_iter().map(|text| Entry { text: text.into(), best: false }).collect();
-        row.extend(printed.into_iter().map(|text| Entry { best: Some(&text) == lowest.as_ref(), text }));
+        let mut row: Vec<Entry> = labels.into_iter().map(Entry::of).collect();
+        row.extend(printed.into_iter().map(|text| Entry { best: Some(&text) == lowest.as_ref(), ..Entry::of(text) }));
         self.rows.push(row);
     }
 
-    /// The same as a file of values separated by commas.
+    /// The same as a file of values separated by commas, its numbers as programs read them.
     pub(super) fn csv(&self, stem: &str) -> Csv {
         let mut csv = CsvText::new(stem, &self.columns);
         for row in &self.rows {
-            csv.row(row.iter().map(|entry| entry.text.as_str()));
+            csv.row(row.iter().map(|entry| super::text::plain(&entry.text)));
         }
         csv.done()
     }

@@ -1,6 +1,9 @@
 //! The report as one HTML file that needs nothing else: style, drawings and pictures are inside.
 
-use super::document::{Block, Entry, Panel, Section, Strip, Table};
+use super::{
+    document::{Block, Entry, Panel, Section, Strip, Table},
+    verdict::Verdict,
+};
 use anyhow::Context;
 use base64::{Engine, engine::general_purpose::STANDARD};
 use std::{collections::BTreeMap, fs, path::Path};
@@ -65,7 +68,7 @@ fn block_html(block: &Block, album: &mut Album<'_>) -> anyhow::Result<String> {
         Block::Text(text) => format!("<p>{}</p>\n", escaped(text)),
         Block::Finding(verdict, text) => {
             let word = verdict.word();
-            let class = word.to_lowercase().replace(' ', "-");
+            let class = class(*verdict);
             format!("<p class=\"finding {class}\"><b>{word}</b> {}</p>\n", escaped(text))
         }
         Block::Missing(text) => format!("<p class=\"missing\">{}</p>\n", escaped(text)),
@@ -93,6 +96,8 @@ fn table_html(table: &Table) -> String {
         format!("<{tag}{class}>{inside}</{tag}>")
     };
     let heading: String = table.columns.iter().enumerate().map(|(i, name)| cell("th", i, &escaped(name))).collect();
+    // Sentences break into lines, names and numbers do not.
+    let prose = if table.labels == table.columns.len() { " class=\"prose\"" } else { "" };
     let totals = table.rows.len().saturating_sub(table.totals);
     let rows: String = table
         .rows
@@ -105,13 +110,23 @@ fn table_html(table: &Table) -> String {
         })
         .collect();
     format!(
-        "<div class=\"table\"><table>\n<caption>{}</caption>\n<thead><tr>{heading}</tr></thead>\n<tbody>\n{rows}</tbody>\n</table></div>\n",
+        "<div class=\"table\"><table{prose}>\n<caption>{}</caption>\n<thead><tr>{heading}</tr></thead>\n<tbody>\n{rows}</tbody>\n</table></div>\n",
         escaped(&table.caption)
     )
 }
 
 fn entry_html(entry: &Entry) -> String {
-    if entry.best { format!("<b>{}</b>", escaped(&entry.text)) } else { escaped(&entry.text) }
+    let text = escaped(&entry.text);
+    match entry.verdict {
+        Some(verdict) => format!("<span class=\"verdict {}\">{text}</span>", class(verdict)),
+        None if entry.best => format!("<b>{text}</b>"),
+        None => text,
+    }
+}
+
+/// Which colour a verdict has.
+fn class(verdict: Verdict) -> String {
+    verdict.word().to_lowercase().replace(' ', "-")
 }
 
 fn strip_html(strip: &Strip, album: &mut Album<'_>) -> anyhow::Result<String> {

@@ -42,7 +42,7 @@ fn table_of(table: &Table) -> String {
 }
 
 fn entry(entry: &Entry) -> String {
-    if entry.best { format!("**{}**", escaped(&entry.text)) } else { escaped(&entry.text) }
+    if entry.best || entry.verdict.is_some() { format!("**{}**", escaped(&entry.text)) } else { escaped(&entry.text) }
 }
 
 /// One table for each run of rows with as many pictures.

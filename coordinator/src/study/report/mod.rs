@@ -42,7 +42,7 @@ pub(crate) fn write(data: &StudyData, out: &Path) -> anyhow::Result<()> {
         file(&figures, &name, text)?;
     }
     file(out, "results.json", &results::json(&study)?)?;
-    file(out, "data.json", &(serde_json::to_string_pretty(data)? + "\n"))?;
+    file(out, "data.json", &results::data(data)?)?;
     file(out, "results.md", &markdown::page(TITLE, &lead, &sections))?;
     file(out, "report.html", &html::page(TITLE, &lead, &sections, &pictures)?)
 }

@@ -1,7 +1,7 @@
 //! `results.json`: one line for each match that a program may want to compare.
 
 use super::study::{CSSIM, Match, Study};
-use crate::study::row::{Method, Row};
+use crate::study::row::{Method, Row, StudyData};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -49,6 +49,27 @@ pub(super) fn json(study: &Study<'_>) -> serde_json::Result<String> {
     }
     let lines = groups.values().filter_map(|rows| Match::best(rows)).map(|best| line(&best));
     Ok(format!("[\n{}\n]\n", lines.collect::<serde_json::Result<Vec<_>>>()?.join(",\n")))
+}
+
+/// The text of `data.json`: the whole study, a line for each thing measured.
+///
+/// # Errors
+/// Where it cannot be written.
+pub(super) fn data(data: &StudyData) -> serde_json::Result<String> {
+    let about = serde_json::to_string_pretty(&data.about)?.replace('\n', "\n  ");
+    let lists = [
+        ("photos", lines(&data.photos)?),
+        ("rows", lines(&data.rows)?),
+        ("direct", lines(&data.direct)?),
+        ("agreements", lines(&data.agreements)?),
+    ];
+    let lists = lists.map(|(name, lines)| format!("  \"{name}\": [{lines}]"));
+    Ok(format!("{{\n  \"about\": {about},\n{}\n}}\n", lists.join(",\n")))
+}
+
+fn lines<T: Serialize>(list: &[T]) -> serde_json::Result<String> {
+    let lines = list.iter().map(serde_json::to_string).collect::<serde_json::Result<Vec<_>>>()?;
+    Ok(if lines.is_empty() { String::new() } else { format!("\n    {}\n  ", lines.join(",\n    ")) })
 }
 
 /// What tells results apart, in the order in which they are listed: all but the start.

@@ -10,7 +10,7 @@ pub(super) fn score(score: Option<f64>) -> String {
 /// A number with so many decimals; a dash where there is none.
 pub(super) fn fixed(number: Option<f64>, decimals: usize) -> String {
     match number.filter(|number| number.is_finite()) {
-        Some(number) => without_negative_zero(format!("{number:.decimals$}")),
+        Some(number) => without_negative_zero(format!("{number:.decimals$}")).replace('-', "−"),
         None => "–".to_owned(),
     }
 }
@@ -25,6 +25,18 @@ pub(super) fn signed(difference: Option<f64>) -> String {
         None => "–".to_owned(),
     }
 }
+
+/// A number of a table as programs read it: its minus is a hyphen, its absence nothing.
+pub(super) fn plain(shown: &str) -> String {
+    match shown.strip_prefix('−') {
+        Some(digits) => format!("-{digits}"),
+        None if shown == "–" => String::new(),
+        None => shown.strip_prefix('+').unwrap_or(shown).to_owned(),
+    }
+}
+
+/// What stands instead of the numbers of a claim that the study has none for.
+pub(super) const ABSENT: &str = "Not in this study.";
 
 /// A number to three significant digits, for what spans magnitudes: seconds, ratios.
 pub(super) fn significant(number: Option<f64>) -> String {

@@ -88,7 +88,7 @@ impl Plot {
             if self.x.log {
                 let logs = self.shown().map(|point| point.0.log10());
                 let (low, high) = range(logs, false);
-                let x = (10.0_f64.powf(low)..10.0_f64.powf(high)).log_scale();
+                let x = (10.0_f64.powf(low)..10.0_f64.powf(high)).log_scale().with_key_points(decades(low, high));
                 self.fill(root, builder.build_cartesian_2d(x, y0..y1)?)?;
             } else {
                 let (low, high) = range(self.shown().map(|point| point.0), self.x.from_zero);
@@ -144,4 +144,11 @@ impl Plot {
         }
         Ok(())
     }
+}
+
+/// Ticks between two powers of ten: the powers, or 1, 2 and 5 times each where those would be few.
+fn decades(low: f64, high: f64) -> Vec<f64> {
+    let steps: &[f64] = if high - low < 2.5 { &[1.0, 2.0, 5.0] } else { &[1.0] };
+    let powers = (-12_i32..=12).flat_map(|power| steps.iter().map(move |step| step * 10.0_f64.powi(power)));
+    powers.filter(|tick| (low..=high).contains(&tick.log10())).collect()
 }

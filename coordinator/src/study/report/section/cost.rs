@@ -87,6 +87,9 @@ pub(super) fn median_ratio(study: &Study<'_>, method: Method) -> Option<f64> {
 /// Whether two stages are ten times as cheap as brute force, and the numbers.
 pub(super) fn claim(study: &Study<'_>, method: Method) -> (Verdict, String) {
     let ratios = ratios(study, method);
+    if ratios.is_empty() {
+        return (Verdict::NotDecided, text::ABSENT.to_owned());
+    }
     let lowest = ratios.iter().copied().min_by(f64::total_cmp);
     let words = format!(
         "Brute force, charged one direct rendering for each evaluation, costs {} times {} (median over {}, lowest {}); the \

@@ -79,14 +79,17 @@ pub(super) fn pairs<'a>(study: &Study<'a>) -> Vec<Pair<'a>> {
 
 /// Whether samples come close to all pixels, and the numbers.
 pub(super) fn claim(pairs: &[Pair<'_>]) -> (Verdict, String) {
+    if pairs.is_empty() {
+        return (Verdict::NotDecided, text::ABSENT.to_owned());
+    }
     let excess: Vec<f64> = pairs.iter().map(|(_, sampled, full)| sampled - full).collect();
     let worst = pairs.iter().max_by(|a, b| (a.1 - a.2).total_cmp(&(b.1 - b.2)));
     let worst = worst.map_or_else(String::new, |((material, probe), sampled, full)| {
         format!(", at most {} ({})", text::signed(Some(sampled - full)), text::cell(material, probe))
     });
     let words = format!(
-        "A match from samples has a CSSIM {} above that from all pixels in the mean of {}{worst}; confirmed up to a mean of \
-         {CLOSE:.3}, refuted above {CELL_SLACK:.2}.",
+        "From samples CSSIM differs by {} from that of all pixels (positive: worse) in the mean of {}{worst}; confirmed up to a \
+         mean of {CLOSE:.3}, refuted above {CELL_SLACK:.2}.",
         text::signed(mean(&excess)),
         text::count(pairs.len(), "cell")
     );

@@ -83,6 +83,9 @@ pub(super) fn margins(study: &Study<'_>, method: Method) -> Vec<f64> {
 /// Whether a method is robust under a third light, and the numbers.
 pub(super) fn claim(study: &Study<'_>, method: Method) -> (Verdict, String) {
     let margins = margins(study, method);
+    if margins.is_empty() {
+        return (Verdict::NotDecided, text::ABSENT.to_owned());
+    }
     let wins = margins.iter().filter(|margin| **margin > 0.0).count();
     let words = format!(
         "Under held-out lights {} beats L2 in {} cases, by a CSSIM of {} in the mean; {PAIRED_RULE}.",

@@ -77,10 +77,16 @@ pub(super) fn claim(study: &Study<'_>) -> (Verdict, String) {
             let wins = text::share(of.iter().filter(|margin| **margin > 0.0).count(), of.len());
             parts.push(format!("at {size} pixels in {wins} cells, by {} in the mean", text::signed(mean(&of))));
         }
-        margins.extend(of);
+        // At the size of the grid it is brute force itself.
+        margins.extend(of.into_iter().filter(|_| size < study.size()));
     }
-    let parts = if parts.is_empty() { "nowhere measured".to_owned() } else { parts.join("; ") };
-    let words = format!("{SAMPLES} samples beat brute force on low-resolution images {parts}; {PAIRED_RULE}.");
+    if parts.is_empty() {
+        return (Verdict::NotDecided, text::ABSENT.to_owned());
+    }
+    let parts = parts.join("; ");
+    let words = format!(
+        "{SAMPLES} samples beat brute force on low-resolution images {parts}; below the full size {PAIRED_RULE}."
+    );
     (verdict::paired(&margins), words)
 }
 

@@ -78,6 +78,9 @@ fn ggx(models: &[&str], scored: &[((&str, &str), Vec<Option<f64>>)]) -> (Verdict
     let place = |name: &str| models.iter().position(|model| *model == name);
     let margin = |scores: &Vec<Option<f64>>| Some(scores[place("cook-torrance")?]? - scores[place("ggx")?]?);
     let margins: Vec<f64> = scored.iter().filter_map(|(_, scores)| margin(scores)).collect();
+    if margins.is_empty() {
+        return (Verdict::NotDecided, "GGX against Cook-Torrance: not in this study.".to_owned());
+    }
     let wins = margins.iter().filter(|margin| **margin > 0.0).count();
     let words = format!(
         "GGX beats Cook-Torrance in {} cells, by a CSSIM of {} in the mean, on the claim of [BP20a] that GGX is the better model; \

@@ -3,7 +3,7 @@
 use super::{cost, full, held_out, low_resolution, table_one};
 use crate::study::{
     report::{
-        document::{Block, Section, Table},
+        document::{Block, Entry, Section, Table},
         statistics::mean,
         study::Study,
         text,
@@ -34,7 +34,7 @@ pub(super) fn section(study: &Study<'_>) -> anyhow::Result<Section> {
         ["claim", "verdict", "numbers and rule"],
     );
     for (claim, (verdict, numbers)) in claims {
-        table.row([claim, verdict.word(), &numbers]);
+        table.rows.push(vec![Entry::of(claim), Entry::verdict(verdict), Entry::of(numbers)]);
     }
     let csv = table.csv("claims");
     section.blocks.extend([Block::Table(table), Block::Data(csv)]);
@@ -45,6 +45,9 @@ pub(super) fn section(study: &Study<'_>) -> anyhow::Result<Section> {
 /// Ours with polish against the best start of brute force.
 fn brute(study: &Study<'_>) -> (Verdict, String) {
     let pairs = study.pairs(Method::OursPolished, Method::Brute);
+    if pairs.is_empty() {
+        return (Verdict::NotDecided, text::ABSENT.to_owned());
+    }
     let scores: Vec<(f64, f64)> = pairs.iter().map(|(_, ours, brute)| (*ours, *brute)).collect();
     let ours = mean(&scores.iter().map(|pair| pair.0).collect::<Vec<_>>());
     let rival = mean(&scores.iter().map(|pair| pair.1).collect::<Vec<_>>());
@@ -66,6 +69,9 @@ fn brute(study: &Study<'_>) -> (Verdict, String) {
 fn fitting(study: &Study<'_>) -> (Verdict, String) {
     let margins: Vec<f64> =
         study.pairs(Method::OursPolished, Method::L2).iter().map(|(_, ours, l2)| l2 - ours).collect();
+    if margins.is_empty() {
+        return (Verdict::NotDecided, text::ABSENT.to_owned());
+    }
     let wins = margins.iter().filter(|margin| **margin > 0.0).count();
     let words = format!(
         "Lower CSSIM in {} cells, by {} in the mean; {PAIRED_RULE}.",

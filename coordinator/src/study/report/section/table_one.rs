@@ -81,6 +81,9 @@ pub(super) fn claim(study: &Study<'_>) -> (Verdict, String) {
         Some((at(32)?, at(256)?))
     };
     let pairs: Vec<(f64, f64)> = study.cells().into_iter().filter_map(both).collect();
+    if pairs.is_empty() {
+        return (Verdict::NotDecided, text::ABSENT.to_owned());
+    }
     let few = mean(&pairs.iter().map(|pair| pair.0).collect::<Vec<_>>());
     let many = mean(&pairs.iter().map(|pair| pair.1).collect::<Vec<_>>());
     let ratio = few.zip(many).map(|(few, many)| few / many);

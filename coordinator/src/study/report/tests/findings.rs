@@ -99,7 +99,7 @@ fn table_one_stands_beside_the_papers_and_names_its_misprints() {
 fn trends_and_ranks_have_their_signs() {
     let mut data = whole();
     let section = section_of(&data, "trends");
-    assert_eq!(row(tables(&section)[0], &["delrin", "Uffizi Gallery"])[2..], ["1.00", "-1.00"]);
+    assert_eq!(row(tables(&section)[0], &["delrin", "Uffizi Gallery"])[2..], ["1.00", "−1.00"]);
     assert_eq!(findings(&section)[0].0, Verdict::Confirmed);
     for row in data.rows.iter_mut().filter(|row| row.method == Method::Candidate) {
         row.parameters.insert("alpha".to_owned(), -row.gamma.unwrap());
