@@ -402,10 +402,10 @@ fn starts(model: &dyn Model) -> Vec<(&'static str, Vec<f64>)> {
     {
         let mut start = paper.clone();
         start[kd..kd + 3].fill(diffuse);
-        let colours = if width > specular + 1 { 3.min(width - specular) } else { 1 };
+        let colours = if width.entry > specular + 1 { 3.min(width.entry - specular) } else { 1 };
         start[specular..specular + colours].fill(reflectance);
         let (lower, upper) = brdf::flat_bounds(model.parameters());
-        start[width] = share.clamp(lower[width], upper[width]);
+        start[width.entry] = (width.inverse)(share).clamp(lower[width.entry], upper[width.entry]);
         starts.push((name, start));
     }
     starts

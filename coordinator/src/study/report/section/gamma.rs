@@ -1,0 +1,92 @@
+//! The paper's Figure 2: CSSIM of the candidates over gamma.
+
+use crate::study::{
+    report::{
+        chart::{Axis, Plot, Series, colour},
+        document::{CsvText, Section},
+        study::Study,
+        text,
+        verdict::Verdict,
+    },
+    row::{Method, Row},
+};
+
+/// The materials of the paper's figure.
+const PAPER: [&str; 3] = ["gold-metallic-paint3", "aluminium", "red-metallic-paint"];
+
+pub(super) fn section(study: &Study<'_>) -> anyhow::Result<Section> {
+    let mut section = Section::new("gamma", "Figure 2: CSSIM over γ");
+    let mut minima = Vec::new();
+    let mut ends = 0;
+    for probe in &study.data.about.probes {
+        let curves: Vec<(&str, Vec<&Row>)> = materials(study)
+            .into_iter()
+            .map(|material| (material, candidates(study, (material, probe))))
+            .filter(|(_, curve)| curve.len() > 1)
+            .collect();
+        if curves.is_empty() {
+            continue;
+        }
+        for (material, curve) in &curves {
+            let lowest = curve.iter().min_by(|a, b| a.cssim.total_cmp(&b.cssim)).and_then(|row| row.gamma);
+            let ended = lowest.is_some() && (lowest == curve[0].gamma || lowest == curve[curve.len() - 1].gamma);
+            ends += usize::from(ended);
+            minima.push(format!("{} for {}", text::fixed(lowest, 2), text::cell(material, probe)));
+        }
+        let caption = format!(
+            "CSSIM of the candidate of each γ under {}; the lowest of each material is circled.",
+            text::light(probe)
+        );
+        let (svg, csv) = draw(probe, &curves)?;
+        section.figure(&caption, svg, csv);
+    }
+    if minima.is_empty() {
+        return Ok(
+            section.missing("candidates of several gammas of one subset, of at least one of the paper's materials")
+        );
+    }
+    let (all, first) = (minima.len(), minima.join("; "));
+    section.finding(
+        Verdict::Measured,
+        format!(
+            "The lowest CSSIM is at γ = {first}. It is at an end of the range of γ in {} curves.",
+            text::share(ends, all)
+        ),
+    );
+    Ok(section)
+}
+
+/// The paper's three, or the first three of its six, or of all.
+fn materials<'a>(study: &Study<'a>) -> Vec<&'a str> {
+    let about = &study.data.about;
+    let paper: Vec<&str> =
+        about.materials.iter().map(String::as_str).filter(|material| PAPER.contains(material)).collect();
+    let others = if about.six.is_empty() { &about.materials } else { &about.six };
+    if paper.len() == PAPER.len() { paper } else { others.iter().take(PAPER.len()).map(String::as_str).collect() }
+}
+
+/// The candidates of the grid's seed by gamma, of equal ones the better.
+pub(super) fn candidates<'a>(study: &Study<'a>, cell: (&str, &str)) -> Vec<&'a Row> {
+    let mut rows: Vec<&Row> = study.rows(&study.pick(Method::Candidate, cell));
+    rows.retain(|row| row.gamma.is_some_and(f64::is_finite));
+    let gamma = |row: &Row| row.gamma.unwrap_or(f64::NAN);
+    rows.sort_by(|a, b| gamma(a).total_cmp(&gamma(b)).then(a.cssim.total_cmp(&b.cssim)));
+    rows.dedup_by(|a, b| (gamma(a) - gamma(b)).abs() < 1e-9);
+    rows
+}
+
+fn draw(probe: &str, curves: &[(&str, Vec<&Row>)]) -> anyhow::Result<(String, crate::study::report::document::Csv)> {
+    let mut csv = CsvText::new(&format!("fig2-gamma-{probe}"), ["material", "gamma", "cssim", "cost", "evaluations"]);
+    let mut series = Vec::new();
+    for (i, (material, curve)) in curves.iter().enumerate() {
+        for row in curve {
+            let (gamma, cost) = (text::exact(row.gamma), text::exact(row.cost));
+            csv.row([(*material).to_owned(), gamma, text::exact(Some(row.cssim)), cost, row.evaluations.to_string()]);
+        }
+        let points = curve.iter().filter_map(|row| Some((row.gamma?, row.cssim))).collect();
+        series.push(Series { name: (*material).to_owned(), colour: colour(i), points, joined: true, minimum: true });
+    }
+    let title = format!("Candidates under {}", text::light(probe));
+    let plot = Plot { title, x: Axis::linear("γ"), y: Axis::linear("CSSIM (lower is better)"), series };
+    Ok((plot.svg()?, csv.done()))
+}
