@@ -129,13 +129,14 @@ impl Plan<'_> {
         }
         self.sampled(&six)?;
         self.repeated();
+        let repeat = self.study.light(&self.study.file.repeat_probe);
         for (light, material) in product(probes, &six) {
             let scene = self.scene(material, light);
-            if subsets {
+            if subsets && Some(light) == repeat {
                 let method = Method { subsets: SUBSETS, ..self.method() };
                 self.fit(scene, MethodName::Subsets, method, |task| task);
             }
-            if models {
+            if models && Some(light) == repeat {
                 for name in self.study.file.models.clone() {
                     let method = Method { model: brdf::model(&name)?, ..self.method() };
                     self.fit(scene, MethodName::Ours, method, |task| task);
@@ -237,6 +238,8 @@ impl Plan<'_> {
             self.main(scene);
             self.brute(scene);
             self.low_resolution(scene);
+            let few = Method { samples: SampleCount::Draws(32), polish: false, ..self.method() };
+            self.fit(scene, MethodName::Ours, few, |task| FitTask { pictures: Some("samples32"), ..task });
         }
     }
 
@@ -254,21 +257,29 @@ impl Plan<'_> {
     /// Numbers of pixels, and ways to draw them.
     fn sampled(&mut self, six: &[usize]) -> anyhow::Result<()> {
         let (samples, sampling) = (self.study.has(Experiment::Samples), self.study.has(Experiment::Sampling));
+        let repeated = self.study.numbers(&self.study.file.repeat_materials);
         for (light, material) in product(self.study.probes, six) {
             let scene = self.scene(material, light);
-            let mut fit = |samples, sampling, pictures| {
-                let method = Method { samples, sampling, polish: false, ..self.method() };
-                self.fit(scene, MethodName::Ours, method, |task| FitTask { pictures, is_shared: true, ..task })
-            };
             if samples {
-                fit(SampleCount::Draws(32), Sampling::Importance, Some("samples32"));
-                fit(SampleCount::Draws(64), Sampling::Importance, Some("samples64"));
-                fit(SampleCount::Full, Sampling::Importance, Some("full"));
+                for (draws, pictures) in [(32, "samples32"), (64, "samples64")] {
+                    let samples = SampleCount::Draws(draws);
+                    let method = Method { samples, polish: false, ..self.method() };
+                    self.fit(scene, MethodName::Ours, method, |task| FitTask { pictures: Some(pictures), ..task });
+                }
+                let given = self.study.file.full_gammas.clone();
+                let gammas = if given.is_empty() { Method::default().gammas } else { given };
+                let method = Method { samples: SampleCount::Full, polish: false, gammas, ..self.method() };
+                let with = |task| FitTask { pictures: Some("full"), is_shared: true, ..task };
+                self.fit(scene, MethodName::Ours, method, with);
             }
-            if sampling {
+            let mut fit = |samples, sampling| {
+                let method = Method { samples, sampling, polish: false, ..self.method() };
+                self.fit(scene, MethodName::Ours, method, |task| FitTask { is_shared: true, ..task })
+            };
+            if sampling && repeated.contains(&material) {
                 for draws in [32, 64, 256] {
                     for sampling in [Sampling::Importance, Sampling::Stratified, Sampling::Uniform] {
-                        fit(SampleCount::Draws(draws), sampling, None);
+                        fit(SampleCount::Draws(draws), sampling);
                     }
                 }
             }
@@ -389,7 +400,7 @@ fn product(lights: usize, materials: &[usize]) -> impl Iterator<Item = (usize, u
     (0..lights).flat_map(move |light| materials.clone().into_iter().map(move |material| (light, material)))
 }
 
-/// Where brute force starts: at the paper's point; as a plastic, a metal, a mirror.
+/// Where brute force starts: at the paper's point; as a plastic, and as a metal.
 fn starts(model: &dyn Model) -> Vec<(&'static str, Vec<f64>)> {
     let paper: Vec<f64> =
         model.parameters().iter().flat_map(|p| std::iter::repeat_n(p.start, p.channels.count())).collect();
@@ -397,9 +408,7 @@ fn starts(model: &dyn Model) -> Vec<(&'static str, Vec<f64>)> {
     let offset = |name| brdf::offset_of(model.parameters(), name);
     let Some(width) = model.lobes().iter().find_map(|basis| basis.width) else { return starts };
     let (Some(kd), Some(specular)) = (offset("kd"), offset("f0").or_else(|| offset("ks"))) else { return starts };
-    for (name, diffuse, reflectance, share) in
-        [("plastic", 0.3, 0.04, 0.05_f64), ("metal", 0.05, 0.7, 0.1), ("mirror", 0.05, 0.5, 0.02)]
-    {
+    for (name, diffuse, reflectance, share) in [("plastic", 0.3, 0.04, 0.05_f64), ("metal", 0.05, 0.7, 0.1)] {
         let mut start = paper.clone();
         start[kd..kd + 3].fill(diffuse);
         let colours = if width.entry > specular + 1 { 3.min(width.entry - specular) } else { 1 };

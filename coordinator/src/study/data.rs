@@ -223,6 +223,9 @@ impl Collector<'_> {
 
     /// Rows of a match by other metrics.
     fn variants(&mut self, cell: &Cell, method: MethodName, what: &str, found: Option<&Match>) -> anyhow::Result<()> {
+        if cell.scene.size < variants::SMALLEST {
+            return Ok(());
+        }
         let base = base(self.inputs, cell.scene);
         let photo = record::read_image(&self.inputs.out, &format!("{base}-photo"))?;
         let image = record::read_image(&self.inputs.out, &format!("{base}-{what}"))?;

@@ -54,10 +54,13 @@ pub(super) struct StudyFile {
     /// Seeds of the experiments that repeat.
     #[serde(default = "default_seeds")]
     pub(super) seeds: u32,
-    /// The light of the experiments that repeat, by name; the first probe if left out.
+    /// The gammas of fits to all pixels, which take minutes; the default ones if left out.
+    #[serde(default)]
+    pub(super) full_gammas: Vec<f64>,
+    /// The light of the experiments that repeat, of models and of subsets, by name; the first probe if left out.
     #[serde(default)]
     pub(super) repeat_probe: String,
-    /// The materials of the experiments that repeat, by name; the first three of `six` if left out.
+    /// The materials of the experiments that repeat, and of the ways to draw pixels, by name; the first three of `six` if left out.
     #[serde(default)]
     pub(super) repeat_materials: Vec<String>,
     /// The seed of everything else.
@@ -213,6 +216,9 @@ impl Study {
         {
             ensure!((1..=1 << 20).contains(&samples), "{name} must lie between 1 and 1048576, found {samples}");
         }
+        let gammas = &self.file.full_gammas;
+        let ascending = gammas.windows(2).all(|pair| pair[0] < pair[1]) && gammas.iter().all(|gamma| *gamma > 0.0);
+        ensure!(ascending, "full-gammas must be positive and ascending, found {gammas:?}");
         ensure!((1..=1000).contains(&self.file.seeds), "seeds must lie between 1 and 1000, found {}", self.file.seeds);
         Ok(())
     }

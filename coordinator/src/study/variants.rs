@@ -8,6 +8,9 @@ use lookalike::{
     },
 };
 
+/// Columns and rows below which a photo has no variants: half of them, and a quarter, have to hold the metric's windows.
+pub(super) const SMALLEST: u32 = 44;
+
 /// Scores of an image against a photo over black, by the name of the variant.
 pub(super) fn scores(photo: &Image, image: &Image, exposure: f64) -> Result<Vec<(&'static str, f64)>, MetricError> {
     let coverage: Vec<f32> = vec![1.0; photo.width() * photo.height()];
@@ -33,10 +36,8 @@ pub(super) fn scores(photo: &Image, image: &Image, exposure: f64) -> Result<Vec<
         ),
         ("iCID", icid(&reference, &shown, &coverage, &IcidOptions::default())?.icid),
     ];
-    // The coarsest of three scales has a quarter of the columns and rows.
-    if photo.width().min(photo.height()) >= 44 {
-        scores.push(("three scales", with(CidOptions { scales: Scales::Three, ..CidOptions::default() })?));
-    }
+    scores.push(("three scales", with(CidOptions { scales: Scales::Three, ..CidOptions::default() })?));
+    // The coarsest of five has a sixteenth of the columns and rows.
     if photo.width().min(photo.height()) >= 176 {
         scores.push(("five scales", with(CidOptions { scales: Scales::Five, ..CidOptions::default() })?));
     }
