@@ -65,12 +65,12 @@ fn materials<'a>(study: &Study<'a>) -> Vec<&'a str> {
     if paper.len() == PAPER.len() { paper } else { others.iter().take(PAPER.len()).map(String::as_str).collect() }
 }
 
-/// The candidates of the grid's seed by gamma, of equal ones the better.
+/// The candidates of the grid's seed by gamma, of equal ones the first.
 pub(super) fn candidates<'a>(study: &Study<'a>, cell: (&str, &str)) -> Vec<&'a Row> {
     let mut rows: Vec<&Row> = study.rows(&study.pick(Method::Candidate, cell));
     rows.retain(|row| row.gamma.is_some_and(f64::is_finite));
     let gamma = |row: &Row| row.gamma.unwrap_or(f64::NAN);
-    rows.sort_by(|a, b| gamma(a).total_cmp(&gamma(b)).then(a.cssim.total_cmp(&b.cssim)));
+    rows.sort_by(|a, b| gamma(a).total_cmp(&gamma(b)));
     rows.dedup_by(|a, b| (gamma(a) - gamma(b)).abs() < 1e-9);
     rows
 }
