@@ -97,7 +97,11 @@ fn table_html(table: &Table) -> String {
     };
     let heading: String = table.columns.iter().enumerate().map(|(i, name)| cell("th", i, &escaped(name))).collect();
     // Sentences break into lines, names and numbers do not.
-    let prose = if table.labels == table.columns.len() { " class=\"prose\"" } else { "" };
+    let shape = match table.columns.len() {
+        columns if columns == table.labels => " class=\"prose\"",
+        columns if columns > 9 => " class=\"wide\"",
+        _ => "",
+    };
     let totals = table.rows.len().saturating_sub(table.totals);
     let rows: String = table
         .rows
@@ -110,7 +114,7 @@ fn table_html(table: &Table) -> String {
         })
         .collect();
     format!(
-        "<div class=\"table\"><table{prose}>\n<caption>{}</caption>\n<thead><tr>{heading}</tr></thead>\n<tbody>\n{rows}</tbody>\n</table></div>\n",
+        "<div class=\"table\"><table{shape}>\n<caption>{}</caption>\n<thead><tr>{heading}</tr></thead>\n<tbody>\n{rows}</tbody>\n</table></div>\n",
         escaped(&table.caption)
     )
 }

@@ -4,6 +4,7 @@
 //! its file would need; nothing is drawn from what is not there.
 
 mod chart;
+mod differences;
 mod document;
 mod html;
 mod markdown;
@@ -27,13 +28,15 @@ use study::Study;
 const TITLE: &str = "Lookalike against Bieron and Peers 2020";
 
 /// Writes the report into `out`: `results.md`, `report.html`, `results.json`, `data.json` and `figures/`; the pictures that
-/// it shows are in `out/pictures/` already.
+/// it shows are in `out/pictures/` already, where it adds those of differences.
 ///
 /// # Errors
 /// Where a file cannot be read or written.
 pub(crate) fn write(data: &StudyData, out: &Path) -> anyhow::Result<()> {
     let pictures = out.join("pictures");
-    let study = Study::new(data, names(&pictures)?);
+    let mut names = names(&pictures)?;
+    differences::write(&pictures, &mut names)?;
+    let study = Study::new(data, names);
     let sections = section::all(&study)?;
     let lead = lead(&study);
     let figures = out.join("figures");

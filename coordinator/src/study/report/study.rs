@@ -161,15 +161,26 @@ impl Pick<'_> {
         let several = matches!(row.method, Method::Subsets | Method::SubsetsPolished);
         let drawn = row.samples.is_none() || row.sampling == self.sampling && row.seed == self.seed;
         let subset = row.samples == self.samples && drawn && (several || row.subsets <= 1);
-        let stage_one = one_stage || subset && row.clamped == self.clamped;
+        // Shown again under another light or scored by another metric, a match is known by its cell and method.
+        let again = row.shown != row.probe || row.metric != CSSIM;
+        let stage_one = one_stage || again || subset && row.clamped == self.clamped;
         row.method == self.method && place && scored && searched && model && stage_one
     }
 }
 
 impl<'a> Match<'a> {
-    /// The best of several starts.
+    /// The best of several starts; of a match that has no start, the first, as experiments may have found it again.
     pub(super) fn best(rows: &[&'a Row]) -> Option<Self> {
+        let first = *rows.first()?;
         let row = rows.iter().copied().min_by(|a, b| a.cssim.total_cmp(&b.cssim))?;
+        if row.start.is_none() {
+            return Some(Self {
+                row: first,
+                cssim: first.cssim,
+                cpu_seconds: first.cpu_seconds,
+                evaluations: first.evaluations,
+            });
+        }
         let cpu_seconds = rows.iter().map(|row| row.cpu_seconds).sum();
         Some(Self { row, cssim: row.cssim, cpu_seconds, evaluations: rows.iter().map(|row| row.evaluations).sum() })
     }

@@ -80,8 +80,13 @@ fn score(study: &Study<'_>, cell: (&str, &str), (method, searched_size): Column)
 }
 
 fn heading((method, size): &Column) -> String {
-    let name = text::method(*method);
-    size.map_or_else(|| name.to_owned(), |size| format!("{name} {size}"))
+    let size = || size.map_or_else(String::new, |size| format!(" {size}"));
+    match method {
+        Method::LowRes => format!("low res.{}", size()),
+        Method::L2 => "L2".to_owned(),
+        Method::CubeRoot => "cube root".to_owned(),
+        other => text::method(*other).to_owned(),
+    }
 }
 
 /// How often each column is the best, from the marks of the table itself.

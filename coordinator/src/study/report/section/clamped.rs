@@ -14,12 +14,12 @@ use crate::study::{
 
 /// The paper's setting.
 const SAMPLES: u32 = 32;
-const PROBE: &str = "grace_cross";
 
 pub(super) fn section(study: &Study<'_>) -> anyhow::Result<Section> {
     let mut section = Section::new("clamped", "Equation 1 on clamped values");
+    let Some(probe) = probe(study) else { return Ok(section.missing(&needs())) };
     let mut table = Table::new(
-        &format!("Spread over seeds: {SAMPLES} samples, {}.", text::light(PROBE)),
+        &format!("Spread over seeds: {SAMPLES} samples, {}.", text::light(probe)),
         2,
         ["material", "Eq. 1 on", "seeds", "mean γ", "sd of γ", "lowest γ", "highest γ", "mean CSSIM", "sd of CSSIM"],
     );
@@ -27,7 +27,7 @@ pub(super) fn section(study: &Study<'_>) -> anyhow::Result<Section> {
     let mut spread = Vec::new();
     let mut deviations = [Vec::new(), Vec::new()];
     for material in &study.data.about.materials {
-        let both = [false, true].map(|clamped| rows(study, material, clamped));
+        let both = [false, true].map(|clamped| rows(study, (material, probe), clamped));
         if both.iter().any(|rows| rows.len() < 2) {
             continue;
         }
@@ -60,9 +60,7 @@ pub(super) fn section(study: &Study<'_>) -> anyhow::Result<Section> {
         }
     }
     if table.rows.is_empty() {
-        return Ok(section.missing(&format!(
-            "clamped and unclamped \"ours\" with {SAMPLES} samples and several seeds under {PROBE}"
-        )));
+        return Ok(section.missing(&needs()));
     }
     let chart =
         Spread { title: "Winning γ over seeds".to_owned(), label: "γ of the winner".to_owned(), rows: spread };
@@ -96,15 +94,33 @@ fn judged(deviations: &[Vec<(Option<f64>, Option<f64>)>; 2]) -> (Verdict, String
     (Verdict::of(holds), words)
 }
 
-fn rows<'a>(study: &Study<'a>, material: &str, clamped: bool) -> Vec<&'a Row> {
+fn needs() -> String {
+    format!(
+        "clamped and unclamped \"ours\" with {SAMPLES} samples and several seeds under one light, in the paper Grace Cathedral"
+    )
+}
+
+/// The light that was measured so, the paper's if it was.
+fn probe<'a>(study: &Study<'a>) -> Option<&'a str> {
+    let measured = |probe: &&String| study.data.rows.iter().any(|row| row.clamped && row.probe == **probe);
+    let mut probes: Vec<&String> = study.data.about.probes.iter().filter(measured).collect();
+    probes.sort_by_key(|probe| *probe != "grace_cross");
+    probes.first().map(|probe| probe.as_str())
+}
+
+/// One match for each seed.
+fn rows<'a>(study: &Study<'a>, (material, probe): (&str, &str), clamped: bool) -> Vec<&'a Row> {
     let meant = |row: &&Row| {
         row.method == Method::Ours
             && row.material == material
-            && (row.probe == PROBE && row.shown == PROBE)
+            && (row.probe == probe && row.shown == probe)
             && row.samples == Some(SAMPLES)
             && row.sampling == "importance"
             && (row.clamped == clamped && row.subsets <= 1)
             && (row.size == study.size() && row.metric == CSSIM && row.model == study.model)
     };
-    study.data.rows.iter().filter(meant).collect()
+    let mut rows: Vec<&Row> = study.data.rows.iter().filter(meant).collect();
+    rows.sort_by_key(|row| row.seed);
+    rows.dedup_by_key(|row| row.seed);
+    rows
 }

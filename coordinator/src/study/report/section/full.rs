@@ -3,6 +3,7 @@
 use crate::study::{
     report::{
         chart::{Bars, Group, method_colour},
+        differences::GAIN,
         document::{Block, Panel, Section, StripRow, Table},
         statistics::mean,
         study::{Pick, Study},
@@ -54,7 +55,9 @@ pub(super) fn section(study: &Study<'_>) -> anyhow::Result<Section> {
     });
     let title = format!("{samples} samples against all pixels");
     let bars = Bars { title, label: "CSSIM (lower is better)".to_owned(), kinds, groups: groups.collect() };
-    section.strip("The photo and its matches.", strip(study, &pairs, &samples));
+    let caption =
+        format!("The photo, its matches, and the absolute difference of each from it, {GAIN} times as bright.");
+    section.strip(&caption, strip(study, &pairs, &samples));
     section.figure(
         "CSSIM of the match from samples and of the match from all pixels.",
         bars.svg()?,
@@ -111,6 +114,8 @@ fn strip(study: &Study<'_>, pairs: &[Pair<'_>], samples: &str) -> Vec<StripRow> 
             Panel::new("photo", String::new(), picture("photo")),
             Panel::new(&format!("{samples} samples"), note(sampled), picture("ours")),
             Panel::new("full image", note(full), picture("full")),
+            Panel::new(&format!("difference of {samples}"), String::new(), picture("difference-ours")),
+            Panel::new("difference of full", String::new(), picture("difference-full")),
         ];
         rows.push(StripRow { label: text::cell(cell.0, cell.1), panels });
     }

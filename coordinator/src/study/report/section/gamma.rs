@@ -3,7 +3,8 @@
 use crate::study::{
     report::{
         chart::{Axis, Plot, Series, colour},
-        document::{CsvText, Section},
+        document::{Block, CsvText, Section, Table},
+        statistics::range,
         study::Study,
         text,
         verdict::Verdict,
@@ -17,6 +18,11 @@ const PAPER: [&str; 3] = ["gold-metallic-paint3", "aluminium", "red-metallic-pai
 pub(super) fn section(study: &Study<'_>) -> anyhow::Result<Section> {
     let mut section = Section::new("gamma", "Figure 2: CSSIM over γ");
     let mut minima = Vec::new();
+    let mut table = Table::new(
+        "The lowest CSSIM of each curve.",
+        2,
+        ["material", "light", "γ of the lowest", "CSSIM there", "γ from, to"],
+    );
     let mut ends = 0;
     for probe in &study.data.about.probes {
         let curves: Vec<(&str, Vec<&Row>)> = materials(study)
@@ -31,7 +37,11 @@ pub(super) fn section(study: &Study<'_>) -> anyhow::Result<Section> {
             let lowest = curve.iter().min_by(|a, b| a.cssim.total_cmp(&b.cssim)).and_then(|row| row.gamma);
             let ended = lowest.is_some() && (lowest == curve[0].gamma || lowest == curve[curve.len() - 1].gamma);
             ends += usize::from(ended);
-            minima.push(format!("{} for {}", text::fixed(lowest, 2), text::cell(material, probe)));
+            let (from, to) = (text::fixed(curve[0].gamma, 2), text::fixed(curve[curve.len() - 1].gamma, 2));
+            let score = curve.iter().map(|row| row.cssim).min_by(f64::total_cmp);
+            let (name, light) = ((*material).to_owned(), text::light(probe).to_owned());
+            table.row([name, light, text::fixed(lowest, 2), text::score(score), format!("{from} to {to}")]);
+            minima.extend(lowest);
         }
         let caption = format!(
             "CSSIM of the candidate of each γ under {}; the lowest of each material is circled.",
@@ -45,12 +55,16 @@ pub(super) fn section(study: &Study<'_>) -> anyhow::Result<Section> {
             section.missing("candidates of several gammas of one subset, of at least one of the paper's materials")
         );
     }
-    let (all, first) = (minima.len(), minima.join("; "));
+    let csv = table.csv("fig2-minima");
+    section.blocks.extend([Block::Table(table), Block::Data(csv)]);
+    let (low, high) = range(&minima).unzip();
     section.finding(
         Verdict::Measured,
         format!(
-            "The lowest CSSIM is at γ = {first}. It is at an end of the range of γ in {} curves.",
-            text::share(ends, all)
+            "The γ of the lowest CSSIM is from {} to {}; it is at an end of its range in {} curves.",
+            text::fixed(low, 2),
+            text::fixed(high, 2),
+            text::share(ends, minima.len())
         ),
     );
     Ok(section)
@@ -65,12 +79,12 @@ fn materials<'a>(study: &Study<'a>) -> Vec<&'a str> {
     if paper.len() == PAPER.len() { paper } else { others.iter().take(PAPER.len()).map(String::as_str).collect() }
 }
 
-/// The candidates of the grid's seed by gamma, of equal ones the better.
+/// The candidates of the grid's seed by gamma, of equal ones the first.
 pub(super) fn candidates<'a>(study: &Study<'a>, cell: (&str, &str)) -> Vec<&'a Row> {
     let mut rows: Vec<&Row> = study.rows(&study.pick(Method::Candidate, cell));
     rows.retain(|row| row.gamma.is_some_and(f64::is_finite));
     let gamma = |row: &Row| row.gamma.unwrap_or(f64::NAN);
-    rows.sort_by(|a, b| gamma(a).total_cmp(&gamma(b)).then(a.cssim.total_cmp(&b.cssim)));
+    rows.sort_by(|a, b| gamma(a).total_cmp(&gamma(b)));
     rows.dedup_by(|a, b| (gamma(a) - gamma(b)).abs() < 1e-9);
     rows
 }

@@ -4,7 +4,7 @@ use crate::study::{
     report::{
         document::{Block, Section, Table},
         statistics::mean,
-        study::{CSSIM, Match, Pick, Study},
+        study::{CSSIM, Pick, Study},
         text,
         verdict::Verdict,
     },
@@ -15,8 +15,6 @@ use std::collections::BTreeSet;
 const METHODS: [Method; 3] = [Method::OursPolished, Method::Brute, Method::L2];
 /// Between these lie most of the paper's scores.
 const PAPER: (f64, f64) = (0.04, 0.07);
-/// The name that the score over windows on the object goes by here.
-const OBJECT: &str = "cssim, windows on the object";
 
 pub(super) fn section(study: &Study<'_>) -> anyhow::Result<Section> {
     let mut section = Section::new("metrics", "Variants of the metric");
@@ -75,13 +73,11 @@ fn variants(study: &Study<'_>) -> Vec<Variant> {
         .filter(|row| row.metric != CSSIM && METHODS.contains(&row.method))
         .map(|row| row.metric.as_str())
         .collect();
-    let plain = variant(study, CSSIM, CSSIM, |found| Some(found.cssim));
-    let object = variant(study, OBJECT, CSSIM, |found| found.row.cssim_object);
-    let others = named.into_iter().map(|metric| variant(study, metric, metric, |found| Some(found.cssim)));
-    [plain, object].into_iter().chain(others).filter(|variant| variant.cells > 0).collect()
+    let all = std::iter::once(CSSIM).chain(named);
+    all.map(|metric| variant(study, metric)).filter(|variant| variant.cells > 0).collect()
 }
 
-fn variant(study: &Study<'_>, name: &str, metric: &str, score: fn(&Match<'_>) -> Option<f64>) -> Variant {
+fn variant(study: &Study<'_>, metric: &str) -> Variant {
     let about = &study.data.about;
     let cells: Vec<(&str, &str)> =
         about.materials.iter().flat_map(|m| about.probes.iter().map(move |p| (m.as_str(), p.as_str()))).collect();
@@ -90,7 +86,7 @@ fn variant(study: &Study<'_>, name: &str, metric: &str, score: fn(&Match<'_>) ->
         let pick = Pick { metric, ..study.pick(method, cell) };
         let sizes = study.data.rows.iter().filter(|row| row.metric == metric).map(|row| row.size).max();
         let found = study.find(&pick).or_else(|| study.find(&Pick { size: sizes?, ..pick }));
-        score(&found?)
+        Some(found?.cssim)
     };
     let has = |method: &Method| cells.iter().any(|cell| at(*method, *cell).is_some());
     let methods: Vec<bool> = METHODS.iter().map(has).collect();
@@ -101,7 +97,7 @@ fn variant(study: &Study<'_>, name: &str, metric: &str, score: fn(&Match<'_>) ->
     };
     let scores: Vec<[Option<f64>; 3]> = cells.iter().filter_map(complete).collect();
     let column = |i: usize| mean(&scores.iter().filter_map(|scores| scores[i]).collect::<Vec<_>>());
-    Variant { name: name.to_owned(), cells: scores.len(), means: [column(0), column(1), column(2)] }
+    Variant { name: metric.to_owned(), cells: scores.len(), means: [column(0), column(1), column(2)] }
 }
 
 /// The methods from the lowest mean on.

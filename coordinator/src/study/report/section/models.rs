@@ -73,8 +73,11 @@ fn best(scores: &[Option<f64>]) -> Option<usize> {
     there.min_by(|a, b| a.1.total_cmp(&b.1)).map(|best| best.0)
 }
 
+/// A cell and its scores by model.
+type Scored<'a> = ((&'a str, &'a str), Vec<Option<f64>>);
+
 /// [BP20a] holds GGX to be the better of the two.
-fn ggx(models: &[&str], scored: &[((&str, &str), Vec<Option<f64>>)]) -> (Verdict, String) {
+fn ggx(models: &[&str], scored: &[Scored<'_>]) -> (Verdict, String) {
     let place = |name: &str| models.iter().position(|model| *model == name);
     let margin = |scores: &Vec<Option<f64>>| Some(scores[place("cook-torrance")?]? - scores[place("ggx")?]?);
     let margins: Vec<f64> = scored.iter().filter_map(|(_, scores)| margin(scores)).collect();

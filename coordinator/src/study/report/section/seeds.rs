@@ -47,7 +47,10 @@ fn cells<'a>(study: &Study<'a>, samples: u32) -> Vec<Cell<'a>> {
             && row.cssim.is_finite()
     };
     for row in study.data.rows.iter().filter(meant) {
-        cells.entry((&row.material, &row.probe)).or_default().push(row);
+        let cell = cells.entry((&row.material, &row.probe)).or_default();
+        if cell.iter().all(|other| other.seed != row.seed) {
+            cell.push(row);
+        }
     }
     cells.into_values().filter(|rows| rows.len() > 1).collect()
 }

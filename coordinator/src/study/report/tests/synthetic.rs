@@ -85,6 +85,8 @@ fn cell(data: &mut StudyData, (m, material): (usize, &str), (p, probe): (usize, 
         Row { subsets: 8, cpu_seconds: 9.0, ..of(Method::Subsets, base + 0.002) },
         Row { subsets: 8, cpu_seconds: 11.0, ..of(Method::SubsetsPolished, base - 0.0005) },
         Row { samples: None, cpu_seconds: 20.0, ..of(Method::Ours, base + 0.003) },
+        // Another experiment found it again, from other tables.
+        Row { cpu_seconds: 1.0, ..of(Method::Ours, base + 0.0039) },
         Row { model: "cook-torrance".to_owned(), ..of(Method::OursPolished, base + 0.006) },
         Row {
             model: "ward".to_owned(),
@@ -105,12 +107,12 @@ fn cell(data: &mut StudyData, (m, material): (usize, &str), (p, probe): (usize, 
     }
     for shown in PROBES.into_iter().chain(HELD_OUT).filter(|shown| *shown != probe) {
         for (method, cssim) in [(Method::L2, 0.03), (Method::Ours, 0.012), (Method::OursPolished, 0.01)] {
-            data.rows.push(Row { shown: shown.to_owned(), ..of(method, base + cssim) });
+            data.rows.push(Row { shown: shown.to_owned(), samples: None, gamma: None, ..of(method, base + cssim) });
         }
     }
     for (metric, scale) in [("multi-scale", 0.7), ("exposure x2", 1.2)] {
         for (method, more) in [(Method::OursPolished, 0.0), (Method::Brute, 0.001), (Method::L2, 0.02)] {
-            data.rows.push(Row { metric: metric.to_owned(), ..of(method, (base + more) * scale) });
+            data.rows.push(Row { metric: metric.to_owned(), samples: None, ..of(method, (base + more) * scale) });
         }
     }
     candidates(data, (material, probe), base);
