@@ -4,6 +4,7 @@ pub mod cluster;
 pub mod gate;
 pub mod journal;
 pub mod light;
+pub mod merl;
 pub mod netns;
 pub mod nodes;
 pub mod ordeal;

@@ -114,6 +114,7 @@ fn bad_usage_is_code_two_and_says_what_is_possible() {
         ("render --env g.hdr -o a.exr".into(), &["no material"]),
         ("render --env g.hdr -o a.exr --model ggx --params alpha=x".into(), &["alpha must be a number"]),
         ("worker".into(), &["--access <FILE>"]),
+        ("study no-such-study.toml --out study".into(), &["cannot read the study no-such-study.toml"]),
         ("demo --workers 0".into(), &["--workers 1 or more"]),
     ] {
         refused(&lookalike(&arguments), phrases);
@@ -126,7 +127,6 @@ fn what_is_not_there_yet_says_so_and_what_to_do() {
     for (arguments, phrases) in [
         ("check ball.exr --env garden.hdr".to_owned(), &["lookalike check is not there yet"][..]),
         ("export run --format materialx -o m.mtlx".into(), &["lookalike export is not there yet"]),
-        ("study study.toml --out study".into(), &["lookalike study is not there yet"]),
         ("report run".into(), &["lookalike report is not there yet"]),
         (format!("{fit} --exposure-gain rgb"), &["degenerate", "--anchor"]),
         (format!("{fit} --exposure-gain rgb --anchor f0=.04"), &["--anchor is not there yet"]),

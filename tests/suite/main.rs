@@ -28,4 +28,5 @@ mod recovery;
 mod render;
 mod resume;
 mod sim;
+mod study;
 mod tidy;

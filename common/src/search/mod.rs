@@ -3,6 +3,7 @@
 //! | module | minimises | where it comes from |
 //! |---|---|---|
 //! | [`pattern`] | any function, no derivatives | generalised pattern search, settings of MATLAB's `patternsearch` |
+//! | [`quasi_newton`] | a smooth function, no derivatives | BFGS projected onto the box, differences |
 //! | [`least_squares`] | a sum of squares with a Jacobian | Levenberg-Marquardt with the box inside the step |
 //! | [`bvls`] | a linear sum of squares | bounded-variable least squares, Stark & Parker 1995 |
 //! | [`multi_start`] | whatever one of the above does | the best few of many starts, equal minima merged |

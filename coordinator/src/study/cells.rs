@@ -136,11 +136,8 @@ impl Plan<'_> {
                 let method = Method { subsets: SUBSETS, ..self.method() };
                 self.fit(scene, MethodName::Subsets, method, |task| task);
             }
-            if models && Some(light) == repeat {
-                for name in self.study.file.models.clone() {
-                    let method = Method { model: brdf::model(&name)?, ..self.method() };
-                    self.fit(scene, MethodName::Ours, method, |task| task);
-                }
+            if models {
+                self.other_models(scene, Some(light) == repeat)?;
             }
             if has_agreement {
                 self.agreement(scene);
@@ -320,6 +317,19 @@ impl Plan<'_> {
                 }
             }
         }
+    }
+
+    /// The first of the other models everywhere, the rest under one light on a few materials.
+    fn other_models(&mut self, scene: Scene, is_repeated: bool) -> anyhow::Result<()> {
+        let is_repeated =
+            is_repeated && self.study.numbers(&self.study.file.repeat_materials).contains(&scene.material);
+        for (m, name) in self.study.file.models.clone().into_iter().enumerate() {
+            if m == 0 || is_repeated {
+                let method = Method { model: brdf::model(&name)?, ..self.method() };
+                self.fit(scene, MethodName::Ours, method, |task| task);
+            }
+        }
+        Ok(())
     }
 
     fn agreement(&mut self, scene: Scene) {

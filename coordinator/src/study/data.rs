@@ -143,6 +143,7 @@ impl Collector<'_> {
             size: cell.scene.size,
             searched_size: cell.scene.size,
             seed: self.inputs.study.file.seed,
+            gammas: 0,
             gamma: found.gamma,
             start: None,
             cost: found.cost,
@@ -151,6 +152,7 @@ impl Collector<'_> {
             cssim_object: Some(found.cssim_object),
             evaluations: found.evaluations as u64,
             cpu_seconds,
+            stage_two_seconds: None,
             parameters: named(model, &found.parameters),
         }
     }
@@ -167,6 +169,7 @@ impl Collector<'_> {
             sampling: format!("{:?}", task.method.sampling).to_lowercase(),
             clamped: task.is_clamped,
             subsets: task.method.subsets,
+            gammas: u32::try_from(task.method.gammas.len()).unwrap_or(u32::MAX),
             seed: task.method.seed,
             ..row
         };

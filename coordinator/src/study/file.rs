@@ -27,7 +27,8 @@ pub(super) struct StudyFile {
     /// The model of most experiments.
     #[serde(default = "default_model")]
     pub(super) model: String,
-    /// Models of the table of models, beside it.
+    /// Models of the table of models, beside it: the first of them on the six under all probes, the others on the materials and
+    /// under the light of the experiments that repeat.
     #[serde(default)]
     pub(super) models: Vec<String>,
     /// Columns and rows of the photos.

@@ -160,6 +160,8 @@ fn write_report(
         probes: names(&study.lights[..study.probes]),
         held_out: names(&study.lights[study.probes..]),
         size: study.file.size,
+        model: study.file.model.clone(),
+        seed: study.file.seed,
     };
     let data =
         StudyData { about, photos: data.photos, rows: data.rows, direct: data.direct, agreements: data.agreements };

@@ -30,6 +30,9 @@ pub(crate) struct Row {
     pub(crate) searched_size: u32,
     /// Seed of the subset.
     pub(crate) seed: u64,
+    /// How many exponents were tried; 0 where there are none.
+    #[serde(default)]
+    pub(crate) gammas: u32,
     /// The exponent: of the candidate, or of the winner.
     pub(crate) gamma: Option<f64>,
     /// Name of the start, where a method has several.
@@ -46,6 +49,9 @@ pub(crate) struct Row {
     pub(crate) evaluations: u64,
     /// Seconds of one core that it took to find the parameters, the tables that it needed included.
     pub(crate) cpu_seconds: f64,
+    /// Those of them that stage two took, its table included; none of a method without it.
+    #[serde(default)]
+    pub(crate) stage_two_seconds: Option<f64>,
     /// The parameters by their flat name: `kd.r`, `alpha`.
     pub(crate) parameters: BTreeMap<String, f64>,
 }
@@ -183,6 +189,12 @@ pub(crate) struct About {
     pub(crate) held_out: Vec<String>,
     /// Size of the grid.
     pub(crate) size: u32,
+    /// The model of the grid.
+    #[serde(default)]
+    pub(crate) model: String,
+    /// The seed of the grid.
+    #[serde(default)]
+    pub(crate) seed: u64,
 }
 
 /// All that a study has measured.

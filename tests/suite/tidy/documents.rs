@@ -6,7 +6,7 @@ use super::{
 };
 use std::{collections::BTreeSet, fs, process::Command};
 
-const DOCUMENTS: [&str; 13] = [
+const DOCUMENTS: [&str; 15] = [
     "README.md",
     "ARCHITECTURE.md",
     "CONTRIBUTING.md",
@@ -19,7 +19,9 @@ const DOCUMENTS: [&str; 13] = [
     "docs/overhead.md",
     "docs/progress.md",
     "docs/real-materials.md",
+    "docs/results.md",
     "docs/security.md",
+    "docs/study.md",
 ];
 const FOLDERS: [&str; 9] =
     ["common/", "coordinator/", "deploy/", "docs/", "fuzz/", "tests/", "worker/", ".ci/", "experiments/"];

@@ -1,4 +1,4 @@
-//! `polish`: stage three, a short pattern search on CSSIM from the winner.
+//! `polish`: stage three, a short search on CSSIM from the winner, or from what `explore` has found.
 
 use super::view::Scene;
 use crate::{

@@ -32,6 +32,8 @@ pub(super) fn row(method: Method, material: &str, probe: &str, cssim: f64) -> Ro
         cssim_object: Some(cssim * 2.0),
         evaluations: 400,
         cpu_seconds: 2.0,
+        gammas: 21,
+        stage_two_seconds: None,
         parameters: BTreeMap::new(),
     }
 }
@@ -56,6 +58,8 @@ pub(super) fn whole() -> StudyData {
 pub(super) fn empty() -> StudyData {
     let names = |names: &[&str]| names.iter().map(|&name| name.to_owned()).collect::<Vec<_>>();
     let about = About {
+        model: "ggx".to_owned(),
+        seed: 0,
         command: "lookalike study STUDY.toml --out study".to_owned(),
         version: "0.1.0".to_owned(),
         machine: "a processor, 2 cores".to_owned(),

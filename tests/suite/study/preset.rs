@@ -1,0 +1,53 @@
+//! The small preset gives the results that are written down in `preset.json`, whatever happened on the way.
+
+use super::scene::{PRESET, folder, results, study};
+use serde_json::Value;
+use std::{collections::BTreeSet, fs};
+
+/// What the preset gave. `LOOKALIKE_BLESS=1` writes it anew: look at the difference, and say in CHANGELOG.md why results changed.
+const EXPECTED: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/suite/study/preset.json");
+
+#[test]
+fn the_small_preset_gives_what_it_gave_and_a_finished_study_only_writes_its_report_again() {
+    let folder = folder(PRESET);
+    let answer = study(folder.path(), "--workers 2").done();
+    assert!(answer.stdout.trim_end().ends_with("report.html"), "{}", answer.stdout);
+    let found = results(folder.path());
+    if std::env::var_os("LOOKALIKE_BLESS").is_some() {
+        let lines: Vec<String> = found.iter().map(Value::to_string).collect();
+        fs::write(EXPECTED, format!("[\n{}\n]\n", lines.join(",\n"))).unwrap();
+    }
+    let expected: Vec<Value> = serde_json::from_str(&fs::read_to_string(EXPECTED).unwrap()).unwrap();
+    assert_eq!(found.len(), expected.len());
+    for (found, expected) in found.iter().zip(&expected) {
+        assert_eq!(found, expected, "the small preset gives another result: see LOOKALIKE_BLESS in this file");
+    }
+    // The methods that the table of results is to have.
+    let methods: BTreeSet<&str> = found.iter().filter_map(|row| row["method"].as_str()).collect();
+    let all = ["ours", "ours+polish", "paper", "l2", "brute", "lowres", "log", "cuberoot"];
+    assert_eq!(methods, all.into_iter().collect());
+    let score = |method: &str| {
+        let scores = found.iter().filter(|row| row["method"] == method && row["samples"] != 32 && row["samples"] != 64);
+        scores.filter_map(|row| row["cssim"].as_f64()).fold(f64::INFINITY, f64::min)
+    };
+    assert!(score("ours+polish") <= score("ours") && score("ours") <= score("l2"), "{found:?}");
+    assert!(score("ours+polish") <= score("brute") + 0.002, "{found:?}");
+
+    let report = |name: &str| fs::read(folder.path().join("out").join(name)).unwrap();
+    let before = (report("results.json"), report("seconds.tsv"));
+    for name in ["results.md", "report.html", "data.json"] {
+        fs::remove_file(folder.path().join("out").join(name)).unwrap();
+    }
+    study(folder.path(), "--workers 1 --resume").done();
+    assert_eq!((report("results.json"), report("seconds.tsv")), before);
+    assert!(!report("results.md").is_empty() && !report("report.html").is_empty());
+
+    // A cell that is lost is computed again, and nothing else.
+    let lost = folder.path().join("out/cells/paint-room-32-lowres16.json");
+    let record = fs::read(&lost).unwrap();
+    fs::remove_file(&lost).unwrap();
+    study(folder.path(), "--workers 1 --resume").done();
+    assert_eq!(results(folder.path()), found);
+    let content = |bytes: &[u8]| serde_json::from_slice::<Value>(bytes).unwrap()["content"].clone();
+    assert_eq!(content(&fs::read(&lost).unwrap()), content(&record));
+}
