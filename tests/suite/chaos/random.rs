@@ -12,7 +12,7 @@ use tempfile::TempDir;
 
 use crate::fit::scene::{fit, folder_of_size, without_timing};
 
-/// Four shards, eleven searches, full tables, judging, polish, pictures.
+/// Four shards, the coarse table, eleven searches, full tables, judging, exploration, polish, pictures.
 const FLAGS: &str = "--samples 128 --gammas 1:3:0.2 --seed 5";
 
 /// The files of results that are the same from run to run.

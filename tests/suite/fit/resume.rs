@@ -7,7 +7,7 @@ use lookalike_tests::{journal::JournalView, process::Process};
 use serde_json::Value;
 use std::{fs, path::Path, process::Command};
 
-/// Four shards, six searches, one full table, judging, polish, pictures: at least 14 nodes.
+/// Four shards, the coarse table, six searches, one full table, judging, exploration, polish, pictures: at least 16 nodes.
 const FLAGS: &str = "--samples 128 --gammas 1:2:0.2 --seed 5 --workers 2";
 
 /// Starts a fit and kills it with SIGKILL as soon as so many nodes are told to be finished; 0 is when the first worker joins.

@@ -35,17 +35,28 @@ pub(super) fn room() -> Environment {
 
 /// A photo of a material in the room: its rendering, each pixel multiplied by 1 + `noise` times a number in \[-1, 1\].
 pub(super) fn capture(name: &str, parameters: &[f64], noise: f64) -> Arc<Capture> {
-    let geometry = Geometry::sphere(SIZE, SIZE, Circle::inscribed(SIZE, SIZE), Camera::Orthographic).unwrap();
+    capture_of(name, parameters, noise, (SIZE, SIZE), Circle::inscribed(SIZE, SIZE))
+}
+
+/// As [`capture`], of a photo of other columns and rows with the sphere in this circle.
+pub(super) fn capture_of(
+    name: &str,
+    parameters: &[f64],
+    noise: f64,
+    (columns, rows): (usize, usize),
+    circle: Circle,
+) -> Arc<Capture> {
+    let geometry = Geometry::sphere(columns, rows, circle, Camera::Orthographic).unwrap();
     let model: &'static dyn Model = model(name).unwrap();
-    let places = (0..SIZE * SIZE).map(|i| [i % SIZE, i / SIZE]);
+    let places = (0..columns * rows).map(|i| [i % columns, i / columns]);
     let coverage: Vec<f32> = places.clone().map(|[c, r]| geometry.coverage(c, r)).collect();
     let pixels: Vec<Pixel> = places.map(|place| place.map(|x| u32::try_from(x).unwrap())).collect();
     let width = model.lobes().iter().find_map(|basis| basis.width_at(parameters)).unwrap();
     let knots = Knots::covering(width / 1.3, width * 1.3, PER_OCTAVE);
     let plan = TransportPlan { model, knots, accuracy: Accuracy::FULL };
     let table = plan.integrate(&geometry, &LightPyramid::new(room()), &pixels);
-    let view =
-        FullView { model, table: &table, pixels: &pixels, coverage: &coverage, stride: 1, width: SIZE, height: SIZE };
+    let (width, height) = (columns, rows);
+    let view = FullView { model, table: &table, pixels: &pixels, coverage: &coverage, stride: 1, width, height };
     let mut photo = view.render(parameters);
     for (i, pixel) in photo.pixels_mut().iter_mut().enumerate() {
         for (c, value) in pixel.iter_mut().enumerate() {

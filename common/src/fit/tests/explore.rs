@@ -1,0 +1,85 @@
+//! Where stage three starts: on coarse pictures, and without one where it would show nothing.
+
+use super::scene::{Bench, capture_of, method};
+use crate::{
+    fit::{
+        FitOutcome, FitPlanner, Method,
+        wire::{PolishedWire, read, write},
+    },
+    graph::{Blob, NodeSpec},
+    scene::Circle,
+};
+use std::cell::RefCell;
+
+const MATERIAL: [f64; 7] = [0.3, 0.2, 0.1, 0.05, 0.05, 0.05, 0.2];
+
+fn quick() -> Method {
+    Method { gammas: vec![2.0], ..method("ggx") }
+}
+
+/// The outcome of a fit of a sphere in a photo, and the kinds of its nodes in order.
+fn fit(size: (usize, usize), circle: Circle, change: impl Fn(&NodeSpec, Blob) -> Blob) -> (FitOutcome, Vec<String>) {
+    let photo = capture_of("ggx", &MATERIAL, 0.05, size, circle);
+    let planner = FitPlanner::new(photo, quick(), 1.0).unwrap();
+    let kinds = RefCell::new(Vec::new());
+    let noted = |spec: &NodeSpec, output: Blob| {
+        kinds.borrow_mut().push(spec.kind.clone());
+        change(spec, output)
+    };
+    let outcome = Bench::default().run(planner, |_| 0, noted).unwrap().into_outcome().unwrap();
+    (outcome, kinds.into_inner())
+}
+
+#[test]
+fn a_large_object_is_explored_on_every_second_pixel_and_polish_ends_no_worse_than_the_winner() {
+    let circle = Circle { x: 103.5, y: 99.0, radius: 97.0 };
+    let (outcome, kinds) = fit((207, 199), circle, |_, output| output);
+    assert!(kinds.contains(&"explore".to_owned()) && outcome.explored > 50, "{kinds:?} {}", outcome.explored);
+    let (winner, polished) = (outcome.judged[outcome.winner].cssim, outcome.polished.unwrap());
+    assert!(polished.cssim <= winner, "{winner} {polished:?}");
+}
+
+#[test]
+fn an_object_that_a_coarse_picture_would_not_show_is_polished_from_the_winner() {
+    // Too few pixels; and at the edge, where no window of the metric is centred on it.
+    for circle in [Circle { x: 30.0, y: 30.0, radius: 6.0 }, Circle { x: 3.0, y: 40.0, radius: 15.0 }] {
+        let (outcome, kinds) = fit((60, 60), circle, |_, output| output);
+        let is_seen = kinds.contains(&"explore".to_owned());
+        assert_eq!(is_seen, outcome.explored > 0);
+        let (winner, polished) = (outcome.judged[outcome.winner].cssim, outcome.polished.unwrap());
+        assert!(polished.cssim <= winner, "{winner} {polished:?}");
+        if circle.radius < 10.0 {
+            assert!(!is_seen, "{kinds:?}");
+        }
+    }
+}
+
+#[test]
+fn a_find_that_leads_nowhere_sends_polish_back_to_the_winner() {
+    let model = method("ggx").model;
+    let rounds = RefCell::new(Vec::new());
+    // What exploration finds is a lobe far from the winner's, and polish there ends worse than the winner.
+    let astray = |spec: &NodeSpec, output: Blob| {
+        let changed = |change: &dyn Fn(&mut crate::fit::Polished)| {
+            let mut polished = read::<PolishedWire>("polish", &output).unwrap().polished(model).unwrap();
+            change(&mut polished);
+            Blob::new(write("polish", &PolishedWire::of(polished)).unwrap())
+        };
+        match spec.kind.as_str() {
+            "explore" => changed(&|found| found.parameters = vec![0.0, 0.0, 0.0, 0.9, 0.9, 0.9, 0.02]),
+            "polish" => {
+                rounds.borrow_mut().push(spec.inputs.clone());
+                if rounds.borrow().len() > 1 {
+                    return output;
+                }
+                changed(&|polished| (polished.cssim, polished.at_table_edge) = (0.9, false))
+            }
+            _ => output,
+        }
+    };
+    let (outcome, kinds) = fit((24, 24), Circle::inscribed(24, 24), astray);
+    let (winner, polished) = (outcome.judged[outcome.winner].cssim, outcome.polished.unwrap());
+    assert_eq!(rounds.borrow().len(), 2, "{kinds:?}");
+    assert_ne!(rounds.borrow()[0], rounds.borrow()[1], "the second round is on the table of stage two");
+    assert!(polished.cssim <= winner, "{winner} {polished:?}");
+}
