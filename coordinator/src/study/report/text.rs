@@ -66,7 +66,9 @@ pub(super) const fn minimised(method: Method) -> &'static str {
         | Method::L2
         | Method::Log
         | Method::CubeRoot => "Eq. 1",
-        Method::OursPolished | Method::SubsetsPolished | Method::Brute | Method::LowRes | Method::BruteDirect => "CSSIM",
+        Method::OursPolished | Method::SubsetsPolished | Method::Brute | Method::LowRes | Method::BruteDirect => {
+            "CSSIM"
+        }
     }
 }
 

@@ -136,7 +136,9 @@ mod tests {
     #[test]
     fn the_sign_test_is_the_exact_binomial() {
         let p = |wins: usize, losses: usize| sign_test(&[vec![1.0; wins], vec![-1.0; losses], vec![0.0; 3]].concat());
-        for (wins, losses, expected) in [(5, 0, 2.0 / 32.0), (0, 5, 2.0 / 32.0), (4, 1, 12.0 / 32.0), (9, 1, 22.0 / 1024.0)] {
+        for (wins, losses, expected) in
+            [(5, 0, 2.0 / 32.0), (0, 5, 2.0 / 32.0), (4, 1, 12.0 / 32.0), (9, 1, 22.0 / 1024.0)]
+        {
             assert!((p(wins, losses) - expected).abs() < 1e-12, "{wins} {losses}: {}", p(wins, losses));
         }
         assert_eq!([p(0, 0), p(2, 2)], [1.0, 1.0]);

@@ -85,8 +85,7 @@ fn more(study: &Study<'_>, section: &mut Section) {
         .filter_map(|cell| methods.iter().map(|method| study.grid(*method, cell)).collect())
         .collect();
     if !methods.contains(&Method::Subsets) || cells.is_empty() {
-        let needs =
-            "More candidates: not in this study: STUDY.toml needs the experiments \"subsets\" and \"methods\".";
+        let needs = "More candidates: not in this study: STUDY.toml needs the experiments \"subsets\" and \"methods\".";
         return section.blocks.push(Block::Missing(needs.to_owned()));
     }
     let caption = format!(

@@ -90,7 +90,8 @@ fn judged(deviations: &[Vec<(Option<f64>, Option<f64>)>; 2]) -> (Verdict, String
     };
     // Less spread, yet most of it still there; of both.
     let remains = gamma.zip(clamped_gamma).map(|(free, clamped)| clamped >= REMAINS * free);
-    let remains = remains.zip(score.zip(clamped_score)).map(|(gamma, (free, clamped))| gamma && clamped >= REMAINS * free);
+    let remains =
+        remains.zip(score.zip(clamped_score)).map(|(gamma, (free, clamped))| gamma && clamped >= REMAINS * free);
     let holds = holds.zip(remains).map(|(less, remains)| less && remains);
     let words = format!(
         "Clamping takes the spread over seeds of the winning γ from {} to {} ({} %) and that of CSSIM from {} to {} ({} %; mean \

@@ -194,7 +194,9 @@ fn left_out(study: &Study<'_>) -> Option<String> {
     };
     let (full, drawn) = (gammas(None)?, gammas(study.samples)?);
     (full < drawn).then(|| {
-        format!("All pixels are left out: they were tried with {full} exponents, samples with {drawn}, which costs more.")
+        format!(
+            "All pixels are left out: they were tried with {full} exponents, samples with {drawn}, which costs more."
+        )
     })
 }
 

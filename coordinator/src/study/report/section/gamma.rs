@@ -53,7 +53,9 @@ pub(super) fn section(study: &Study<'_>) -> anyhow::Result<Section> {
         section.figure(&caption, svg, csv);
     }
     if minima.is_empty() {
-        return Ok(section.missing("the experiment \"methods\" or \"gamma\", and one of the first three of the six materials"));
+        return Ok(
+            section.missing("the experiment \"methods\" or \"gamma\", and one of the first three of the six materials")
+        );
     }
     let csv = table.csv("fig2-minima");
     section.blocks.extend([Block::Table(table), Block::Data(csv)]);

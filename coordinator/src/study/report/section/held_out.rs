@@ -102,7 +102,8 @@ pub(super) fn claim(study: &Study<'_>, method: Method) -> (Verdict, String) {
 
 /// Whether polish on the fitting light helps under another, and the numbers.
 fn polish(cases: &[Case<'_>]) -> Option<(Verdict, String)> {
-    let margins: Vec<f64> = cases.iter().filter_map(|(_, _, [_, ours, polished])| Some((*ours)? - (*polished)?)).collect();
+    let margins: Vec<f64> =
+        cases.iter().filter_map(|(_, _, [_, ours, polished])| Some((*ours)? - (*polished)?)).collect();
     let mean = mean(&margins)?;
     let wins = margins.iter().filter(|margin| **margin > 0.0).count();
     let verb = if mean > 0.0 { "helps" } else { "hurts" };

@@ -70,8 +70,7 @@ fn matches(study: &Study<'_>, image: u32) -> (Vec<[String; 8]>, Vec<Series>) {
     let seconds = |found: &Match<'_>| found.cpu_seconds;
     let mut rows: Vec<_> = ours.iter().map(|(cell, found)| line(*cell, &name, found, Some(seconds(found)))).collect();
     let points = ours.iter().map(|(_, found)| (seconds(found), found.cssim)).collect();
-    let mut series =
-        vec![Series { name, colour: method_colour(Method::Ours), points, joined: false, minimum: false }];
+    let mut series = vec![Series { name, colour: method_colour(Method::Ours), points, joined: false, minimum: false }];
     for (i, size) in sizes(study, image).into_iter().enumerate() {
         let found: Vec<_> = cells.iter().filter_map(|cell| Some((*cell, low(study, *cell, image, size)?))).collect();
         rows.extend(
@@ -119,8 +118,7 @@ fn claim_at(study: &Study<'_>, image: u32) -> (Verdict, String) {
 fn images(study: &Study<'_>) -> Vec<u32> {
     let rows = study.data.rows.iter().filter(|row| row.method == Method::LowRes);
     let images: BTreeSet<u32> = rows.map(|row| row.size).collect();
-    let measured =
-        |image: &u32| sizes(study, *image).into_iter().any(|size| !pairs(study, *image, size).is_empty());
+    let measured = |image: &u32| sizes(study, *image).into_iter().any(|size| !pairs(study, *image, size).is_empty());
     let mut images: Vec<u32> = images.into_iter().filter(measured).collect();
     images.sort_by_key(|image| *image != study.size());
     images

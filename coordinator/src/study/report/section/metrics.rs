@@ -26,7 +26,8 @@ pub(super) fn section(study: &Study<'_>) -> anyhow::Result<Section> {
     let named = named(study);
     let cells: Vec<(String, Vec<Cell<'_>>)> =
         named.into_iter().map(|name| (name.to_owned(), complete(study, name, study.size()))).collect();
-    let Some(most) = cells.iter().map(|(_, cells)| cells).max_by_key(|cells| cells.len()).filter(|most| !most.is_empty())
+    let Some(most) =
+        cells.iter().map(|(_, cells)| cells).max_by_key(|cells| cells.len()).filter(|most| !most.is_empty())
     else {
         section = section.missing("the experiment \"methods\", on a grid of 44 pixels at least");
         sizes(study, &mut section);
@@ -38,7 +39,8 @@ pub(super) fn section(study: &Study<'_>) -> anyhow::Result<Section> {
     variants.extend(same.iter().map(|(name, _)| variant(study, name, most, study.size())));
     let methods: Vec<usize> =
         (0..METHODS.len()).filter(|i| variants.iter().all(|variant| variant.means[*i].is_some())).collect();
-    let (table, orders) = table(&methods, &variants, "Mean score over the cells that every metric has; the best in bold.");
+    let (table, orders) =
+        table(&methods, &variants, "Mean score over the cells that every metric has; the best in bold.");
     let csv = table.csv("metrics");
     section.blocks.extend([Block::Table(table), Block::Data(csv)]);
     let fewer: Vec<Variant> = fewer
@@ -192,11 +194,14 @@ fn nearest(study: &Study<'_>, section: &mut Section) {
 }
 
 /// The number of cells, and their mean under each light.
-fn by_light(study: &Study<'_>, (metric, method, model): Rival<'_>, lights: &[(&str, f64)]) -> (usize, Vec<Option<f64>>) {
+fn by_light(
+    study: &Study<'_>,
+    (metric, method, model): Rival<'_>,
+    lights: &[(&str, f64)],
+) -> (usize, Vec<Option<f64>>) {
     let of = |probe: &str| -> Vec<f64> {
         let cells = study.six().into_iter().filter(|cell| cell.1 == probe);
-        let score =
-            |cell| Some(study.find(&Pick { metric, model: Some(model), ..study.pick(method, cell) })?.cssim);
+        let score = |cell| Some(study.find(&Pick { metric, model: Some(model), ..study.pick(method, cell) })?.cssim);
         cells.filter_map(score).collect()
     };
     let scores: Vec<Vec<f64>> = lights.iter().map(|(probe, _)| of(probe)).collect();

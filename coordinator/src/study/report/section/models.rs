@@ -2,7 +2,7 @@
 
 use crate::study::{
     report::{
-        document::{Block, Section, Table},
+        document::{Block, Entry, Section, Table},
         statistics::mean,
         study::{Pick, Study},
         text,
@@ -56,6 +56,10 @@ pub(super) fn section(study: &Study<'_>) -> anyhow::Result<Section> {
         Verdict::Measured,
         format!("Lowest CSSIM, of the cells that a model has beside another: {}.", wins.join(", ")),
     );
+    if let Some(table) = cells(study) {
+        let csv = table.csv("models-cells");
+        section.blocks.extend([Block::Table(table), Block::Data(csv)]);
+    }
     let (verdict, words) = claim(study);
     section.finding(verdict, words);
     Ok(section)
@@ -79,25 +83,39 @@ fn best(scores: &[Option<f64>]) -> Option<usize> {
     there.min_by(|a, b| a.1.total_cmp(&b.1)).map(|best| best.0)
 }
 
-/// CSSIM of the study's model polished, and of the paper's, in the cells that have both.
-type Pairs = Vec<(f64, f64)>;
+/// CSSIM of the study's model with polish, and of the paper's, in the cells that have both.
+type Pairs<'a> = Vec<((&'a str, &'a str), f64, f64)>;
+
+/// The paper's model by a method beside the study's with polish, in some cells.
+fn pairs<'a>(study: &Study<'a>, cells: Vec<(&'a str, &'a str)>, rival: Method) -> Pairs<'a> {
+    let score = |method, model, cell| Some(study.find(&Pick { model: Some(model), ..study.pick(method, cell) })?.cssim);
+    let pair = |cell| Some((cell, score(Method::OursPolished, &study.model, cell)?, score(rival, PAPER, cell)?));
+    cells.into_iter().filter_map(pair).collect()
+}
+
+/// Both models cell by cell.
+fn cells(study: &Study<'_>) -> Option<Table> {
+    let pairs = pairs(study, study.six(), Method::OursPolished);
+    let model = study.model.as_str();
+    let caption = format!(
+        "CSSIM of ours + polish with {model} and with {PAPER}, the better in bold; a positive difference: {model} is worse."
+    );
+    let mut table = Table::new(&caption, 2, ["material", "light", model, PAPER, "difference"]);
+    for ((material, probe), ours, rival) in &pairs {
+        table.scores([*material, text::light(probe)], &[Some(*ours), Some(*rival)]);
+        table.rows.last_mut()?.push(Entry::of(text::signed(Some(ours - rival))));
+    }
+    (model != PAPER && !pairs.is_empty()).then_some(table)
+}
 
 /// Whether the study's model is the better one, as [BP20a] holds of GGX against Cook-Torrance, and the numbers.
 pub(super) fn claim(study: &Study<'_>) -> (Verdict, String) {
     if study.model == PAPER {
         return (Verdict::NotDecided, format!("{PAPER} is the model of this study."));
     }
-    let score = |pick: &Pick<'_>| Some(study.find(pick)?.cssim);
-    let both = |cells: Vec<(&str, &str)>, rival: Method| -> Pairs {
-        let pair = |cell: (&str, &str)| {
-            let ours = Pick { model: Some(&study.model), ..study.pick(Method::OursPolished, cell) };
-            Some((score(&ours)?, score(&Pick { model: Some(PAPER), ..study.pick(rival, cell) })?))
-        };
-        cells.into_iter().filter_map(pair).collect()
-    };
-    let polished = both(study.six(), Method::OursPolished);
-    let paper = both(study.cells(), Method::Paper);
-    let margins = |pairs: &Pairs| pairs.iter().map(|(ours, rival)| rival - ours).collect::<Vec<f64>>();
+    let polished = pairs(study, study.six(), Method::OursPolished);
+    let paper = pairs(study, study.cells(), Method::Paper);
+    let margins = |pairs: &Pairs<'_>| pairs.iter().map(|(_, ours, rival)| rival - ours).collect::<Vec<f64>>();
     let (rival, all) = (margins(&polished), margins(&paper));
     let parts: Vec<String> = [
         compared(study, &polished, "both with polish, on the six materials"),
@@ -119,18 +137,23 @@ pub(super) fn claim(study: &Study<'_>) -> (Verdict, String) {
     (verdict::paired(judged), words)
 }
 
-/// Which of the two models wins and by how much, said plainly; none where no cell has both.
-fn compared(study: &Study<'_>, pairs: &Pairs, how: &str) -> Option<String> {
-    let ours = mean(&pairs.iter().map(|pair| pair.0).collect::<Vec<_>>())?;
-    let rival = mean(&pairs.iter().map(|pair| pair.1).collect::<Vec<_>>())?;
-    let wins = pairs.iter().filter(|(ours, rival)| ours < rival).count();
+/// Which of the two models wins, by how much and where most, said plainly; none where no cell has both.
+fn compared(study: &Study<'_>, pairs: &Pairs<'_>, how: &str) -> Option<String> {
+    let ours = mean(&pairs.iter().map(|pair| pair.1).collect::<Vec<_>>())?;
+    let rival = mean(&pairs.iter().map(|pair| pair.2).collect::<Vec<_>>())?;
+    let wins = pairs.iter().filter(|(_, ours, rival)| ours < rival).count();
+    let (cell, worst_ours, worst_rival) = pairs.iter().max_by(|a, b| (a.1 - a.2).total_cmp(&(b.1 - b.2)))?;
     let verb = if ours > rival { "loses to" } else { "beats" };
     Some(format!(
-        "The default model {} {verb} {PAPER} by {} in mean CSSIM ({} against {}; {how}): it is the better one in {} cells.",
+        "The default model {} {verb} {PAPER} by {} in mean CSSIM ({} against {}; {how}): it is the better one in {} cells, and \
+         does worst against it at {} ({} against {}).",
         study.model,
         text::score(Some((rival - ours).abs())),
         text::score(Some(ours)),
         text::score(Some(rival)),
-        text::share(wins, pairs.len())
+        text::share(wins, pairs.len()),
+        text::cell(cell.0, cell.1),
+        text::score(Some(*worst_ours)),
+        text::score(Some(*worst_rival))
     ))
 }

@@ -6,8 +6,7 @@ use crate::study::{
         document::{Block, Section, Table},
         statistics::mean,
         study::{Pick, Study},
-        text,
-        verdict,
+        text, verdict,
     },
     row::Method,
 };

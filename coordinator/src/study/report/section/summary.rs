@@ -87,8 +87,7 @@ fn fitting(study: &Study<'_>) -> (Verdict, String) {
 fn worse(study: &Study<'_>, section: &mut Section) {
     let pairs = study.pairs(Method::OursPolished, Method::Brute);
     if pairs.is_empty() {
-        let needs =
-            "Against brute force: not in this study: STUDY.toml needs the experiment \"methods\".";
+        let needs = "Against brute force: not in this study: STUDY.toml needs the experiment \"methods\".";
         return section.blocks.push(Block::Missing(needs.to_owned()));
     }
     let losing: Vec<_> = pairs.iter().filter(|(_, ours, brute)| ours - brute > CELL_SLACK).collect();

@@ -35,7 +35,8 @@ pub(super) fn section(study: &Study<'_>) -> anyhow::Result<Section> {
     if lights.is_empty() {
         return Ok(section.missing("the experiment \"samples\", and the materials of the six"));
     }
-    let gammas: BTreeSet<u32> = study.six().into_iter().filter_map(|cell| restricted(study, cell)).map(|pair| pair.gammas).collect();
+    let gammas: BTreeSet<u32> =
+        study.six().into_iter().filter_map(|cell| restricted(study, cell)).map(|pair| pair.gammas).collect();
     let gammas: Vec<String> = gammas.into_iter().map(|gammas| gammas.to_string()).collect();
     let of_full = (!gammas.is_empty()).then(|| OF_FULL.to_owned());
     let mut caption =

@@ -52,8 +52,11 @@ pub(super) fn section(study: &Study<'_>) -> anyhow::Result<Section> {
             text::fixed(mean(trends), 2)
         )
     };
-    let words =
-        format!("The width of the lobe {} (the paper: low γ sharp, high γ blurry); {}.", signs(&trends[0]), verdict::rule(&trends[0]));
+    let words = format!(
+        "The width of the lobe {} (the paper: low γ sharp, high γ blurry); {}.",
+        signs(&trends[0]),
+        verdict::rule(&trends[0])
+    );
     section
         .finding(verdict::paired(&trends[0]), words.replace("margin", "correlation").replace("comparisons", "cells"));
     section.finding(Verdict::Measured, format!("The mean diffuse albedo {}.", signs(&trends[1])));
