@@ -51,9 +51,9 @@ pub(super) fn significant(number: Option<f64>) -> String {
     format!("{number:.decimals$}")
 }
 
-/// A probability; of the least, only that they are below what four decimals show.
+/// A probability; of one that is nearly 0, only that it is below what four decimals show.
 pub(super) fn probability(p: f64) -> String {
-    if p < 1e-4 { "below 0.0001".to_owned() } else { significant(Some(p)) }
+    if p < 1e-4 { "p < 0.0001".to_owned() } else { format!("p = {}", significant(Some(p))) }
 }
 
 /// What the evaluations of a method are of.

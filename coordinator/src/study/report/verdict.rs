@@ -53,7 +53,7 @@ const CHANCE: f64 = 0.1;
 /// The rule of [`paired`] in words, after the numbers that it goes by.
 pub(super) fn rule(margins: &[f64]) -> String {
     format!(
-        "n = {}, sign test p = {}; confirmed if the mean margin is positive, two thirds of at least {FEWEST} comparisons are, and \
+        "n = {}, sign test {}; confirmed if the mean margin is positive, two thirds of at least {FEWEST} comparisons are, and \
          p (two-sided) is below {CHANCE}; refuted if so of negative ones; else not decided",
         margins.len(),
         text::probability(sign_test(margins))

@@ -108,7 +108,7 @@ fn polish(cases: &[Case<'_>]) -> Option<(Verdict, String)> {
     let wins = margins.iter().filter(|margin| **margin > 0.0).count();
     let verb = if mean > 0.0 { "helps" } else { "hurts" };
     let words = format!(
-        "Polish on the fitting light {verb} under held-out lights: CSSIM falls by {} in the mean, and falls in {} cases; that \
+        "Polish on the fitting light {verb} under held-out lights: it lowers CSSIM by {} in the mean, and in {} cases; that \
          it helps is judged so: {}.",
         text::signed(Some(mean)),
         text::share(wins, margins.len()),
