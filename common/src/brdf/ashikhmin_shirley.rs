@@ -121,7 +121,7 @@ impl Model for AshikhminShirley {
     }
 }
 
-/// The /// The diffuse lobe of unit weight; its albedo is `1 - (1 - n.v/2)^5`.
+/// The diffuse lobe of unit weight; its albedo is `1 - (1 - n.v/2)^5`.
 #[derive(Debug, Clone, Copy)]
 struct DiffuseLobe;
 

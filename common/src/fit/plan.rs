@@ -490,9 +490,9 @@ impl Planner for FitPlanner {
         }
     }
 
-    /// What a search claims is computed again here; of a table only the shape can be seen.
+    /// What a search claims is computed again here; of everything else only the shape can be seen.
     fn is_verified_by_repetition(&self, spec: &NodeSpec) -> bool {
-        spec.kind == nodes::TRANSPORT
+        spec.kind != nodes::SEARCH
     }
 }
 

@@ -248,7 +248,7 @@ impl PolishedWire {
     }
 }
 
-fn check_parameters(what: &str, model: &dyn Model, parameters: &[f64]) -> Result<(), NodeFailure> {
+pub(super) fn check_parameters(what: &str, model: &dyn Model, parameters: &[f64]) -> Result<(), NodeFailure> {
     let (lower, upper) = flat_bounds(model.parameters());
     let inside = parameters.iter().zip(lower.iter().zip(&upper)).all(|(p, (l, u))| (l..=u).contains(&p));
     if parameters.len() != lower.len() || !inside {

@@ -8,7 +8,7 @@
 //! | [`bvls`] | a linear sum of squares | bounded-variable least squares, Stark & Parker 1995 |
 //! | [`multi_start`] | whatever one of the above does | the best few of many starts, equal minima merged |
 //!
-//! Everything is `f64` in a fixed order on one thread: equal inputs give equal bits. Every search counts the calls of
+//! Everything is `f64` in a fixed order, on one thread or with its values collected in order: equal inputs give equal bits. Every search counts the calls of
 //! its objective, can be watched and stopped ([`Progress`]), and says why it ended ([`Termination`]). A search never
 //! returns a point outside its box, nor one worse than its start. An objective that is not finite at the start is an
 //! error; elsewhere it is a rejected point.

@@ -3,7 +3,7 @@
 //! BFGS (Nocedal & Wright, *Numerical Optimization*, 2nd ed. 2006, section 6.1) on the free coordinates, in the box's scaled
 //! coordinates, in which a step of the same length means about as much in every parameter. A coordinate at a bound is not free while the
 //! function falls towards the outside (Bertsekas, *Projected Newton Methods*, SIAM J. Control Optim. 20(2), 1982). Steps are
-//! projected onto the box and halved until they decrease the function enough (Armijo). Derivatives are one-sided differences, whose
+//! projected onto the box and shortened, along a parabola, until they decrease the function enough (Armijo). Derivatives are one-sided differences, whose
 //! values may be computed at the same time; once nothing decreases along them any more, they are central ones.
 //!
 //! It takes a few iterations of one evaluation per parameter each, where a pattern search creeps along the narrow valleys that

@@ -71,7 +71,10 @@ impl FitRecord<'_> {
         let polished = self.outcome.polished.as_ref().map(|p| {
             let mut entry = score(p.cssim, p.cssim_object);
             merge(&mut entry, json!({ "parameters": parameters_json(model, &p.parameters) }));
-            merge(&mut entry, json!({ "evaluations": p.evaluations, "termination": p.termination.name() }));
+            let explored = self.outcome.explored;
+            let rest =
+                json!({ "evaluations": p.evaluations, "explored": explored, "termination": p.termination.name() });
+            merge(&mut entry, rest);
             entry
         });
         let counts = self.capture.counts();

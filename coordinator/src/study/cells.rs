@@ -4,6 +4,7 @@ use super::{
     file::{Experiment, Study},
     row::Method as MethodName,
 };
+use anyhow::bail;
 use lookalike::fit::{Compress, Method, SearchKind, Start};
 use lookalike::render::subset::{SampleCount, Sampling};
 use lookalike::{brdf, brdf::Model};
@@ -80,8 +81,12 @@ pub(super) struct FitTask {
 
 /// All cells, each after those that it needs.
 pub(super) fn plan(study: &Study) -> anyhow::Result<Vec<Cell>> {
-    let mut plan = Plan { study, model: brdf::model(&study.file.model)?, cells: Vec::new(), known: BTreeMap::new() };
+    let mut plan =
+        Plan { study, model: brdf::model(&study.file.model)?, cells: Vec::new(), known: BTreeMap::new(), clash: None };
     plan.everything()?;
+    if let Some(name) = plan.clash {
+        bail!("two cells of the study would be called {name:?}: rename a material or a light");
+    }
     Ok(plan.cells)
 }
 
@@ -90,6 +95,8 @@ struct Plan<'a> {
     model: &'static dyn Model,
     cells: Vec<Cell>,
     known: BTreeMap<String, CellId>,
+    /// A name that two different cells would have.
+    clash: Option<String>,
 }
 
 impl Plan<'_> {
@@ -136,8 +143,8 @@ impl Plan<'_> {
                 let method = Method { subsets: SUBSETS, ..self.method() };
                 self.fit(scene, MethodName::Subsets, method, |task| task);
             }
-            if models {
-                self.other_models(scene, Some(light) == repeat)?;
+            if models && Some(light) == repeat {
+                self.other_models(scene)?;
             }
             if has_agreement {
                 self.agreement(scene);
@@ -163,6 +170,10 @@ impl Plan<'_> {
     /// The number of the cell of this name, which is made if it is not there.
     fn cell(&mut self, name: String, scene: Scene, task: Task, needs: Vec<CellId>) -> CellId {
         if let Some(&known) = self.known.get(&name) {
+            // Names are made of those of material and light: "a" under "b-c" and "a-b" under "c" would be one.
+            if self.cells[known].scene != scene && !matches!(task, Task::Table) {
+                self.clash.get_or_insert(name);
+            }
             return known;
         }
         self.known.insert(name.clone(), self.cells.len());
@@ -319,10 +330,9 @@ impl Plan<'_> {
         }
     }
 
-    /// The first of the other models everywhere, the rest under one light on a few materials.
-    fn other_models(&mut self, scene: Scene, is_repeated: bool) -> anyhow::Result<()> {
-        let is_repeated =
-            is_repeated && self.study.numbers(&self.study.file.repeat_materials).contains(&scene.material);
+    /// The first of the other models on every material, the rest on a few.
+    fn other_models(&mut self, scene: Scene) -> anyhow::Result<()> {
+        let is_repeated = self.study.numbers(&self.study.file.repeat_materials).contains(&scene.material);
         for (m, name) in self.study.file.models.clone().into_iter().enumerate() {
             if m == 0 || is_repeated {
                 let method = Method { model: brdf::model(&name)?, ..self.method() };
@@ -351,17 +361,11 @@ impl Plan<'_> {
         }
     }
 
-    /// What an evaluation costs without tables, per light and at the large size; and brute force without them, on a small photo.
+    /// What an evaluation costs without tables, per light; and brute force without them, on a small photo.
     fn direct(&mut self) {
-        let (size, large) = (self.study.file.size, self.study.file.large);
+        let size = self.study.file.size;
         let first = self.study.numbers(&self.study.file.six).first().copied().unwrap_or(0);
-        let mut scenes: Vec<Scene> =
-            (0..self.study.probes).map(|light| Scene { material: first, light, size }).collect();
-        for [material, light] in &self.study.file.large_cells {
-            let material = self.study.numbers(std::slice::from_ref(material)).first().copied();
-            let scene = material.zip(self.study.light(light));
-            scenes.extend(scene.map(|(material, light)| Scene { material, light, size: large }));
-        }
+        let scenes: Vec<Scene> = (0..self.study.probes).map(|light| Scene { material: first, light, size }).collect();
         let samples = self.study.file.direct_samples;
         for scene in scenes {
             let of = self.main(scene);

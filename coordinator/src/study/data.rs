@@ -9,6 +9,7 @@ use super::{
     supply::Inputs,
     variants,
 };
+use anyhow::Context;
 use lookalike::{
     brdf::{self, flat_names},
     fit::Method,
@@ -53,9 +54,12 @@ impl Collector<'_> {
             (Task::Fit(task), Content::Fit { .. }) => self.fit(cell, task, record),
             (Task::Brute { starts, direct }, Content::Survey { minima, .. }) => {
                 let method = if direct.is_some() { MethodName::BruteDirect } else { MethodName::Brute };
+                // All starts read one table.
+                let table = self.seconds.sum(&record.labels, |node| node.starts_with("transport "));
                 for (s, ((name, _), minimum)) in starts.iter().zip(minima).enumerate() {
                     let label = format!("brute-force from start {s}");
-                    let cost = self.seconds.sum(&record.labels, |node| node == label);
+                    let search = self.seconds.sum(&record.labels, |node| node == label);
+                    let cost = search + table / starts.len() as f64;
                     let row = self.row(cell, &self.inputs.study.file.model, method, minimum, cost);
                     self.data.rows.push(Row { start: Some((*name).to_owned()), ..row });
                 }
@@ -72,7 +76,8 @@ impl Collector<'_> {
             (Task::Agreement { .. }, Content::Survey { appraisals, .. }) => {
                 let scores: Vec<f64> = appraisals.iter().map(|a| a.cssim).collect();
                 for (g, gamma) in Method::default().gammas.into_iter().enumerate() {
-                    let costs: Vec<f64> = appraisals.iter().map(|a| a.costs[g]).collect();
+                    let costs: Option<Vec<f64>> = appraisals.iter().map(|a| a.costs.get(g).copied()).collect();
+                    let costs = costs.with_context(|| foreign(cell))?;
                     let (material, probe) = self.names(cell);
                     let (spearman, matches) = (spearman(&scores, &costs), u32::try_from(scores.len())?);
                     self.data.agreements.push(Agreement { material, probe, gamma, spearman, matches });
@@ -175,22 +180,24 @@ impl Collector<'_> {
         };
         let cost = |counts: &dyn Fn(&str) -> bool| self.seconds.sum(&record.labels, counts);
         let is_subset = |node: &str| node.starts_with("transport of ") && !node.contains("coarse picture");
-        let is_two_stage = |node: &str| {
-            is_subset(node) || node.starts_with("search ") || node == "select" || node.starts_with("transport in full,")
-        };
+        let is_stage_two = |node: &str| node == "select" || node.starts_with("transport in full,");
+        let is_two_stage = |node: &str| is_subset(node) || node.starts_with("search ") || is_stage_two(node);
         let single = |gamma: f64| cost(&|node: &str| is_subset(node) || node == format!("search gamma {gamma}"));
         let all = cost(&|node: &str| node != "report");
-        let two_stages = cost(&is_two_stage);
+        let (two_stages, stage_two) = (cost(&is_two_stage), cost(&is_stage_two));
         let evaluations: u64 = candidates.iter().map(|c| c.evaluations as u64).sum();
         let mut rows = Vec::new();
-        let won = &candidates[*winner];
+        let won = candidates.get(*winner).with_context(|| foreign(cell))?;
         let (plain, with_polish) = match task.name {
             MethodName::Subsets => (Some(MethodName::Subsets), MethodName::SubsetsPolished),
             MethodName::Candidate => (None, MethodName::OursPolished),
             other => (Some(other), MethodName::OursPolished),
         };
         if let Some(method) = plain {
-            rows.push(Row { evaluations, ..self.row(cell, model, method, won, two_stages) });
+            let is_single = method == MethodName::Log;
+            let seconds = if is_single { single(1.0) } else { two_stages };
+            let stage_two = (!is_single).then_some(stage_two);
+            rows.push(Row { evaluations, stage_two_seconds: stage_two, ..self.row(cell, model, method, won, seconds) });
         }
         if let Some(polished) = polished {
             let row = self.row(cell, model, with_polish, polished, all);
@@ -259,7 +266,7 @@ impl Collector<'_> {
             };
             let searched = self.records.get(from);
             let evaluations = searched.and_then(|r| r.content.minimum()).map_or(0, |found| found.evaluations);
-            let cost = searched.map_or(0.0, |r| self.seconds.sum(&r.labels, |node| node.starts_with("brute-force")));
+            let cost = searched.map_or(0.0, |r| self.seconds.sum(&r.labels, |node| node != "report"));
             let found = Match {
                 parameters: point.clone(),
                 cssim: appraised.cssim,
@@ -273,6 +280,11 @@ impl Collector<'_> {
             self.data.rows.push(Row { probe, searched_size: origin.scene.size, ..row });
         }
     }
+}
+
+/// What is wrong with a record that another version, or somebody else, has written.
+fn foreign(cell: &Cell) -> String {
+    format!("cells/{}.json is no record of this study; remove it, and --resume computes it again", cell.name)
 }
 
 fn named(model: &str, parameters: &[f64]) -> BTreeMap<String, f64> {

@@ -27,8 +27,8 @@ pub(super) struct StudyFile {
     /// The model of most experiments.
     #[serde(default = "default_model")]
     pub(super) model: String,
-    /// Models of the table of models, beside it: the first of them on the six under all probes, the others on the materials and
-    /// under the light of the experiments that repeat.
+    /// Models of the table of models, beside it: the first of them on the six, the others on the materials of the experiments
+    /// that repeat, all under the light of these.
     #[serde(default)]
     pub(super) models: Vec<String>,
     /// Columns and rows of the photos.
@@ -168,6 +168,8 @@ impl Study {
     }
 
     fn fill(&mut self) -> anyhow::Result<()> {
+        ensure!(!self.materials.is_empty(), "materials is an empty list; name at least one file in MERL's format");
+        ensure!(self.probes > 0, "probes is an empty list; name at least one light to fit under");
         if self.file.six.is_empty() {
             self.file.six = self.materials.iter().take(6).map(|(name, _)| name.clone()).collect();
         }
@@ -205,12 +207,17 @@ impl Study {
                 );
             }
         }
+        for (what, list) in [("six", &self.file.six), ("repeat-materials", &self.file.repeat_materials)] {
+            let distinct: BTreeSet<&String> = list.iter().collect();
+            ensure!(distinct.len() == list.len(), "{what} names a material twice");
+        }
         for model in std::iter::once(&self.file.model).chain(&self.file.models) {
             brdf::model(model)?;
         }
         let sizes = [self.file.size, self.file.large].into_iter().chain(self.file.low_resolutions.iter().copied());
         for size in sizes.chain((self.file.direct_size > 0).then_some(self.file.direct_size)) {
-            ensure!((16..=1024).contains(&size), "sizes must lie between 16 and 1024 pixels, found {size}");
+            // A fit to all pixels of a larger photo would not fit into memory.
+            ensure!((16..=512).contains(&size), "sizes must lie between 16 and 512 pixels, found {size}");
         }
         for (name, samples) in
             [("photo-samples", self.file.photo_samples), ("direct-samples", self.file.direct_samples)]
@@ -218,7 +225,8 @@ impl Study {
             ensure!((1..=1 << 20).contains(&samples), "{name} must lie between 1 and 1048576, found {samples}");
         }
         let gammas = &self.file.full_gammas;
-        let ascending = gammas.windows(2).all(|pair| pair[0] < pair[1]) && gammas.iter().all(|gamma| *gamma > 0.0);
+        let positive = gammas.iter().all(|gamma| *gamma > 0.0 && gamma.is_finite());
+        let ascending = gammas.windows(2).all(|pair| pair[0] < pair[1]) && positive;
         ensure!(ascending, "full-gammas must be positive and ascending, found {gammas:?}");
         ensure!((1..=1000).contains(&self.file.seeds), "seeds must lie between 1 and 1000, found {}", self.file.seeds);
         Ok(())
@@ -324,7 +332,11 @@ mod tests {
             (&format!("{base}six = ['tin']"), "\"tin\" is none of gold, nickel"),
             (&format!("{base}repeat-probe = 'uffizi'"), "\"uffizi\" is none of grace"),
             (&format!("{base}model = 'phong'"), "unknown model 'phong'"),
-            (&format!("{base}size = 8"), "between 16 and 1024"),
+            (&format!("{base}size = 8"), "between 16 and 512"),
+            (&format!("{base}six = ['gold', 'gold']"), "six names a material twice"),
+            (&format!("{base}full-gammas = [2.0, inf]"), "full-gammas must be positive"),
+            ("materials = []\nprobes = ['grace.hdr']", "materials is an empty list"),
+            ("materials = ['*.binary']\nprobes = []\nheld-out = ['uffizi.hdr']", "probes is an empty list"),
             (&format!("{base}sizes = 8"), "unknown field `sizes`"),
             (&format!("{base}experiments = ['all']"), "unknown variant `all`"),
             (&format!("{base}held-out = ['grace.hdr']"), "two files are called \"grace\""),

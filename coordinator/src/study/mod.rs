@@ -13,9 +13,11 @@
 
 mod cells;
 mod data;
+mod effort;
 mod file;
 mod pictures;
 mod planner;
+mod progress;
 mod record;
 mod report;
 mod row;
@@ -25,21 +27,24 @@ mod variants;
 
 use crate::{
     cli::Exit,
-    fitting::{run_to_end, runner_options, version},
+    comm::RunEvent,
+    fitting::{journal_failed, run_to_end, runner_options, version},
     inputs::{load_environment, show_warnings},
-    journal::{FitLedger, JOURNAL_FILE, JournalOptions},
+    journal::{self, Finished, FitLedger, JOURNAL_FILE, JournalOptions, RunIdentity},
     metrics::Metrics,
     outputs::{OutFolder, print_result},
-    progress::{Ending, display_of_many},
+    progress::Ending,
     settings::{EnvironmentSettings, StudySettings},
 };
-use anyhow::Context;
+use anyhow::{Context, bail};
+use effort::Effort;
 use file::Study;
 use lookalike::{
     brdf::merl::MerlTable,
     fit::encode_light,
     graph::{Blob, Many},
 };
+use progress::Progress;
 use row::{About, StudyData};
 use seconds::Seconds;
 use std::{
@@ -56,50 +61,86 @@ pub(crate) fn run(settings: StudySettings) -> anyhow::Result<ExitCode> {
     let study = Study::read(&settings.study)?;
     let cells = cells::plan(&study)?;
     let out = OutFolder::create(&settings.out, settings.resume)?;
+    refuse_strangers(&out)?;
     let metrics = settings.metrics.map(Metrics::listen).transpose()?;
-    let inputs = Arc::new(load(study, cells, out.clone(), settings.cluster.workers.count())?);
+    let inputs = Arc::new(load(study, cells, out, settings.cluster.workers.count())?);
     let tally = Arc::new(Mutex::new(Tally::default()));
-    let seconds = Seconds::open(&out)?;
+    let mut seconds = Seconds::open(&inputs.out)?;
     let supply = Supply::new(Arc::clone(&inputs), Arc::clone(&tally))?;
-    let mut display = display_of_many(settings.progress, inputs.cells.len());
-    display.say(&format!(
-        "{} cells: photos, tables, fits and rivals; complete: {}",
-        inputs.cells.len(),
-        lock(&tally).complete
-    ));
-    let mut options = runner_options(&settings.cluster, &out, inputs.study.file.seed);
+    let mut effort = Effort::read(&inputs.out);
+    if !supply.is_complete() || !inputs.out.file(JOURNAL_FILE).exists() {
+        let workers = run_cells(&settings, &inputs, &tally, (supply, &mut seconds), metrics.as_ref())?;
+        effort.seconds += began.elapsed().as_secs_f64();
+        effort.workers = effort.workers.max(workers);
+        effort.write(&inputs.out)?;
+    }
+    write_report(&settings, &inputs, &seconds, &effort)?;
+    let failed = std::mem::take(&mut lock(&tally).failed);
+    end(&inputs.out, failed.len())?;
+    for cell in &failed {
+        eprintln!("failed: {cell}");
+    }
+    let page = inputs.out.file("report.html");
+    print_result(&format!("{}\n", page.display())).context("cannot write to stdout")?;
+    Ok(if failed.is_empty() { Exit::Done } else { Exit::SomeFitsFailed }.into())
+}
+
+/// Computes the cells that are not complete; how many workers there were.
+fn run_cells(
+    settings: &StudySettings,
+    inputs: &Arc<Inputs>,
+    tally: &Arc<Mutex<Tally>>,
+    (supply, seconds): (Supply, &mut Seconds),
+    metrics: Option<&Metrics>,
+) -> anyhow::Result<u32> {
+    let mut progress = Progress::new(settings.progress, inputs.cells.len());
+    progress.complete(lock(tally).complete);
+    let mut options = runner_options(&settings.cluster, &inputs.out, inputs.study.file.seed);
     // Seconds of a node are those of one core.
     options.threads_per_worker = std::num::NonZeroUsize::new(1);
     options.journal = Some(JournalOptions {
-        path: out.file(JOURNAL_FILE),
-        identity: identity(&inputs),
+        path: inputs.out.file(JOURNAL_FILE),
+        identity: identity(inputs)?,
         resume: settings.resume,
         survivors: true,
         best: None,
         fits: FitLedger::default(),
     });
-    let (mut seconds, mut told, mut workers) = (seconds, lock(&tally).complete, 0_u32);
-    let run = run_to_end(options, Many::new(supply), metrics.as_ref(), |event| {
+    let mut workers = 0;
+    let run = run_to_end(options, Many::new(supply), metrics, |event| {
         seconds.note(event);
-        workers += u32::from(matches!(event, crate::comm::RunEvent::WorkerJoined { .. }));
-        display.event(event);
-        let complete = lock(&tally).complete;
-        if complete >= told + 10 {
-            told = complete;
-            let minutes = began.elapsed().as_secs_f64() / 60.0;
-            display.say(&format!("{complete} of {} cells complete, {minutes:.1} min", inputs.cells.len()));
-        }
+        workers += u32::from(matches!(event, RunEvent::WorkerJoined { .. }));
+        progress.event(event);
+        progress.complete(lock(tally).complete);
     });
     let problem = run.as_ref().err().map(|error| format!("{error:#}"));
-    display.finish(problem.as_deref().map_or(Ending::Finished, Ending::Failed));
+    progress.finish(problem.as_deref().map_or(Ending::Finished, Ending::Failed));
     drop(run?);
-    write_report(&settings, &inputs, &seconds, (began.elapsed().as_secs_f64(), workers))?;
-    let failed = std::mem::take(&mut lock(&tally).failed);
-    for cell in &failed {
-        eprintln!("failed: {cell}");
+    Ok(workers)
+}
+
+/// Refuses cells that no journal here knows of: another study may have left them.
+fn refuse_strangers(out: &OutFolder) -> anyhow::Result<()> {
+    if out.file("cells").exists() && !out.file(JOURNAL_FILE).exists() {
+        bail!(
+            "{} holds cells of a study but no journal ({JOURNAL_FILE}) that says of which: choose another --out, or remove it first",
+            out.file("cells").display()
+        );
     }
-    print_result(&format!("{}\n", out.file("report.html").display())).context("cannot write to stdout")?;
-    Ok(if failed.is_empty() { Exit::Done } else { Exit::SomeFitsFailed }.into())
+    Ok(())
+}
+
+/// Tells the journal that all has ended.
+fn end(out: &OutFolder, failed: usize) -> anyhow::Result<()> {
+    let path = out.file(JOURNAL_FILE);
+    if failed > 0 {
+        let ended = format!("{failed} cells of the study failed");
+        return journal::settle(&path, &FitLedger::default(), Some(&ended)).map_err(journal_failed);
+    }
+    let names = ["results.md", "results.json", "report.html"];
+    let outputs = names.into_iter().filter_map(|name| Some((name.to_owned(), out.hash(name).transpose()?)));
+    let outputs = outputs.map(|(name, hash)| Ok((name, hash?))).collect::<anyhow::Result<_>>()?;
+    journal::finish(&path, &Finished { outputs }).map_err(journal_failed)
 }
 
 fn lock(tally: &Mutex<Tally>) -> std::sync::MutexGuard<'_, Tally> {
@@ -126,25 +167,23 @@ fn load(study: Study, cells: Vec<cells::Cell>, out: OutFolder, workers: usize) -
     Ok(Inputs { study, cells, materials, lights, out, workers })
 }
 
-/// What the run is a run of.
-fn identity(inputs: &Inputs) -> crate::journal::RunIdentity {
+/// What the run is a run of. What the file says counts, not how it is written.
+fn identity(inputs: &Inputs) -> anyhow::Result<RunIdentity> {
     let study = &inputs.study;
-    let mut identity = version().with("the study", study.text.clone());
+    let mut identity = version();
+    for (key, value) in toml::from_str::<toml::Table>(&study.text)? {
+        identity = identity.with(format!("the study: {key}"), value.to_string());
+    }
     for ((name, _), blob) in study.materials.iter().zip(&inputs.materials) {
         identity = identity.with(format!("material {name}"), blob.hash().to_string());
     }
     for ((name, _), light) in study.lights.iter().zip(&inputs.lights) {
         identity = identity.with(format!("light {name}"), light.encoded.hash().to_string());
     }
-    identity
+    Ok(identity)
 }
 
-fn write_report(
-    settings: &StudySettings,
-    inputs: &Inputs,
-    nodes: &Seconds,
-    (seconds, workers): (f64, u32),
-) -> anyhow::Result<()> {
+fn write_report(settings: &StudySettings, inputs: &Inputs, nodes: &Seconds, effort: &Effort) -> anyhow::Result<()> {
     let data = data::collect(inputs, nodes)?;
     let study = &inputs.study;
     let names = |list: &[(String, std::path::PathBuf)]| list.iter().map(|(name, _)| name.clone()).collect::<Vec<_>>();
@@ -152,8 +191,8 @@ fn write_report(
         command: settings.command.clone(),
         version: env!("CARGO_PKG_VERSION").to_owned(),
         machine: machine(),
-        seconds,
-        workers,
+        seconds: effort.seconds,
+        workers: effort.workers,
         study: study.text.clone(),
         materials: names(&study.materials),
         six: study.file.six.clone(),

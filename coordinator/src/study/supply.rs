@@ -100,6 +100,11 @@ impl Supply {
         Ok(supply)
     }
 
+    /// Whether there is nothing to compute.
+    pub(super) fn is_complete(&self) -> bool {
+        self.state.iter().all(|state| *state == State::Complete)
+    }
+
     fn tell(&self, change: impl FnOnce(&mut Tally)) {
         change(&mut self.tally.lock().unwrap_or_else(PoisonError::into_inner));
     }

@@ -1,10 +1,11 @@
-//! `appraise`: what studies ask of given parameter vectors: their CSSIM, and Eq. 1 over all usable pixels for some gammas.
+//! `appraise`: what studies ask of given parameter vectors: their CSSIM, and Eq. 1, with the tangent below its knee, over all pixels that
+//! the object covers wholly, for some gammas.
 //!
 //! Inputs: the view; the shards of the full-resolution table, in order.
 
 use super::view::Scene;
 use crate::{
-    fit::wire::{read, write},
+    fit::wire::{check_parameters, read, write},
     graph::{Blob, NodeFailure, NodeType, RunContext},
     metric::cost::{Compression, cost},
 };
@@ -38,6 +39,7 @@ impl NodeType for Appraise {
             return Err(NodeFailure::new("gammas and mean radiance must be positive"));
         }
         let scene = Scene::read(inputs, context)?;
+        parameters.points.iter().try_for_each(|point| check_parameters("points", scene.view.model, point))?;
         let full = scene.full();
         let planes = |image: &crate::image::Image| -> [Vec<f64>; 3] {
             let inside = image.pixels().iter().zip(full.coverage).filter(|(_, coverage)| **coverage >= 1.0);

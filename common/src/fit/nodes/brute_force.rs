@@ -52,6 +52,9 @@ impl NodeType for BruteForce {
                 };
                 let view = context.decoded(view, View::decode)?;
                 let scene = DirectScene::read(direct, of_scene, context)?;
+                if (scene.geometry.width(), scene.geometry.height()) != (view.width, view.height) {
+                    return Err(NodeFailure::new("the direct integrator's scene has another size than the view"));
+                }
                 search(&parameters, &view, context, &|point| direct_image(&view, &scene, point))?
             }
         };

@@ -4,7 +4,7 @@ use super::{PolishParameters, view::Scene};
 use crate::{
     fit::{
         explore::explore,
-        wire::{PolishedWire, read, write},
+        wire::{PolishedWire, check_parameters, read, write},
     },
     graph::{Blob, NodeFailure, NodeType, RunContext},
 };
@@ -21,11 +21,17 @@ impl NodeType for Explore {
     fn run(&self, parameters: &[u8], inputs: &[Blob], context: &RunContext) -> Result<Vec<u8>, NodeFailure> {
         let PolishParameters { starts, max_evaluations } = read("parameters of explore", parameters)?;
         let scene = Scene::read(inputs, context)?;
+        starts.iter().try_for_each(|start| check_parameters("starts", scene.view.model, start))?;
         let total = u64::from(max_evaluations) * starts.len() as u64;
-        let mut done = 0;
-        let mut observe = |_: &crate::search::Progress<'_>| {
-            done += 1;
-            context.report(done.min(total), total);
+        // Evaluations of earlier starts, and of this one so far: a new start begins to count from 1.
+        let (mut before, mut last) = (0, 0);
+        let mut observe = |progress: &crate::search::Progress<'_>| {
+            let now = progress.evaluations as u64;
+            if now < last {
+                before += last;
+            }
+            last = now;
+            context.report((before + now).min(total), total);
             if context.is_cancelled() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         };
         let (view, limit) = (scene.full(), max_evaluations as usize);

@@ -4,7 +4,7 @@ use super::view::Scene;
 use crate::{
     fit::{
         polish,
-        wire::{PolishedWire, read, write},
+        wire::{PolishedWire, check_parameters, read, write},
     },
     graph::{Blob, NodeFailure, NodeType, RunContext},
 };
@@ -29,6 +29,7 @@ impl NodeType for Polish {
     fn run(&self, parameters: &[u8], inputs: &[Blob], context: &RunContext) -> Result<Vec<u8>, NodeFailure> {
         let PolishParameters { starts, max_evaluations } = read("parameters of polish", parameters)?;
         let scene = Scene::read(inputs, context)?;
+        starts.iter().try_for_each(|start| check_parameters("starts", scene.view.model, start))?;
         let mut observe = |progress: &crate::search::Progress<'_>| {
             context.report(progress.evaluations as u64, u64::from(max_evaluations));
             if context.is_cancelled() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }

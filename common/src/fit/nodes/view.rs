@@ -1,6 +1,7 @@
-//! What the nodes of stage two, polish and report share: the photo, the judge, and the full-resolution table.
+//! What the nodes share that render and score images (`select`, `explore`, `polish`, `report`, `brute-force`, `appraise`): the photo, the
+//! judge, and a table of its pixels.
 //!
-//! Inputs of all three: the view; the shards of the full-resolution table, in order.
+//! Inputs of all: the view; the shards of the table, in order.
 
 use crate::{
     brdf::{self, Model, lobe_terms},

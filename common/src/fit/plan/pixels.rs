@@ -44,9 +44,23 @@ impl Grid {
     /// Every pixel.
     pub(super) const FULL: Self = Self(1);
 
-    /// The coarsest grid that still has `size` columns and rows, where the photo has as many.
-    pub(super) fn of_size(photo: &Image, size: usize) -> Self {
-        Self(index((photo.width().min(photo.height()) / size).max(1)))
+    /// The coarsest grid on which the box around these pixels still has `size` columns and rows, where it has as many; coarser, if more
+    /// than `most` pixels would be on it.
+    pub(super) fn around(pixels: &[Pixel], size: u32, most: usize) -> Self {
+        let extent = |axis: usize| {
+            let (low, high) = pixels.iter().fold((u32::MAX, 0), |(low, high), p| (low.min(p[axis]), high.max(p[axis])));
+            high.saturating_sub(low).saturating_add(1)
+        };
+        let mut grid = Self((extent(0).min(extent(1)) / size).max(1));
+        while pixels.iter().filter(|pixel| grid.holds(**pixel)).count() > most {
+            grid.0 += 1;
+        }
+        grid
+    }
+
+    /// Columns or rows of the grid along so many pixels.
+    pub(super) fn count(self, length: usize) -> usize {
+        self.places(length).count()
     }
 
     /// Columns and rows of a square.
@@ -95,7 +109,9 @@ mod tests {
         assert_eq!(grid.values(&values, 7), [8.0, 11.0, 29.0, 32.0]);
         assert!(grid.holds([4, 1]) && !grid.holds([3, 1]));
         assert_eq!(Grid::FULL.image(&photo), photo);
-        assert_eq!(Grid::of_size(&photo, 2), Grid(2));
-        assert_eq!(Grid::of_size(&photo, 64), Grid::FULL);
+        let square = |side: u32| (0..side * side).map(|i| [100 + i % side, 7 + i / side]).collect::<Vec<Pixel>>();
+        assert_eq!(Grid::around(&square(64), 16, 1000), Grid(4));
+        assert_eq!(Grid::around(&square(64), 96, 10_000), Grid::FULL);
+        assert_eq!(Grid::around(&square(64), 96, 1100), Grid(2));
     }
 }

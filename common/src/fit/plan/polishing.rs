@@ -1,5 +1,6 @@
 //! Stage three as a plan: look on a coarse picture for the lobe to start from, polish on the full-resolution table there, on wider
-//! tables where the width runs into an edge, and from the winner itself where that has led nowhere.
+//! tables where the width runs into an edge. Where that ends worse than the winner, it is done again from the winner, on the table that
+//! it was judged on: the outcome never scores worse than the winner.
 
 use super::{FitPlanner, Grid, Step, add, index, release_tables, verify};
 use crate::{
@@ -24,14 +25,26 @@ const MAX_ROUNDS: usize = 4;
 /// Reach of the next table around a width that polish took to the edge of this one.
 const AROUND: f64 = 1.6;
 
-/// Columns or rows of the coarse picture, the fewer of the two.
-const COARSE_SIZE: usize = 96;
+/// Columns or rows of the object on the coarse picture, the fewer of the two.
+const COARSE_SIZE: u32 = 96;
+
+/// Most pixels of the coarse picture's table.
+const MOST_COARSE: usize = 40_000;
+
+/// Fewer pixels of an object show no lobe.
+const FEWEST_COARSE: usize = 150;
+
+/// Pixels from the centre of one of the metric's windows to its edge.
+const REACH: usize = 5;
 
 /// Knots per factor of two of width in the coarse table.
 const COARSE_PER_OCTAVE: f64 = 4.0;
 
-/// Widths further apart than this get tables of their own.
+/// A table that would have to span more than this factor of widths, margins included, is not made for both winner and find.
 const FAR: f64 = 4.0;
+
+/// Most starts that a round of polish compares: winner, find, and the ends of earlier rounds.
+const MAX_STARTS: usize = MAX_ROUNDS + 2;
 
 /// Where stage three stands.
 #[derive(Debug, Default)]
@@ -40,8 +53,8 @@ pub(super) struct Polishing {
     coarse: Option<(BlobHash, Vec<Input>)>,
     /// What the next round may start from: the best on its table.
     starts: Vec<Vec<f64>>,
-    /// Whether the winner of stage two is among them.
-    has_winner: bool,
+    /// Whether it went back to the winner and the table that it was judged on, where it ends.
+    has_retreated: bool,
     rounds: usize,
     /// Evaluations of these rounds.
     evaluations: usize,
@@ -53,8 +66,11 @@ impl FitPlanner {
     /// Adds the table of the coarse picture.
     pub(super) fn add_coarse_table(&mut self, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
         let Some((low, high)) = explored_span(self.method.model) else { return Ok(()) };
-        let grid = Grid::of_size(self.capture.photo(), COARSE_SIZE);
+        let grid = Grid::around(&self.pixels, COARSE_SIZE, MOST_COARSE);
         let pixels: Vec<Pixel> = self.pixels.iter().copied().filter(|pixel| grid.holds(*pixel)).collect();
+        if !self.shows_the_object(grid, &pixels) {
+            return Ok(());
+        }
         let view = add(graph, "coarse view", &self.view_wire(grid, pixels.clone()))?;
         let list = add(graph, "list of pixels", &pixels)?;
         let knots = Knots::covering(low, high, COARSE_PER_OCTAVE);
@@ -64,6 +80,17 @@ impl FitPlanner {
         Ok(())
     }
 
+    /// Whether a coarse picture can be scored: the object has pixels enough, and one of the metric's windows is centred on it.
+    fn shows_the_object(&self, grid: Grid, pixels: &[Pixel]) -> bool {
+        let photo = self.capture.photo();
+        let inside = |place: u32, length: usize| {
+            let (at, count) = ((place / grid.stride()) as usize, grid.count(length));
+            at >= REACH && at + REACH < count
+        };
+        let is_centre = |p: &Pixel| inside(p[0], photo.width()) && inside(p[1], photo.height());
+        pixels.len() >= FEWEST_COARSE && pixels.iter().any(is_centre)
+    }
+
     /// Looks on the coarse picture for the lobe that polish starts from.
     pub(super) fn add_exploration(&mut self, won: &[f64], graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
         let Some((view, table)) = &self.polishing.coarse else { return self.polish_winner(won, graph) };
@@ -71,7 +98,6 @@ impl FitPlanner {
         let parameters =
             PolishParameters { starts: starts(self.method.model, won), max_evaluations: index(MAX_EXPLORATIONS) };
         let node = self.add_on_view(graph, (nodes::EXPLORE, nodes::EXPLORE), inputs, &parameters)?;
-        table.iter().filter_map(Input::node).for_each(|shard| graph.release(shard));
         self.step = Step::Exploring(node);
         Ok(())
     }
@@ -79,7 +105,11 @@ impl FitPlanner {
     /// Polish starts from what was found, on a table that has its width, and from the winner where that table has the winner's too.
     pub(super) fn explored(&mut self, output: &Blob, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
         let model = self.method.model;
-        let found = verify::polished(model, output)?;
+        // Until now every part of the table may still have come, to be looked at.
+        let table = self.polishing.coarse.take().map_or_else(Vec::new, |(_, table)| table);
+        table.iter().filter_map(Input::node).for_each(|shard| graph.release(shard));
+        let most = MAX_EXPLORATIONS * starts(model, &self.winner_of_stage_two()?).len();
+        let found = verify::polished(model, output, most)?;
         self.explored_evaluations = found.evaluations;
         let found = found.parameters;
         let won = self.winner_of_stage_two()?;
@@ -91,7 +121,6 @@ impl FitPlanner {
         if !inside(self.span) {
             self.span = needed_span(model, starts.iter().map(|start| &start[..]));
         }
-        self.polishing.has_winner = starts.len() == 2;
         self.polishing.starts = starts;
         self.add_polish(graph)
     }
@@ -103,7 +132,6 @@ impl FitPlanner {
 
     fn polish_winner(&mut self, won: &[f64], graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
         self.polishing.starts = vec![won.to_vec()];
-        self.polishing.has_winner = true;
         self.add_polish(graph)
     }
 
@@ -116,29 +144,33 @@ impl FitPlanner {
 
     /// Polish ends, or goes on with a wider table where it ran into the edge of this one.
     pub(super) fn polished(&mut self, output: &Blob, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
-        let mut polished = verify::polished(self.method.model, output)?;
+        let left = MAX_EVALUATIONS.saturating_sub(self.polishing.evaluations);
+        let mut polished = verify::polished(self.method.model, output, left.max(MAX_STARTS))?;
         let polishing = &mut self.polishing;
         polishing.rounds += 1;
         polishing.evaluations += polished.evaluations;
         polished.evaluations = polishing.spent + polishing.evaluations;
         // Another table pays only with evaluations left for a gradient and a few steps.
         let enough_left = polishing.evaluations + 3 * polished.parameters.len() < MAX_EVALUATIONS;
-        let goes_on = polished.at_table_edge && polishing.rounds < MAX_ROUNDS && enough_left;
+        let goes_on =
+            polished.at_table_edge && polishing.rounds < MAX_ROUNDS && enough_left && !polishing.has_retreated;
         polishing.starts.push(polished.parameters.clone());
         let score = self.method.judge.pick(polished.cssim, polished.cssim_object);
         let best = winner(&self.judged, self.method.judge).ok_or_else(|| PlanError::new("no candidate was judged"))?;
         let is_worse = score > self.score_of_winner(best);
+        let judged_on = self.tables.first().map_or(self.span, |(span, _)| *span);
         self.best.set(score.min(self.score_of_winner(best)));
         self.polished = Some(polished);
         if goes_on {
             self.widen_span();
             self.release_tables_between(graph);
             self.add_polish(graph)
-        } else if is_worse && !self.polishing.has_winner {
+        } else if is_worse && self.span != judged_on {
             // Nothing better was there: what polish owes is the winner's own surroundings, on the table that it won on.
-            self.span = self.tables.first().map_or(self.span, |(span, _)| *span);
+            self.span = judged_on;
             self.release_tables_between(graph);
-            self.polishing = Polishing { spent: self.polishing.evaluations, ..Polishing::default() };
+            let spent = self.polishing.evaluations;
+            self.polishing = Polishing { spent, has_retreated: true, ..Polishing::default() };
             let won = self.winner_of_stage_two()?;
             self.polish_winner(&won, graph)
         } else {

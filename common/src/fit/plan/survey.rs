@@ -8,9 +8,10 @@
 
 use super::{FitError, FitPlanner, add, limits, pictures::Pictures, tables::whole_span, verify};
 use crate::{
+    brdf::flat_len,
     fit::{
         Integration, Method, Polished,
-        nodes::{self, AppraiseParameters, AppraisedWire, BruteForceParameters, DirectWire, ReportParameters},
+        nodes::{self, AppraiseParameters, BruteForceParameters, DirectWire, ReportParameters},
         plan::Grid,
         wire::{ImageWire, read},
     },
@@ -44,7 +45,7 @@ pub struct Appraisal {
     pub cssim: f64,
     /// CSSIM over windows centred on the object.
     pub cssim_object: f64,
-    /// Eq. 1 over all pixels that the object covers, for each gamma.
+    /// Eq. 1 over all pixels that the object covers wholly, for each gamma.
     pub costs: Vec<f64>,
 }
 
@@ -187,18 +188,15 @@ impl Planner for SurveyPlanner {
             return if is_all { self.end(Vec::new()) } else { Ok(()) };
         }
         if let Some(start) = self.searches.remove(&node) {
-            self.minima.insert(start, verify::polished(self.base.method.model, output)?);
+            // MATLAB's limit; a request may have set a lower one.
+            let most = 2000 * flat_len(self.base.method.model.parameters());
+            self.minima.insert(start, verify::polished(self.base.method.model, output, most)?);
             return self.finish(graph);
         }
         if self.appraise == Some(node) {
             self.appraise = None;
-            let AppraisedWire(appraised) =
-                read("appraisals", output).map_err(|failure| verify::wrong("appraisals", &failure))?;
-            if appraised.len() != self.request.points.len() {
-                return Err(verify::wrong(format!("{} appraisals", self.request.points.len()), &appraised.len()));
-            }
-            let appraisal = |(cssim, cssim_object, costs)| Appraisal { cssim, cssim_object, costs };
-            self.appraisals = appraised.into_iter().map(appraisal).collect();
+            let SurveyRequest { points, gammas, .. } = &self.request;
+            self.appraisals = verify::appraisals(output, points.len(), gammas.len())?;
             return self.finish(graph);
         }
         if self.pictures.is_of(node) {
@@ -275,6 +273,14 @@ impl Planner for PhotoPlanner {
         let wrong = |failure: &dyn std::fmt::Display| verify::wrong("a rendering", failure);
         let rendered: nodes::RenderedWire = read("rendering", output).map_err(|failure| wrong(&failure))?;
         let image = rendered.image.image().map_err(|failure| wrong(&failure))?;
+        let expected = (self.geometry.width as usize, self.geometry.height as usize);
+        let found = (image.width(), image.height());
+        if expected != found {
+            return Err(wrong(&format!("{found:?} instead of {expected:?} pixels")));
+        }
+        if let Some(value) = image.pixels().iter().flatten().find(|value| !value.is_finite()) {
+            return Err(wrong(value));
+        }
         self.photo = Some((image, rendered.noise));
         Ok(())
     }

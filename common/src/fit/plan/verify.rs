@@ -7,8 +7,8 @@ use super::other;
 use crate::{
     brdf::Model,
     fit::{
-        Candidate, Objective, Polished,
-        nodes::joined,
+        Appraisal, Candidate, Objective, Polished,
+        nodes::{AppraisedWire, joined},
         wire::{PolishedWire, ScoresWire, TableWire, read},
     },
     graph::{Blob, GraphEdit, Input, NodeId, PlanError},
@@ -92,13 +92,34 @@ pub(super) fn scores(output: &Blob, count: usize) -> Result<Vec<(f64, f64)>, Pla
     Ok(scores)
 }
 
-/// The outcome of a round of polish.
-pub(super) fn polished(model: &dyn Model, output: &Blob) -> Result<Polished, PlanError> {
+/// The outcome of a search on the score that may have evaluated it so often.
+pub(super) fn polished(model: &dyn Model, output: &Blob, most: usize) -> Result<Polished, PlanError> {
     let polished = read::<PolishedWire>("polish", output).and_then(|wire| wire.polished(model));
     let polished = polished.map_err(|failure| wrong("parameters with their scores", &failure))?;
     check_score(polished.cssim)?;
     check_score(polished.cssim_object)?;
+    if polished.evaluations > most {
+        return Err(wrong(format!("at most {most} evaluations"), &polished.evaluations));
+    }
     Ok(polished)
+}
+
+/// The appraisals of so many points, for so many gammas.
+pub(super) fn appraisals(output: &Blob, points: usize, gammas: usize) -> Result<Vec<Appraisal>, PlanError> {
+    let AppraisedWire(appraised) = read("appraisals", output).map_err(|failure| wrong("appraisals", &failure))?;
+    if appraised.len() != points {
+        return Err(wrong(format!("{points} appraisals"), &appraised.len()));
+    }
+    let checked = |(cssim, cssim_object, costs): (f64, f64, Vec<f64>)| {
+        check_score(cssim)?;
+        check_score(cssim_object)?;
+        if costs.len() != gammas {
+            return Err(wrong(format!("{gammas} costs"), &costs.len()));
+        }
+        costs.iter().try_for_each(|cost| check_score(*cost))?;
+        Ok(Appraisal { cssim, cssim_object, costs })
+    };
+    appraised.into_iter().map(checked).collect()
 }
 
 fn check_score(score: f64) -> Result<(), PlanError> {
