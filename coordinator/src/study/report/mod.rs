@@ -44,10 +44,10 @@ pub(crate) fn write(data: &StudyData, out: &Path) -> anyhow::Result<()> {
     for (name, text) in figure_files(&sections) {
         file(&figures, &name, text)?;
     }
-    file(out, "results.json", &results::json(&study)?)?;
-    file(out, "data.json", &results::data(data)?)?;
-    file(out, "results.md", &markdown::page(TITLE, &lead, &sections))?;
-    file(out, "report.html", &html::page(TITLE, &lead, &sections, &pictures)?)
+    file(out, "results.json", results::json(&study)?)?;
+    file(out, "data.json", results::data(data)?)?;
+    file(out, "results.md", markdown::page(TITLE, &lead, &sections))?;
+    file(out, "report.html", html::page(TITLE, &lead, &sections, &pictures)?)
 }
 
 /// What the study is of, in two sentences.
@@ -55,14 +55,13 @@ fn lead(study: &Study<'_>) -> String {
     let about = &study.data.about;
     let probes: Vec<String> = about.probes.iter().map(|probe| text::light(probe).to_owned()).collect();
     format!(
-        "The tables and figures of the paper, measured again by `lookalike study` {} on {} under {}, at {size} x {size} \
+        "The tables and figures of the paper, measured again by lookalike study {} on {} under {}, at {size} x {size} \
          pixels. CSSIM is a difference: 0 is a perfect match, and lower is better.",
         about.version,
         text::count(about.materials.len(), "material"),
         text::list(&probes),
         size = about.size,
     )
-    .replace('`', "")
 }
 
 /// The drawings and the data of all sections, by file name.
@@ -92,7 +91,9 @@ fn names(folder: &Path) -> anyhow::Result<BTreeSet<String>> {
     }
 }
 
-fn file(folder: &Path, name: &str, text: &str) -> anyhow::Result<()> {
-    let path = folder.join(name);
-    fs::write(&path, text).with_context(|| format!("cannot write {}", path.display()))
+/// Writes beside the file and puts it in its place when it is whole: who reads meanwhile sees the old report or the new one.
+fn file(folder: &Path, name: &str, content: impl AsRef<[u8]>) -> anyhow::Result<()> {
+    let (path, part) = (folder.join(name), folder.join(format!("{name}.part")));
+    let written = fs::write(&part, content).and_then(|()| fs::rename(&part, &path));
+    written.with_context(|| format!("cannot write {}", path.display()))
 }

@@ -21,6 +21,7 @@ struct ResultRow<'a> {
     searched_size: u32,
     sampling: &'a str,
     clamped: bool,
+    gammas: u32,
 }
 
 /// The methods that results are published of, in their order.
@@ -97,5 +98,6 @@ fn line(best: &Match<'_>) -> serde_json::Result<String> {
         searched_size: row.searched_size,
         sampling: &row.sampling,
         clamped: row.clamped,
+        gammas: row.gammas,
     })
 }

@@ -6,6 +6,9 @@ use std::collections::{BTreeMap, BTreeSet};
 /// The name of the metric whose scores are CSSIM.
 pub(super) const CSSIM: &str = "cssim";
 
+/// The pixels that stage one sees by default, and in the paper.
+const SAMPLES: u32 = 256;
+
 /// The data of a study and what its grid has in common.
 #[derive(Debug)]
 pub(super) struct Study<'a> {
@@ -52,19 +55,37 @@ pub(super) struct Match<'a> {
 }
 
 impl<'a> Study<'a> {
-    /// Finds what the grid is: the model, the number of samples and the seed that most matches of two stages have.
+    /// Takes the model and the seed of the grid from what the study says of itself, where it does not, those that most
+    /// matches of two stages have; 256 samples where any match has them, else what most have.
     pub(super) fn new(data: &'a StudyData, pictures: BTreeSet<String>) -> Self {
         let grid: Vec<&Row> = data
             .rows
             .iter()
             .filter(|row| matches!(row.method, Method::Ours | Method::OursPolished) && on_grid(row, data.about.size))
             .collect();
-        let samples = || grid.iter().filter_map(|row| row.samples);
-        let samples = samples().find(|samples| *samples == 256).or_else(|| commonest(samples(), |_| false));
+        let usual = data.rows.iter().filter_map(|row| row.samples).find(|samples| *samples == SAMPLES);
+        let samples = usual.or_else(|| commonest(grid.iter().filter_map(|row| row.samples), |_| false));
+        let about = &data.about;
+        if !about.model.is_empty() {
+            return Self { data, pictures, model: about.model.clone(), samples, seed: about.seed };
+        }
         let drawn = || grid.iter().filter(|row| row.samples == samples);
         let model = commonest(drawn().map(|row| row.model.clone()), |model| model == "ggx");
         let seed = commonest(drawn().map(|row| row.seed), |_| false);
         Self { data, pictures, model: model.unwrap_or_default(), samples, seed: seed.unwrap_or(0) }
+    }
+
+    /// Every material under every light that one was fitted under, in the study's order, whether it has a match or not.
+    pub(super) fn places(&self) -> Vec<(&'a str, &'a str)> {
+        let about = &self.data.about;
+        let under = |material: &'a String| about.probes.iter().map(move |probe| (material.as_str(), probe.as_str()));
+        about.materials.iter().flat_map(under).collect()
+    }
+
+    /// The cells of the paper's six materials; all, where the study does not name them.
+    pub(super) fn six(&self) -> Vec<(&'a str, &'a str)> {
+        let six = &self.data.about.six;
+        if six.is_empty() { self.cells() } else { self.cells_of(six) }
     }
 
     /// Materials and lights of the grid that have a match, in the study's order.

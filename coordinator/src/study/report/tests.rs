@@ -2,6 +2,7 @@
 
 mod files;
 mod findings;
+mod rules;
 mod synthetic;
 
 use super::{

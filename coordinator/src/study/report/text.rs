@@ -51,6 +51,27 @@ pub(super) fn significant(number: Option<f64>) -> String {
     format!("{number:.decimals$}")
 }
 
+/// A probability; of one that is nearly 0, only that it is below what four decimals show.
+pub(super) fn probability(p: f64) -> String {
+    if p < 1e-4 { "p < 0.0001".to_owned() } else { format!("p = {}", significant(Some(p))) }
+}
+
+/// What the evaluations of a method are of.
+pub(super) const fn minimised(method: Method) -> &'static str {
+    match method {
+        Method::Ours
+        | Method::Candidate
+        | Method::Subsets
+        | Method::Paper
+        | Method::L2
+        | Method::Log
+        | Method::CubeRoot => "Eq. 1",
+        Method::OursPolished | Method::SubsetsPolished | Method::Brute | Method::LowRes | Method::BruteDirect => {
+            "CSSIM"
+        }
+    }
+}
+
 /// A number for a CSV: the shortest that reads back the same; empty where there is none.
 pub(super) fn exact(number: Option<f64>) -> String {
     number.filter(|number| number.is_finite()).map_or_else(String::new, |number| number.to_string())

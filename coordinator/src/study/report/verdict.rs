@@ -1,6 +1,9 @@
 //! The rules by which numbers confirm a claim or refute it, stated beside each number.
 
-use super::statistics::{mean, number};
+use super::{
+    statistics::{mean, number},
+    text,
+};
 
 /// What the numbers say of a claim.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -42,9 +45,20 @@ pub(super) const MEAN_SLACK: f64 = 0.002;
 pub(super) const CELL_SLACK: f64 = 0.01;
 /// Of the comparisons, the part that has to point one way.
 const MAJORITY: f64 = 2.0 / 3.0;
-/// The rule of [`paired`], in words.
-pub(super) const PAIRED_RULE: &str = "confirmed if the mean margin is positive and two thirds of the comparisons are; \
-                                      refuted if both are so of negative ones; else not decided";
+/// Fewer comparisons decide nothing.
+const FEWEST: usize = 5;
+/// The probability of signs as one-sided, were both equally likely, from which on they decide nothing.
+const CHANCE: f64 = 0.1;
+
+/// The rule of [`paired`] in words, after the numbers that it goes by.
+pub(super) fn rule(margins: &[f64]) -> String {
+    format!(
+        "n = {}, sign test {}; confirmed if the mean margin is positive, two thirds of at least {FEWEST} comparisons are, and \
+         p (two-sided) is below {CHANCE}; refuted if so of negative ones; else not decided",
+        margins.len(),
+        text::probability(sign_test(margins))
+    )
+}
 
 /// Whether ours is as good as a rival over cells: `(ours, rival)`.
 pub(super) fn no_worse(pairs: &[(f64, f64)]) -> Verdict {
@@ -52,9 +66,12 @@ pub(super) fn no_worse(pairs: &[(f64, f64)]) -> Verdict {
     Verdict::of(mean(&excess).map(|mean| mean <= MEAN_SLACK && excess.iter().all(|excess| *excess <= CELL_SLACK)))
 }
 
-/// Whether margins (rival less ours) favour ours: [`PAIRED_RULE`].
+/// Whether margins (rival less ours) favour ours: [`rule`].
 pub(super) fn paired(margins: &[f64]) -> Verdict {
     let Some(mean) = mean(margins) else { return Verdict::NotDecided };
+    if margins.len() < FEWEST || sign_test(margins) >= CHANCE {
+        return Verdict::NotDecided;
+    }
     let needed = number(margins.len()) * MAJORITY - 1e-9;
     let wins = number(margins.iter().filter(|margin| **margin > 0.0).count());
     let losses = number(margins.iter().filter(|margin| **margin < 0.0).count());
@@ -65,6 +82,21 @@ pub(super) fn paired(margins: &[f64]) -> Verdict {
     } else {
         Verdict::NotDecided
     }
+}
+
+/// The two-sided probability, were either sign equally likely, of signs at least as one-sided as these; zeros have none.
+fn sign_test(margins: &[f64]) -> f64 {
+    let wins = margins.iter().filter(|margin| **margin > 0.0).count();
+    let losses = margins.iter().filter(|margin| **margin < 0.0).count();
+    let (fewer, all) = (wins.min(losses), wins + losses);
+    // Logarithms, as 2^all overflows.
+    let mut choices = -number(all) * std::f64::consts::LN_2;
+    let mut tail = choices.exp();
+    for chosen in 1..=fewer {
+        choices += (number(all + 1 - chosen) / number(chosen)).ln();
+        tail += choices.exp();
+    }
+    (2.0 * tail).min(1.0)
 }
 
 /// Whether a number is at most `good`, or more than `bad`.
@@ -90,11 +122,27 @@ mod tests {
 
     #[test]
     fn paired_margins_need_mean_and_majority() {
-        assert_eq!(paired(&[0.1, 0.1, -0.1]), Confirmed);
-        assert_eq!(paired(&[-0.1, -0.1, 0.1]), Refuted);
-        assert_eq!(paired(&[0.1, 0.1, -0.9]), NotDecided);
-        assert_eq!(paired(&[0.1, -0.01]), NotDecided);
+        let margins = |wins: usize, losses: usize, loss: f64| [vec![0.1; wins], vec![-loss; losses]].concat();
+        assert_eq!(paired(&margins(9, 1, 0.1)), Confirmed);
+        assert_eq!(paired(&margins(1, 9, 0.1)), Refuted);
+        // A mean against the majority, no majority, and one that chance may give.
+        assert_eq!(paired(&margins(9, 1, 9.0)), NotDecided);
+        assert_eq!(paired(&margins(30, 20, 0.1)), NotDecided);
+        assert_eq!(paired(&margins(6, 3, 0.1)), NotDecided);
+        assert_eq!([margins(4, 0, 0.0), margins(5, 0, 0.0)].map(|all| paired(&all)), [NotDecided, Confirmed]);
         assert_eq!(paired(&[]), NotDecided);
+    }
+
+    #[test]
+    fn the_sign_test_is_the_exact_binomial() {
+        let p = |wins: usize, losses: usize| sign_test(&[vec![1.0; wins], vec![-1.0; losses], vec![0.0; 3]].concat());
+        for (wins, losses, expected) in
+            [(5, 0, 2.0 / 32.0), (0, 5, 2.0 / 32.0), (4, 1, 12.0 / 32.0), (9, 1, 22.0 / 1024.0)]
+        {
+            assert!((p(wins, losses) - expected).abs() < 1e-12, "{wins} {losses}: {}", p(wins, losses));
+        }
+        assert_eq!([p(0, 0), p(2, 2)], [1.0, 1.0]);
+        assert!(p(2000, 1000) < 1e-60 && p(1500, 1500) == 1.0);
     }
 
     #[test]

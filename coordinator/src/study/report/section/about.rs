@@ -1,5 +1,6 @@
 //! How the study was made, so that it can be repeated.
 
+use super::cost;
 use crate::study::report::{
     document::{Block, Section, Table},
     statistics::median,
@@ -33,6 +34,7 @@ pub(super) fn section(study: &Study<'_>) -> anyhow::Result<Section> {
         table.row([what.to_owned(), value]);
     }
     section.blocks.push(Block::Table(table));
+    section.text(cost::SECONDS);
     section.text("The command:");
     section.blocks.push(Block::Code(about.command.clone()));
     photos(study, &mut section);
@@ -61,7 +63,7 @@ fn photos(study: &Study<'_>, section: &mut Section) {
 
 fn direct(study: &Study<'_>) -> Table {
     let columns = ["material", "light", "model", "size", "samples per pixel", "renderings", "median s"];
-    let mut table = Table::new("Direct renderings with their score, by which brute force is charged.", 3, columns);
+    let mut table = Table::new("Direct renderings, without their score, by which brute force is charged.", 3, columns);
     for cost in &study.data.direct {
         table.row([
             cost.material.clone(),

@@ -17,7 +17,7 @@ const MORE: [Method; 4] = [Method::Ours, Method::Subsets, Method::OursPolished, 
 pub(super) fn section(study: &Study<'_>) -> anyhow::Result<Section> {
     let mut section = Section::new("agreement", "Rank agreement, and more candidates");
     if study.data.agreements.is_empty() {
-        section = section.missing("rank agreements of Eq. 1 with CSSIM");
+        section = section.missing("the experiment \"agreement\"");
     } else {
         ranks(study, &mut section)?;
     }
@@ -85,15 +85,14 @@ fn more(study: &Study<'_>, section: &mut Section) {
         .filter_map(|cell| methods.iter().map(|method| study.grid(*method, cell)).collect())
         .collect();
     if !methods.contains(&Method::Subsets) || cells.is_empty() {
-        let needs =
-            "More candidates: not in this study: STUDY.toml needs the methods \"subsets\" and \"subsets+polish\".";
+        let needs = "More candidates: not in this study: STUDY.toml needs the experiments \"subsets\" and \"methods\".";
         return section.blocks.push(Block::Missing(needs.to_owned()));
     }
     let caption = format!(
         "More candidates from several subsets, over the {} that have every method.",
         text::count(cells.len(), "cell")
     );
-    let mut table = Table::new(&caption, 1, ["method", "mean CSSIM", "median CPU s", "median evaluations"]);
+    let mut table = Table::new(&caption, 1, ["method", "mean CSSIM", "median CPU s", "median evaluations", "of"]);
     let column = |i: usize, f: &dyn Fn(&Match<'_>) -> f64| cells.iter().map(|cell| f(&cell[i])).collect::<Vec<f64>>();
     for (i, method) in methods.iter().enumerate() {
         table.row([
@@ -101,6 +100,7 @@ fn more(study: &Study<'_>, section: &mut Section) {
             text::score(mean(&column(i, &|found| found.cssim))),
             text::significant(median(&column(i, &|found| found.cpu_seconds))),
             text::fixed(median(&column(i, &|found| u32::try_from(found.evaluations).map_or(f64::NAN, f64::from))), 0),
+            text::minimised(*method).to_owned(),
         ]);
     }
     let csv = table.csv("more-candidates");

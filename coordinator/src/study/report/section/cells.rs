@@ -19,7 +19,7 @@ pub(super) fn section(study: &Study<'_>) -> anyhow::Result<Section> {
     let mut section = Section::new("cells", "Every method in every cell");
     let cells = study.cells();
     if cells.is_empty() {
-        return Ok(section.missing("at least one material, one probe and one method of its grid"));
+        return Ok(section.missing("the experiment \"methods\", at least one material and one probe"));
     }
     let columns = columns(study, &cells);
     let scores: Vec<Vec<Option<f64>>> =

@@ -12,8 +12,10 @@ use crate::study::{
     row::{Method, Row},
 };
 
-/// The materials of the paper's figure.
-const PAPER: [&str; 3] = ["gold-metallic-paint3", "aluminium", "red-metallic-paint"];
+/// As many as the paper's figure has, and as the experiment extends.
+const SHOWN: usize = 3;
+/// The largest exponent of the grid.
+const LARGEST: f64 = 3.0;
 
 pub(super) fn section(study: &Study<'_>) -> anyhow::Result<Section> {
     let mut section = Section::new("gamma", "Figure 2: CSSIM over γ");
@@ -52,7 +54,7 @@ pub(super) fn section(study: &Study<'_>) -> anyhow::Result<Section> {
     }
     if minima.is_empty() {
         return Ok(
-            section.missing("candidates of several gammas of one subset, of at least one of the paper's materials")
+            section.missing("the experiment \"methods\" or \"gamma\", and one of the first three of the six materials")
         );
     }
     let csv = table.csv("fig2-minima");
@@ -70,13 +72,11 @@ pub(super) fn section(study: &Study<'_>) -> anyhow::Result<Section> {
     Ok(section)
 }
 
-/// The paper's three, or the first three of its six, or of all.
+/// The first of the six, which are those that the experiment extends; of all, where the study does not name the six.
 fn materials<'a>(study: &Study<'a>) -> Vec<&'a str> {
     let about = &study.data.about;
-    let paper: Vec<&str> =
-        about.materials.iter().map(String::as_str).filter(|material| PAPER.contains(material)).collect();
-    let others = if about.six.is_empty() { &about.materials } else { &about.six };
-    if paper.len() == PAPER.len() { paper } else { others.iter().take(PAPER.len()).map(String::as_str).collect() }
+    let from = if about.six.is_empty() { &about.materials } else { &about.six };
+    from.iter().take(SHOWN).map(String::as_str).collect()
 }
 
 /// The candidates of the grid's seed by gamma, of equal ones the first.
@@ -86,6 +86,13 @@ pub(super) fn candidates<'a>(study: &Study<'a>, cell: (&str, &str)) -> Vec<&'a R
     let gamma = |row: &Row| row.gamma.unwrap_or(f64::NAN);
     rows.sort_by(|a, b| gamma(a).total_cmp(&gamma(b)));
     rows.dedup_by(|a, b| (gamma(a) - gamma(b)).abs() < 1e-9);
+    rows
+}
+
+/// Those of them that every cell has: without the exponents beyond 3 of an experiment of its own.
+pub(super) fn grid_candidates<'a>(study: &Study<'a>, cell: (&str, &str)) -> Vec<&'a Row> {
+    let mut rows = candidates(study, cell);
+    rows.retain(|row| row.gamma.is_some_and(|gamma| gamma <= LARGEST + 1e-9));
     rows
 }
 

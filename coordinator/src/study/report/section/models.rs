@@ -2,15 +2,18 @@
 
 use crate::study::{
     report::{
-        document::{Block, Section, Table},
+        document::{Block, Entry, Section, Table},
         statistics::mean,
         study::{Pick, Study},
         text,
-        verdict::{self, PAIRED_RULE, Verdict},
+        verdict::{self, Verdict},
     },
     row::Method,
 };
 use std::collections::BTreeSet;
+
+/// The model of the paper's results.
+const PAPER: &str = "cook-torrance";
 
 pub(super) fn section(study: &Study<'_>) -> anyhow::Result<Section> {
     let mut section = Section::new("models", "BRDF models");
@@ -20,7 +23,7 @@ pub(super) fn section(study: &Study<'_>) -> anyhow::Result<Section> {
     let scored: Vec<_> = study.cells().into_iter().map(|cell| (cell, scores(study, cell, &models))).collect();
     let scored: Vec<_> = scored.into_iter().filter(|(_, scores)| scores.iter().flatten().count() > 1).collect();
     if scored.is_empty() {
-        return Ok(section.missing("more than one model with the method \"ours+polish\""));
+        return Ok(section.missing("the experiment \"models\" beside \"methods\""));
     }
     let caption =
         "CSSIM of ours + polish by model, mean over the lights that have every model of the row; the best in bold.";
@@ -43,14 +46,21 @@ pub(super) fn section(study: &Study<'_>) -> anyhow::Result<Section> {
     }
     let csv = table.csv("models");
     section.blocks.extend([Block::Table(table), Block::Data(csv)]);
-    let wins = models
-        .iter()
-        .enumerate()
-        .map(|(i, model)| format!("{model} {}", scored.iter().filter(|(_, scores)| best(scores) == Some(i)).count()));
-    let words =
-        format!("Lowest CSSIM, of {}: {}.", text::count(scored.len(), "cell"), wins.collect::<Vec<_>>().join(", "));
-    section.finding(Verdict::Measured, words);
-    let (verdict, words) = ggx(&models, &scored);
+    let wins = models.iter().enumerate().map(|(i, model)| {
+        let has = scored.iter().filter(|(_, scores)| scores[i].is_some()).count();
+        let wins = scored.iter().filter(|(_, scores)| best(scores) == Some(i)).count();
+        format!("{model} in {}", text::share(wins, has))
+    });
+    let wins: Vec<String> = wins.collect();
+    section.finding(
+        Verdict::Measured,
+        format!("Lowest CSSIM, of the cells that a model has beside another: {}.", wins.join(", ")),
+    );
+    if let Some(table) = cells(study) {
+        let csv = table.csv("models-cells");
+        section.blocks.extend([Block::Table(table), Block::Data(csv)]);
+    }
+    let (verdict, words) = claim(study);
     section.finding(verdict, words);
     Ok(section)
 }
@@ -73,23 +83,77 @@ fn best(scores: &[Option<f64>]) -> Option<usize> {
     there.min_by(|a, b| a.1.total_cmp(&b.1)).map(|best| best.0)
 }
 
-/// A cell and its scores by model.
-type Scored<'a> = ((&'a str, &'a str), Vec<Option<f64>>);
+/// CSSIM of the study's model with polish, and of the paper's, in the cells that have both.
+type Pairs<'a> = Vec<((&'a str, &'a str), f64, f64)>;
 
-/// [BP20a] holds GGX to be the better of the two.
-fn ggx(models: &[&str], scored: &[Scored<'_>]) -> (Verdict, String) {
-    let place = |name: &str| models.iter().position(|model| *model == name);
-    let margin = |scores: &Vec<Option<f64>>| Some(scores[place("cook-torrance")?]? - scores[place("ggx")?]?);
-    let margins: Vec<f64> = scored.iter().filter_map(|(_, scores)| margin(scores)).collect();
-    if margins.is_empty() {
-        return (Verdict::NotDecided, "GGX against Cook-Torrance: not in this study.".to_owned());
-    }
-    let wins = margins.iter().filter(|margin| **margin > 0.0).count();
-    let words = format!(
-        "GGX beats Cook-Torrance in {} cells, by a CSSIM of {} in the mean, on the claim of [BP20a] that GGX is the better model; \
-         {PAIRED_RULE}.",
-        text::share(wins, margins.len()),
-        text::signed(mean(&margins))
+/// The paper's model by a method beside the study's with polish, in some cells.
+fn pairs<'a>(study: &Study<'a>, cells: Vec<(&'a str, &'a str)>, rival: Method) -> Pairs<'a> {
+    let score = |method, model, cell| Some(study.find(&Pick { model: Some(model), ..study.pick(method, cell) })?.cssim);
+    let pair = |cell| Some((cell, score(Method::OursPolished, &study.model, cell)?, score(rival, PAPER, cell)?));
+    cells.into_iter().filter_map(pair).collect()
+}
+
+/// Both models cell by cell.
+fn cells(study: &Study<'_>) -> Option<Table> {
+    let pairs = pairs(study, study.six(), Method::OursPolished);
+    let model = study.model.as_str();
+    let caption = format!(
+        "CSSIM of ours + polish with {model} and with {PAPER}, the better in bold; a positive difference: {model} is worse."
     );
-    (verdict::paired(&margins), words)
+    let mut table = Table::new(&caption, 2, ["material", "light", model, PAPER, "difference"]);
+    for ((material, probe), ours, rival) in &pairs {
+        table.scores([*material, text::light(probe)], &[Some(*ours), Some(*rival)]);
+        table.rows.last_mut()?.push(Entry::of(text::signed(Some(ours - rival))));
+    }
+    (model != PAPER && !pairs.is_empty()).then_some(table)
+}
+
+/// Whether the study's model is the better one, as [BP20a] holds of GGX against Cook-Torrance, and the numbers.
+pub(super) fn claim(study: &Study<'_>) -> (Verdict, String) {
+    if study.model == PAPER {
+        return (Verdict::NotDecided, format!("{PAPER} is the model of this study."));
+    }
+    let polished = pairs(study, study.six(), Method::OursPolished);
+    let paper = pairs(study, study.cells(), Method::Paper);
+    let margins = |pairs: &Pairs<'_>| pairs.iter().map(|(_, ours, rival)| rival - ours).collect::<Vec<f64>>();
+    let (rival, all) = (margins(&polished), margins(&paper));
+    let parts: Vec<String> = [
+        compared(study, &polished, "both with polish, on the six materials"),
+        compared(study, &paper, "the paper's method without polish against ours with it, on all materials"),
+    ]
+    .into_iter()
+    .flatten()
+    .collect();
+    // The paper's method has no polish: it is the judge only where the models alone were not compared.
+    let judged = if rival.is_empty() { &all } else { &rival };
+    if parts.is_empty() {
+        return (Verdict::NotDecided, text::ABSENT.to_owned());
+    }
+    let words = format!(
+        "{} [BP20a] holds GGX to be the better model; judged by the first: {}.",
+        parts.join(" "),
+        verdict::rule(judged)
+    );
+    (verdict::paired(judged), words)
+}
+
+/// Which of the two models wins, by how much and where most, said plainly; none where no cell has both.
+fn compared(study: &Study<'_>, pairs: &Pairs<'_>, how: &str) -> Option<String> {
+    let ours = mean(&pairs.iter().map(|pair| pair.1).collect::<Vec<_>>())?;
+    let rival = mean(&pairs.iter().map(|pair| pair.2).collect::<Vec<_>>())?;
+    let wins = pairs.iter().filter(|(_, ours, rival)| ours < rival).count();
+    let (cell, worst_ours, worst_rival) = pairs.iter().max_by(|a, b| (a.1 - a.2).total_cmp(&(b.1 - b.2)))?;
+    let verb = if ours > rival { "loses to" } else { "beats" };
+    Some(format!(
+        "The default model {} {verb} {PAPER} by {} in mean CSSIM ({} against {}; {how}): it is the better one in {} cells, and \
+         does worst against it at {} ({} against {}).",
+        study.model,
+        text::score(Some((rival - ours).abs())),
+        text::score(Some(ours)),
+        text::score(Some(rival)),
+        text::share(wins, pairs.len()),
+        text::cell(cell.0, cell.1),
+        text::score(Some(*worst_ours)),
+        text::score(Some(*worst_rival))
+    ))
 }

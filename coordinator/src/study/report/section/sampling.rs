@@ -6,8 +6,7 @@ use crate::study::{
         document::{Block, Section, Table},
         statistics::mean,
         study::{Pick, Study},
-        text,
-        verdict::{self, PAIRED_RULE},
+        text, verdict,
     },
     row::Method,
 };
@@ -22,9 +21,7 @@ pub(super) fn section(study: &Study<'_>) -> anyhow::Result<Section> {
     let kinds: Vec<&str> =
         KINDS.into_iter().filter(|kind| SAMPLES.iter().any(|samples| measured(*samples, kind))).collect();
     if kinds.len() < 2 {
-        return Ok(
-            section.missing("the method \"ours\" with sampling \"importance\" and \"stratified\" or \"uniform\"")
-        );
+        return Ok(section.missing("the experiment \"sampling\""));
     }
     let mut table = Table::new(
         "Mean CSSIM over the cells that have each; the best in bold.",
@@ -58,10 +55,11 @@ pub(super) fn section(study: &Study<'_>) -> anyhow::Result<Section> {
     section.blocks.push(Block::Table(table));
     let wins = margins.iter().filter(|margin| **margin > 0.0).count();
     let words = format!(
-        "{} beats the others in {} comparisons, by a CSSIM of {} in the mean; {PAIRED_RULE}.",
+        "{} beats the others in {} comparisons, by a CSSIM of {} in the mean; {}.",
         capitalised(kinds[0]),
         text::share(wins, margins.len()),
-        text::signed(mean(&margins))
+        text::signed(mean(&margins)),
+        verdict::rule(&margins)
     );
     section.finding(verdict::paired(&margins), words);
     Ok(section)

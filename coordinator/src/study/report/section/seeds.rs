@@ -26,7 +26,7 @@ pub(super) fn section(study: &Study<'_>) -> anyhow::Result<Section> {
         .filter(|level| !level.1.is_empty())
         .collect();
     if levels.is_empty() {
-        section = section.missing("the method \"ours\" with several seeds at 32, 64 or 256 samples");
+        section = section.missing("the experiment \"spread\" with several seeds");
     } else {
         spread(&levels, &mut section)?;
     }
@@ -148,7 +148,7 @@ fn polish(study: &Study<'_>, section: &mut Section) {
     let gains: Vec<f64> =
         study.pairs(Method::Ours, Method::OursPolished).iter().map(|(_, ours, polished)| ours - polished).collect();
     let Some((low, high)) = range(&gains) else {
-        let needs = "Gain of polish: not in this study: STUDY.toml needs the methods \"ours\" and \"ours+polish\".";
+        let needs = "Gain of polish: not in this study: STUDY.toml needs the experiment \"methods\".";
         return section.blocks.push(Block::Missing(needs.to_owned()));
     };
     let words = format!(

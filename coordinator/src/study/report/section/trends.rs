@@ -1,6 +1,6 @@
 //! How the parameters of the candidates move with gamma.
 
-use super::gamma::candidates;
+use super::gamma::grid_candidates;
 use crate::study::{
     report::{
         chart::{Axis, Plot, Series, colour},
@@ -8,7 +8,7 @@ use crate::study::{
         statistics::{mean, number, spearman},
         study::Study,
         text,
-        verdict::{self, PAIRED_RULE, Verdict},
+        verdict::{self, Verdict},
     },
     row::Row,
 };
@@ -22,9 +22,9 @@ pub(super) fn section(study: &Study<'_>) -> anyhow::Result<Section> {
     let mut section = Section::new("trends", "Parameters over γ");
     let cells = study.cells();
     let curves: Vec<_> =
-        cells.iter().map(|cell| (*cell, candidates(study, *cell))).filter(|curve| curve.1.len() > 2).collect();
+        cells.iter().map(|cell| (*cell, grid_candidates(study, *cell))).filter(|curve| curve.1.len() > 2).collect();
     if curves.is_empty() {
-        return Ok(section.missing("candidates of at least three gammas with their parameters"));
+        return Ok(section.missing("the experiment \"methods\", whose candidates have at least three gammas"));
     }
     let mut table = Table::new(
         "Spearman's rank correlation with γ: above 0, the parameter grows with it.",
@@ -52,8 +52,11 @@ pub(super) fn section(study: &Study<'_>) -> anyhow::Result<Section> {
             text::fixed(mean(trends), 2)
         )
     };
-    let words =
-        format!("The width of the lobe {} (the paper: low γ sharp, high γ blurry); {PAIRED_RULE}.", signs(&trends[0]));
+    let words = format!(
+        "The width of the lobe {} (the paper: low γ sharp, high γ blurry); {}.",
+        signs(&trends[0]),
+        verdict::rule(&trends[0])
+    );
     section
         .finding(verdict::paired(&trends[0]), words.replace("margin", "correlation").replace("comparisons", "cells"));
     section.finding(Verdict::Measured, format!("The mean diffuse albedo {}.", signs(&trends[1])));
