@@ -16,7 +16,7 @@ pub(super) struct CellPlanner {
 
 #[derive(Debug)]
 enum Inner {
-    Photo(PhotoPlanner),
+    Photo(Box<PhotoPlanner>),
     Fit(Box<FitPlanner>),
     Survey(Box<SurveyPlanner>),
 }
@@ -27,12 +27,12 @@ pub(super) enum Outcome {
     /// The image, and the standard error of a typical pixel.
     Photo(Image, Option<f64>),
     Fit(Box<FitOutcome>),
-    Survey(SurveyOutcome),
+    Survey(Box<SurveyOutcome>),
 }
 
 impl CellPlanner {
     pub(super) fn photo(planner: PhotoPlanner) -> Self {
-        Self { inner: Inner::Photo(planner), labels: BTreeSet::new() }
+        Self { inner: Inner::Photo(Box::new(planner)), labels: BTreeSet::new() }
     }
 
     pub(super) fn fit(planner: FitPlanner) -> Self {
@@ -48,14 +48,14 @@ impl CellPlanner {
         let outcome = match self.inner {
             Inner::Photo(planner) => planner.into_photo().map(|(image, noise)| Outcome::Photo(image, noise)),
             Inner::Fit(planner) => planner.into_outcome().map(|outcome| Outcome::Fit(Box::new(outcome))),
-            Inner::Survey(planner) => planner.into_outcome().map(Outcome::Survey),
+            Inner::Survey(planner) => planner.into_outcome().map(|outcome| Outcome::Survey(Box::new(outcome))),
         };
         (self.labels, outcome)
     }
 
     fn inner(&mut self) -> &mut dyn Planner {
         match &mut self.inner {
-            Inner::Photo(planner) => planner,
+            Inner::Photo(planner) => &mut **planner,
             Inner::Fit(planner) => &mut **planner,
             Inner::Survey(planner) => &mut **planner,
         }

@@ -13,12 +13,14 @@ struct Fit {
     own: u8,
     leaves: Vec<NodeId>,
     open: usize,
+    /// It holds its leaves as long as it may.
+    keeps: bool,
     result: Option<Vec<u8>>,
 }
 
 impl Fit {
     fn new(shared: u8, own: u8) -> Self {
-        Self { shared, own, leaves: Vec::new(), open: 2, result: None }
+        Self { shared, own, leaves: Vec::new(), open: 2, keeps: false, result: None }
     }
 }
 
@@ -48,7 +50,7 @@ impl Planner for Fit {
         if self.open == 0 {
             let inputs = self.leaves.iter().map(|leaf| Input::OutputOf(*leaf)).collect();
             graph.add_node(node("leaf", "join", vec![], inputs))?;
-            self.leaves.iter().for_each(|leaf| graph.release(*leaf));
+            self.leaves.iter().filter(|_| !self.keeps).for_each(|leaf| graph.release(*leaf));
         }
         Ok(())
     }
@@ -81,6 +83,8 @@ struct Bench {
     most_active: usize,
     most_ready: usize,
     is_fail_fast: bool,
+    /// The number of a part that stays.
+    stays: Option<u32>,
     /// How many may begin until the test says otherwise, but for one that is waited for.
     there: Option<u32>,
     safe: Vec<u32>,
@@ -104,7 +108,12 @@ impl Parts for Bench {
         let Some(planner) = self.coming.pop() else { return Ok(Next::End) };
         let number = self.next;
         self.next += 1;
-        Ok(Next::Part(Box::new(Part { number, name: format!("fit-{number}"), planner, stays: false })))
+        Ok(Next::Part(Box::new(Part {
+            number,
+            name: format!("fit-{number}"),
+            planner,
+            stays: self.stays == Some(number),
+        })))
     }
 
     fn wants_more(&self, active: usize, ready: usize) -> bool {
@@ -180,6 +189,23 @@ fn part_that_was_not_there_in_time_begins_when_it_is_and_no_node_has_to_end_for_
     planner.parts.there = None;
     planner.look_again(&mut GraphEdit::new(&mut graph)).unwrap();
     assert_eq!(graph.len(), 4);
+}
+
+#[test]
+fn part_that_stays_holds_its_nodes_for_all_that_follow_and_does_not_keep_the_run_from_its_end() {
+    for stays in [None, Some(0)] {
+        let fits = [(1, 2), (3, 4), (5, 6), (1, 2)].map(|(shared, own)| Fit { keeps: true, ..Fit::new(shared, own) });
+        let bench = Bench { stays, most_active: 2, ..Bench::new(fits.into()) };
+        let (bench, ran) = run(bench, Execution::Sequential);
+        let names: Vec<&str> = bench.ended.iter().map(|(name, _)| &**name).collect();
+        let last = bench.ended.last().unwrap().1.clone();
+        assert_eq!(last, Ok(alone(1, 2)));
+        if stays.is_some() {
+            assert_eq!((names, ran.len()), (vec!["fit-1", "fit-2", "fit-3"], 9));
+        } else {
+            assert_eq!((names.len(), ran.len()), (4, 12), "what nobody holds runs again");
+        }
+    }
 }
 
 #[test]
