@@ -93,7 +93,9 @@ fn run_cells(
     (supply, seconds): (Supply, &mut Seconds),
     metrics: Option<&Metrics>,
 ) -> anyhow::Result<u32> {
-    let mut progress = Progress::new(settings.progress, inputs.cells.len());
+    // Tables stay until the run ends.
+    let ending = inputs.cells.iter().filter(|cell| !matches!(cell.task, cells::Task::Table)).count();
+    let mut progress = Progress::new(settings.progress, ending);
     progress.complete(lock(tally).complete);
     let mut options = runner_options(&settings.cluster, &inputs.out, inputs.study.file.seed);
     // Seconds of a node are those of one core.

@@ -96,7 +96,8 @@ impl Supply {
             supply.state[id] = State::Complete;
         }
         supply.settle_tables();
-        supply.tell(|tally| tally.complete = supply.state.iter().filter(|state| **state == State::Complete).count());
+        let is_kept = |id: &CellId| supply.records.contains_key(id);
+        supply.tell(|tally| tally.complete = (0..inputs.cells.len()).filter(is_kept).count());
         Ok(supply)
     }
 
