@@ -68,7 +68,12 @@ pub(crate) fn run(settings: StudySettings) -> anyhow::Result<ExitCode> {
     let mut seconds = Seconds::open(&inputs.out)?;
     let supply = Supply::new(Arc::clone(&inputs), Arc::clone(&tally))?;
     let mut effort = Effort::read(&inputs.out);
-    if !supply.is_complete() || !inputs.out.file(JOURNAL_FILE).exists() {
+    let journal = inputs.out.file(JOURNAL_FILE);
+    if journal.exists() {
+        // Refuses the run of another study, also where nothing is left to compute.
+        journal::finished(&journal, &identity(&inputs)?).map_err(journal_failed)?;
+    }
+    if !supply.is_complete() || !journal.exists() {
         let workers = run_cells(&settings, &inputs, &tally, (supply, &mut seconds), metrics.as_ref())?;
         effort.seconds += began.elapsed().as_secs_f64();
         effort.workers = effort.workers.max(workers);

@@ -85,7 +85,8 @@ fn links_and_paths_in_documents_resolve() {
 
 #[test]
 fn commands_and_flags_in_documents_exist() {
-    const COMMANDS: [&str; 8] = ["access new", "batch", "demo", "fit", "status", "render", "compare", "worker"];
+    const COMMANDS: [&str; 9] =
+        ["access new", "batch", "demo", "fit", "status", "study", "render", "compare", "worker"];
     const OF_CARGO: [&str; 10] = [
         "--bench",
         "--bin",
