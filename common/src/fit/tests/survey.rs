@@ -28,13 +28,13 @@ fn brute_force_comes_near_the_material_and_its_score_is_that_of_its_point() {
     let found =
         survey(SurveyRequest { starts: vec![START.to_vec()], max_evaluations: Some(600), ..Default::default() });
     let minimum = &found.minima[0];
-    assert!(minimum.evaluations <= 600 && minimum.cssim < 0.05, "{minimum:?}");
+    assert!(minimum.evaluations <= 600, "{minimum:?}");
     let points = vec![MATERIAL.to_vec(), minimum.parameters.clone(), START.to_vec()];
     let gammas = vec![1.0, 2.0];
     let appraised = survey(SurveyRequest { points, gammas, pictures: 2, ..Default::default() });
     let [truth, again, start] = &appraised.appraisals[..] else { panic!("{appraised:?}") };
     assert_eq!((again.cssim, again.cssim_object), (minimum.cssim, minimum.cssim_object));
-    assert!(truth.cssim < again.cssim && again.cssim < start.cssim, "{appraised:?}");
+    assert!(truth.cssim < again.cssim && again.cssim < 0.5 * start.cssim, "{appraised:?}");
     assert!(truth.costs.iter().zip(&start.costs).all(|(true_cost, cost)| true_cost < cost));
     assert_eq!((appraised.images.len(), found.images.len()), (2, 1));
     assert_eq!(appraised.images[1], found.images[0]);
