@@ -39,7 +39,7 @@ impl Seconds {
         let mut file = file.with_context(|| format!("cannot write {shown}"))?;
         // A line that was cut off ends here.
         let end = if text.is_empty() || text.ends_with('\n') { "" } else { "\n" };
-        write!(file, "{end}{EPOCH}\n").with_context(|| format!("cannot write {shown}"))?;
+        writeln!(file, "{end}{EPOCH}").with_context(|| format!("cannot write {shown}"))?;
         Ok(Self { before, now: BTreeMap::new(), file })
     }
 
