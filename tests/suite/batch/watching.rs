@@ -89,8 +89,9 @@ fn scrape(address: &str) -> String {
 #[test]
 fn metrics_tell_what_waits_for_workers() {
     let models = "models = ['ggx', 'cook-torrance']";
-    let folder =
-        folder(&format!("photos = ['photo.exr', 'red.exr']\nenvironments = 'map.exr'\n{models}\n[defaults]\n{QUICK}\npolish = 'off'"));
+    let folder = folder(&format!(
+        "photos = ['photo.exr', 'red.exr']\nenvironments = 'map.exr'\n{models}\n[defaults]\n{QUICK}\npolish = 'off'"
+    ));
     let process = start(&folder, "--workers 0 --metrics 0");
     let coordinator = process.id();
     let (mut address, mut page) = (None, None);
