@@ -28,8 +28,8 @@ fn tables_agree_with_the_direct_integrator_in_a_room() {
         .check(&scene);
 }
 
-/// Once the `F5` part was 0.3 % too dark near the rim (`render::cut::spread`). GGX and Cook-Torrance: the lobe of Ashikhmin & Shirley, whose
-/// kink at equal angles a second-order spread does not see, is off by more than the tolerance here.
+/// Once the `F5` part was 0.3 % too dark near the rim (`render::cut::spread`). GGX and Cook-Torrance: the tables of `ashikhmin-shirley` do
+/// not pass here (CHANGELOG.md, "Known").
 #[test]
 fn fresnel_part_of_sharp_lobes_agrees_at_the_rim_under_a_sun_of_one_texel() {
     let scene = Scene::sphere(256, Camera::Orthographic, synthetic::one_texel_sun(256, 80, 100)).unwrap();
