@@ -5,7 +5,7 @@
 
 use super::{Case, EFFORT, QUICK, TOLERANCE, knots};
 use lookalike::{
-    brdf::{MODELS, Material},
+    brdf::{MODELS, Material, Model, Split},
     render::{
         knots::PER_OCTAVE,
         transport::{Accuracy, Pixel, TransportPlan},
@@ -24,16 +24,27 @@ const SUBSET: &[(Accuracy, f64)] = &[(Accuracy::SUBSET, TOLERANCE)];
 #[test]
 fn tables_agree_with_the_direct_integrator_in_a_room() {
     let scene = Scene::sphere(256, Camera::Orthographic, synthetic::room(128)).unwrap();
-    Case { name: "room", models: MODELS, alphas: &[0.01, 0.4], pixels: 24, accuracies: SUBSET, rigour: QUICK }
-        .check(&scene);
+    Case {
+        name: "room",
+        models: MODELS,
+        except: &[],
+        alphas: &[0.01, 0.4],
+        pixels: 24,
+        accuracies: SUBSET,
+        rigour: QUICK,
+    }
+    .check(&scene);
 }
 
-/// Once the `F5` part was 0.3 % too dark near the rim (`render::cut::spread`). GGX and Cook-Torrance: the tables of `ashikhmin-shirley` do
-/// not pass here (CHANGELOG.md, "Known").
+/// Once the `F5` part was 0.3 % too dark near the rim (`render::cut::spread`). Of every model with such a part; the diffuse lobe of
+/// `ashikhmin-shirley` is left out, which is off by 0.34 % here (2.5 % in the worst pixel; CHANGELOG.md, "Known").
 #[test]
 fn fresnel_part_of_sharp_lobes_agrees_at_the_rim_under_a_sun_of_one_texel() {
     let scene = Scene::sphere(256, Camera::Orthographic, synthetic::one_texel_sun(256, 80, 100)).unwrap();
-    Case { name: "sun", models: &MODELS[..2], alphas: &[0.01, 0.1], pixels: 64, accuracies: SUBSET, rigour: QUICK }
+    let splits = |model: &&&dyn Model| model.lobes().iter().any(|basis| basis.lobe.split() == Split::Schlick);
+    let fresnel: Vec<&dyn Model> = MODELS.iter().filter(splits).copied().collect();
+    let except = &["ashikhmin-shirley diffuse"];
+    Case { name: "sun", models: &fresnel, except, alphas: &[0.01, 0.1], pixels: 64, accuracies: SUBSET, rigour: QUICK }
         .check(&scene);
 }
 
@@ -41,8 +52,16 @@ fn fresnel_part_of_sharp_lobes_agrees_at_the_rim_under_a_sun_of_one_texel() {
 fn tables_agree_with_the_direct_integrator_through_a_perspective_camera() {
     let camera = Camera::perspective(50.0).unwrap();
     let scene = Scene::sphere(256, camera, synthetic::room_at_dusk(64)).unwrap();
-    Case { name: "perspective", models: &MODELS[..2], alphas: &[0.1], pixels: 24, accuracies: SUBSET, rigour: QUICK }
-        .check(&scene);
+    Case {
+        name: "perspective",
+        models: &MODELS[..2],
+        except: &[],
+        alphas: &[0.1],
+        pixels: 24,
+        accuracies: SUBSET,
+        rigour: QUICK,
+    }
+    .check(&scene);
 }
 
 /// Pixels that the silhouette cuts never enter stage one; in full images they count by their coverage, and so do their errors here.
