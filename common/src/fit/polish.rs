@@ -2,7 +2,7 @@
 //! the winner's width (design section 2).
 //!
 //! The design asks for a pattern search. CSSIM is smooth in the parameters, though its valleys are narrow: a projected quasi-Newton
-//! search ends in fewer evaluations below where a pattern search of 7,000 ends (`lookalike study`, docs/results.md).
+//! search ends in a few hundred evaluations where a pattern search of 7,000 ends (docs/results.md).
 
 use super::{
     method::{JudgedBy, SearchKind},
