@@ -143,11 +143,13 @@ impl Plan<'_> {
                 let method = Method { subsets: SUBSETS, ..self.method() };
                 self.fit(scene, MethodName::Subsets, method, |task| task);
             }
-            if models && Some(light) == repeat {
-                self.other_models(scene)?;
-            }
             if has_agreement {
                 self.agreement(scene);
+            }
+        }
+        if models {
+            for (light, material) in product(probes, &all) {
+                self.other_models(self.scene(material, light), Some(light) == repeat)?;
             }
         }
         if has_held_out {
@@ -330,9 +332,10 @@ impl Plan<'_> {
         }
     }
 
-    /// The first of the other models on every material, the rest on a few.
-    fn other_models(&mut self, scene: Scene) -> anyhow::Result<()> {
-        let is_repeated = self.study.numbers(&self.study.file.repeat_materials).contains(&scene.material);
+    /// The first of the other models in every scene, the rest on a few materials under the light of the experiments that repeat.
+    fn other_models(&mut self, scene: Scene, is_repeat_probe: bool) -> anyhow::Result<()> {
+        let materials = self.study.numbers(&self.study.file.repeat_materials);
+        let is_repeated = is_repeat_probe && materials.contains(&scene.material);
         for (m, name) in self.study.file.models.clone().into_iter().enumerate() {
             if m == 0 || is_repeated {
                 let method = Method { model: brdf::model(&name)?, ..self.method() };

@@ -27,8 +27,8 @@ pub(super) struct StudyFile {
     /// The model of most experiments.
     #[serde(default = "default_model")]
     pub(super) model: String,
-    /// Models of the table of models, beside it: the first of them on the six, the others on the materials of the experiments
-    /// that repeat, all under the light of these.
+    /// Models of the table of models, beside it: the first of them on every material under every probe, the others on the
+    /// materials of the experiments that repeat, under the light of these.
     #[serde(default)]
     pub(super) models: Vec<String>,
     /// Columns and rows of the photos.
