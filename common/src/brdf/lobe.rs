@@ -60,6 +60,18 @@ pub trait Lobe: Debug + Sync {
         1.0
     }
 
+    /// Bound of the second derivative of `f cos(theta_i)`, in units of `1/pi`, by the light's cosine alone, for a lobe as wide as the
+    /// hemisphere: where it is not 0, the quadrature is refined up to the horizon too.
+    fn bend(&self) -> f64 {
+        0.0
+    }
+
+    /// The turn of the normal, in radians, within which a lobe of this width varies little: narrower than the lobe where it changes
+    /// fast with the viewer's cosine `cos_o`.
+    fn footprint(&self, width: f64, _cos_o: f64) -> f64 {
+        width
+    }
+
     /// `f cos(theta_i)` in 1/sr, without Fresnel term; zero for light from below the horizon.
     fn eval(&self, angles: &Angles, width: f64) -> f64;
 

@@ -18,8 +18,8 @@ use std::f64::consts::PI;
 /// What the cut is refined for: a range of lobe widths, or the cosine lobe.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Band {
-    /// A lobe as wide as the hemisphere.
-    Diffuse,
+    /// A lobe as wide as the hemisphere, with its [bend](crate::brdf::Lobe::bend).
+    Diffuse(f64),
     /// Microfacet lobes of GGX alpha from `.0` to `.1`.
     Glossy(f64, f64),
 }
@@ -29,7 +29,7 @@ impl Band {
     #[must_use]
     pub fn sharpest(self) -> f64 {
         match self {
-            Self::Diffuse => 1.0,
+            Self::Diffuse(_) => 1.0,
             Self::Glossy(lower, _) => lower,
         }
     }
@@ -72,7 +72,7 @@ impl Cut {
         // The `F5` part of a lobe has a twentieth of its mean radiance and nearly all of it towards the rim, where n.v is small: with
         // the same tolerance everywhere its relative error would be twenty times that of the lobe.
         let tolerance = match band {
-            Band::Diffuse => tolerance,
+            Band::Diffuse(_) => tolerance,
             Band::Glossy(sharpest, _) => tolerance * point.cos_o.max(LEAST_COS_D) * (EVEN / sharpest).min(1.0),
         };
         self.nodes.clear();
@@ -130,12 +130,12 @@ struct Bound<'a> {
 impl<'a> Bound<'a> {
     fn new(point: &'a Point, reach: f64, band: Band) -> Self {
         let (lower, upper) = match band {
-            Band::Diffuse => (1.0, 1.0),
+            Band::Diffuse(_) => (1.0, 1.0),
             Band::Glossy(lower, upper) => (lower, upper),
         };
         let a2 = lower * lower;
         let shading = match band {
-            Band::Diffuse => 1.0 / PI,
+            Band::Diffuse(_) => 1.0 / PI,
             Band::Glossy(..) => 0.5 / (point.cos_o + (a2 + (1.0 - a2) * point.cos_o * point.cos_o).sqrt()),
         };
         Self { point, reach, band, shading, squares: [a2, upper * upper], lower }
@@ -147,8 +147,8 @@ impl<'a> Bound<'a> {
         let horizon = cos_i < f64::from(node.radius) + self.reach;
         let error = match self.band {
             // The cosine has curvature cos; at the horizon it has a kink, a first-order error over the part that is cut off.
-            Band::Diffuse if horizon => DIFFUSE_CARE * KINK * spread2.sqrt(),
-            Band::Diffuse => DIFFUSE_CARE * 0.5 * spread2 * cos_i.abs(),
+            Band::Diffuse(_) if horizon => DIFFUSE_CARE * KINK * spread2.sqrt(),
+            Band::Diffuse(bend) => DIFFUSE_CARE * 0.5 * spread2 * (cos_i.abs() + bend),
             Band::Glossy(..) => {
                 let (distribution, curvature) = self.peak_over(node, centroid);
                 let kink = if horizon { KINK * (spread2.sqrt() / self.lower).min(1.0) } else { 0.0 };

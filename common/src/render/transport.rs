@@ -129,7 +129,7 @@ impl TransportPlan {
         let tolerance = self.accuracy.tolerance * pyramid.mean_radiance() / lobe.care();
         let mut sums = vec![vec![0.0; lobe_terms(lobe) * 3 * widths.len()]; pixels.len()];
         let points: Vec<Seen> =
-            pixels.iter().enumerate().flat_map(|(i, &pixel)| self.points(geometry, i, pixel, band)).collect();
+            pixels.iter().enumerate().flat_map(|(i, &pixel)| self.points(geometry, i, pixel, (lobe, band))).collect();
         for group in groups(&points, band.sharpest() * REACH) {
             let (centre, reach) = around(group);
             cut.refine(pyramid, &centre, reach, band, tolerance);
@@ -141,7 +141,13 @@ impl TransportPlan {
     }
 
     /// Surface points of a pixel.
-    fn points(&self, geometry: &Geometry, pixel: usize, [column, row]: Pixel, band: Band) -> Vec<Seen> {
+    fn points(
+        &self,
+        geometry: &Geometry,
+        pixel: usize,
+        [column, row]: Pixel,
+        (lobe, band): (&dyn Lobe, Band),
+    ) -> Vec<Seen> {
         let at = |p: &Position| {
             let surface = geometry.point(f64::from(column) + p.x, f64::from(row) + p.y)?;
             Some(Seen { pixel, point: Point::new(surface.normal, surface.view)?, share: p.weight })
@@ -153,7 +159,9 @@ impl TransportPlan {
             seen(&footprint::on_object(hit))
         } else {
             let spread = geometry.normal_spread(c, r) / self.accuracy.footprint;
-            seen(&footprint::positions(spread, band.sharpest()))
+            let centre = geometry.point(f64::from(column) + 0.5, f64::from(row) + 0.5);
+            let cos_o = centre.map_or(1.0, |surface| surface.normal.dot(surface.view));
+            seen(&footprint::positions(spread, lobe.footprint(band.sharpest(), cos_o)))
         };
         let total: f64 = points.iter().map(|seen| seen.share).sum();
         points.iter_mut().for_each(|seen| seen.share /= total);
@@ -201,7 +209,7 @@ fn around(group: &[Seen]) -> (Point, f64) {
 /// Splits ascending widths into runs that share a cut.
 fn bands(lobe: &dyn Lobe, widths: &[f64]) -> Vec<(Band, std::ops::Range<usize>)> {
     let Some(alphas) = widths.iter().map(|&w| lobe.equivalent_alpha(w)).collect::<Option<Vec<f64>>>() else {
-        return vec![(Band::Diffuse, 0..widths.len())];
+        return vec![(Band::Diffuse(lobe.bend()), 0..widths.len())];
     };
     // Equal numbers of knots per band, as many bands as the ratio asks for.
     let span = alphas.iter().fold(0.0_f64, |m, &a| m.max(a)) / alphas.iter().fold(f64::INFINITY, |m, &a| m.min(a));
