@@ -131,10 +131,10 @@ fn what_is_not_there_yet_says_so_and_what_to_do() {
         (format!("{fit} --exposure-gain rgb"), &["degenerate", "--anchor"]),
         (format!("{fit} --exposure-gain rgb --anchor f0=.04"), &["--anchor is not there yet"]),
         (
-            format!("{fit} --model disney"),
+            format!("{fit} --model merl"),
             &[
-                "the model disney is not there yet",
-                "this version fits ggx, cook-torrance, ward, blinn-phong, ashikhmin-shirley",
+                "the model merl is not there yet",
+                "this version fits ggx, cook-torrance, ward, blinn-phong, ashikhmin-shirley, disney",
             ],
         ),
     ] {

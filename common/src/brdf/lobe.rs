@@ -13,6 +13,15 @@ pub enum Split {
     Schlick,
 }
 
+/// How fast a lobe's distribution falls with the angle of the half vector, `u = sin^2(th)`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Tail {
+    /// No slower than GGX: as `1/u^2`.
+    Short,
+    /// As `1/u`: a generalised Trowbridge-Reitz distribution of exponent 1 (Burley 2012, section B.2.1).
+    Long,
+}
+
 /// One direction of incoming light with the energy that arrives from it.
 #[derive(Debug, Clone, Copy)]
 pub struct Incident {
@@ -58,6 +67,11 @@ pub trait Lobe: Debug + Sync {
     /// of the tolerance.
     fn care(&self) -> f64 {
         1.0
+    }
+
+    /// How its distribution falls, for adaptive quadrature.
+    fn tail(&self) -> Tail {
+        Tail::Short
     }
 
     /// Bound of the second derivative of `f cos(theta_i)`, in units of `1/pi`, by the light's cosine alone, for a lobe as wide as the

@@ -17,6 +17,7 @@ mod ashikhmin_shirley;
 mod beckmann;
 mod blinn_phong;
 mod cook_torrance;
+mod disney;
 mod ggx;
 mod lambert;
 mod lobe;
@@ -32,9 +33,10 @@ pub use angles::Angles;
 pub use ashikhmin_shirley::AshikhminShirley;
 pub use blinn_phong::BlinnPhong;
 pub use cook_torrance::CookTorrance;
+pub use disney::Disney;
 pub use ggx::Ggx;
 pub use lambert::Lambert;
-pub use lobe::{Incident, Lobe, Split, Spread};
+pub use lobe::{Incident, Lobe, Split, Spread, Tail};
 pub use model::{BasisLobe, Model, lobe_terms, term_count};
 pub use parameter::{Channels, Parameter, ParameterError, Role, Scale, flat_bounds, flat_len, flat_names, offset_of};
 pub use reflectance::{Material, Reflectance};
@@ -42,7 +44,7 @@ pub use ward::Ward;
 pub use width::Width;
 
 /// Every model, by the name users give it. The first is the default.
-pub static MODELS: &[&dyn Model] = &[&Ggx, &CookTorrance, &Ward, &BlinnPhong, &AshikhminShirley];
+pub static MODELS: &[&dyn Model] = &[&Ggx, &CookTorrance, &Ward, &BlinnPhong, &AshikhminShirley, &Disney];
 
 /// Looks a model up by name.
 ///

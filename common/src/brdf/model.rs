@@ -35,7 +35,7 @@ pub trait Model: Debug + Sync {
     /// Parameters in the order of the flat vector.
     fn parameters(&self) -> &'static [Parameter];
 
-    /// Basis lobes in the order of the terms.
+    /// Basis lobes in the order of the terms. The first that has a width is the main one: tables may cover a part of its widths alone.
     fn lobes(&self) -> &'static [BasisLobe];
 
     /// Weight of every term at a flat parameter vector; `weights.len()` is [`term_count`].

@@ -7,7 +7,10 @@ use crate::math::{
     sampling::{PointStream, key, uniform},
     warp,
 };
-use std::f64::consts::{PI, TAU};
+use std::{
+    collections::BTreeSet,
+    f64::consts::{PI, TAU},
+};
 
 fn random_parameters(model: &dyn Model, n: u64) -> Vec<f64> {
     let (lower, upper) = flat_bounds(model.parameters());
@@ -63,12 +66,15 @@ fn albedo(lobe: &dyn Lobe, width: f64, cos_o: f64) -> f64 {
 #[test]
 fn no_lobe_reflects_more_than_it_receives() {
     const NOISE: f64 = 2e-3; // of 16k Sobol points
-    for basis in MODELS.iter().flat_map(|m| m.lobes()) {
-        let widths: &[f64] = if basis.width.is_some() { &[0.005, 0.02, 0.1, 0.3, 0.6, 1.0] } else { &[0.0] };
-        for &width in widths {
+    for (model, basis) in MODELS.iter().flat_map(|m| m.lobes().iter().map(move |basis| (m, basis))) {
+        let all: &[f64] = if basis.width.is_some() { &[0.005, 0.02, 0.1, 0.3, 0.6, 1.0] } else { &[0.0] };
+        let (least, most) = basis.width.map_or((0.0, 0.0), |width| width.span(model.parameters()));
+        for &width in all.iter().filter(|width| (least..=most * (1.0 + 1e-9)).contains(*width)) {
             for cos_o in [0.05, 0.2, 0.5, 0.8, 0.99] {
                 let value = albedo(basis.lobe, width, cos_o);
-                assert!(value <= 1.0 + NOISE, "{} width {width} cos {cos_o}: {value}", basis.lobe.name());
+                // Burley's light below the surface: his formula, whose single scattering brightens towards the rim.
+                let most = if basis.lobe.name() == "disney subsurface" { 1.25 } else { 1.0 };
+                assert!(value <= most + NOISE, "{} width {width} cos {cos_o}: {value}", basis.lobe.name());
                 if width <= 0.02 && basis.width.is_some() && cos_o >= 0.5 {
                     let (mirror, loss) = sharp_albedo(basis.lobe, width, cos_o);
                     assert!((mirror - loss..=mirror + NOISE).contains(&value), "{}: {value}", basis.lobe.name());
@@ -85,6 +91,9 @@ fn sharp_albedo(lobe: &dyn Lobe, width: f64, cos_o: f64) -> (f64, f64) {
         // Blinn-Phong lacks the 1/(v.h) of microfacets. Half of a lobe over the larger cosine lies beyond its kink.
         "blinn-phong" => (cos_o, kink + 0.002),
         "ashikhmin-shirley" => (1.0, kink + 0.002),
+        // Masked by a wider distribution, and the coat beyond its tail by the horizon.
+        "disney specular" => (1.0, 0.15),
+        "disney clearcoat" => (1.0, 0.25),
         _ => (1.0, 0.01),
     }
 }
@@ -269,13 +278,13 @@ fn accumulation_has_the_bits_of_a_scalar_loop() {
     }
 }
 
-/// Tables have one grid of widths. A model with two (such as a clear coat of its own width) needs a grid for each first.
+/// Every lobe that has a width has a grid of its own, and so an entry of its own.
 #[test]
-fn no_model_has_more_than_one_width() {
+fn no_two_lobes_of_a_model_share_a_width() {
     for model in MODELS {
-        let mut widths: Vec<usize> = model.lobes().iter().filter_map(|b| Some(b.width?.entry)).collect();
-        widths.dedup();
-        assert!(widths.len() <= 1, "{}", model.name());
+        let widths: Vec<usize> = model.lobes().iter().filter_map(|b| Some(b.width?.entry)).collect();
+        let distinct: BTreeSet<&usize> = widths.iter().collect();
+        assert_eq!(widths.len(), distinct.len(), "{}", model.name());
     }
 }
 
@@ -288,6 +297,6 @@ fn bad_parameters_are_named() {
         model("phong")
             .unwrap_err()
             .to_string()
-            .contains("expected one of ggx, cook-torrance, ward, blinn-phong, ashikhmin-shirley")
+            .contains("expected one of ggx, cook-torrance, ward, blinn-phong, ashikhmin-shirley, disney")
     );
 }

@@ -67,7 +67,7 @@ pub fn polish(
     let score = judge
         .score(&view.render(&minimum.point))
         .map_err(|_| SearchError::NotFinite { what: "the CSSIM", point: minimum.point.clone() })?;
-    let at_table_edge = view.model.lobes().iter().filter_map(|b| b.width).any(|width| {
+    let at_table_edge = view.model.lobes().iter().find_map(|b| b.width).is_some_and(|width| {
         let (x, step) = (bounds.to_scaled(width.entry, minimum.point[width.entry]), EDGE);
         (table_is_tighter[0] && x < step) || (table_is_tighter[1] && x > 1.0 - step)
     });
@@ -104,23 +104,22 @@ fn best_start(
 /// A width in this outermost share of the table's logarithmic span counts as at its edge.
 const EDGE: f64 = 0.02;
 
-/// The model's box with its widths cut to the table's span and moved by their logarithm; whether the span is tighter than the
-/// model's lower and upper bound.
+/// The model's box with the width of the main lobe cut to the table's span; whether that is tighter than the model's lower and upper
+/// bound.
 fn polish_bounds(view: &FullView<'_>) -> Result<(Bounds, [bool; 2]), SearchError> {
     let model_bounds = search_bounds(view.model, SearchKind::LeastSquares)?;
     let (mut lower, mut upper) = (model_bounds.lower().to_vec(), model_bounds.upper().to_vec());
     let mut tighter = [false, false];
-    for width in view.model.lobes().iter().filter_map(|b| b.width) {
-        if let Some(span) = view.table.span() {
-            let (entry, (first, last)) = (width.entry, width.entries(span));
-            tighter = [first > lower[entry] * (1.0 + 1e-9), last < upper[entry] * (1.0 - 1e-9)];
-            // Where the table reaches the model's bound, its outermost knot may miss it by a rounding: the bound counts.
-            if tighter[0] {
-                lower[entry] = first;
-            }
-            if tighter[1] {
-                upper[entry] = last;
-            }
+    let main = view.model.lobes().iter().find_map(|b| b.width);
+    if let (Some(width), Some(span)) = (main, view.table.span()) {
+        let (entry, (first, last)) = (width.entry, width.entries(span));
+        tighter = [first > lower[entry] * (1.0 + 1e-9), last < upper[entry] * (1.0 - 1e-9)];
+        // Where the table reaches the model's bound, its outermost knot may miss it by a rounding: the bound counts.
+        if tighter[0] {
+            lower[entry] = first;
+        }
+        if tighter[1] {
+            upper[entry] = last;
         }
     }
     // Where a reflectance is small, small steps of it are seen.

@@ -1,8 +1,8 @@
 //! Starts for the least-squares search (design section 2).
 //!
 //! For every width of the table's grid, and every scanned value of the parameters that multiply others, the remaining
-//! parameters enter linearly: at gamma = 1 their best values are a small bounded linear least-squares problem per
-//! channel. Terms of fixed weight move to the right-hand side. A model where one of these multiplies another gives coordinates in which
+//! parameters enter linearly: at gamma = 1 their best values are a small bounded linear least-squares problem, one per
+//! channel where no scalar joins them. Terms of fixed weight move to the right-hand side. A model where one of these multiplies another gives coordinates in which
 //! they do not (`Model::scan_weights`).
 
 use super::objective::{flat_roles, observed};
@@ -12,6 +12,7 @@ use crate::{
     render::table::{Planes, TransportTable},
     search::{NormalEquations, bvls},
 };
+use std::ops::Range;
 
 /// All points of the scan, in the order of widths, then scanned values.
 pub(super) fn scan(model: &dyn Model, table: &TransportTable, weights: &[f64], photo: &[[f32; 3]]) -> Vec<Vec<f64>> {
@@ -55,28 +56,20 @@ fn grids(model: &dyn Model, table: &TransportTable) -> Vec<(usize, Vec<f64>)> {
 /// Fills the linear entries of `point` with the bounded least-squares solution at gamma = 1; false when there is none.
 fn solve_linear(model: &dyn Model, terms: &[Planes], weights: &[f64], photo: &[[f32; 3]], point: &mut [f64]) -> bool {
     let (lower, upper) = flat_bounds(model.parameters());
-    let at = |entry: Option<usize>, point: &[f64]| {
-        let mut probe = point.to_vec();
-        if let Some(entry) = entry {
-            probe[entry] = 1.0;
-        }
-        let mut w = vec![Rgb::ZERO; terms.len()];
-        model.scan_weights(&probe, &mut w);
-        w
-    };
-    let fixed = at(None, point);
-    for channel in 0..3 {
-        let entries = linear_entries(model, channel);
-        let columns: Vec<Vec<Rgb>> = entries.iter().map(|&e| at(Some(e), point)).collect();
+    let fixed = weights_with(model, point, None);
+    for (channels, entries) in systems(model) {
+        let columns: Vec<Vec<Rgb>> = entries.iter().map(|&e| weights_with(model, point, Some(e))).collect();
         let mut normal = NormalEquations::new(entries.len());
         let mut row = vec![0.0; entries.len()];
         for (p, weight) in weights.iter().enumerate() {
             let scale = weight.sqrt();
-            let sum = |w: &dyn Fn(usize) -> f64| (0..terms.len()).map(|t| w(t) * terms[t][channel][p]).sum::<f64>();
-            for (x, column) in row.iter_mut().zip(&columns) {
-                *x = scale * sum(&|t| column[t][channel] - fixed[t][channel]);
+            for channel in channels.clone() {
+                let sum = |w: &dyn Fn(usize) -> f64| (0..terms.len()).map(|t| w(t) * terms[t][channel][p]).sum::<f64>();
+                for (x, column) in row.iter_mut().zip(&columns) {
+                    *x = scale * sum(&|t| column[t][channel] - fixed[t][channel]);
+                }
+                normal.add_row(&row, scale * (observed(photo[p][channel]) - sum(&|t| fixed[t][channel])));
             }
-            normal.add_row(&row, scale * (observed(photo[p][channel]) - sum(&|t| fixed[t][channel])));
         }
         let bound = |b: &[f64]| entries.iter().map(|&e| b[e]).collect::<Vec<f64>>();
         let Ok(solution) = bvls::solve(&normal, &bound(&lower), &bound(&upper)) else { return false };
@@ -86,14 +79,32 @@ fn solve_linear(model: &dyn Model, terms: &[Planes], weights: &[f64], photo: &[[
     true
 }
 
-/// Entries of the linear colours that act on one channel. Every linear parameter is a colour.
-fn linear_entries(model: &dyn Model, channel: usize) -> Vec<usize> {
-    let (mut entries, mut first) = (Vec::new(), 0);
+/// The weights of the scan where one linear entry, or none, is 1 and all that are not solved for yet are 0.
+fn weights_with(model: &dyn Model, point: &[f64], entry: Option<usize>) -> Vec<Rgb> {
+    let mut probe = point.to_vec();
+    if let Some(entry) = entry {
+        probe[entry] = 1.0;
+    }
+    let mut weights = vec![Rgb::ZERO; term_count(model)];
+    model.scan_weights(&probe, &mut weights);
+    weights
+}
+
+/// The least-squares problems: which channels each sees, and the entries it solves for. Where all linear parameters are colours the
+/// channels know nothing of each other; a linear scalar joins them.
+fn systems(model: &dyn Model) -> Vec<(Range<usize>, Vec<usize>)> {
+    let (mut of_channel, mut scalars, mut first) = ([const { Vec::new() }; 3], Vec::new(), 0);
     for parameter in model.parameters() {
-        if parameter.role == Role::Linear && parameter.channels == Channels::Rgb {
-            entries.push(first + channel);
+        match (parameter.role, parameter.channels) {
+            (Role::Linear, Channels::Rgb) => (0..3).for_each(|c| of_channel[c].push(first + c)),
+            (Role::Linear, Channels::Scalar) => scalars.push(first),
+            _ => {}
         }
         first += parameter.channels.count();
     }
-    entries
+    if scalars.is_empty() {
+        of_channel.into_iter().enumerate().map(|(c, entries)| (c..c + 1, entries)).collect()
+    } else {
+        vec![(0..3, [of_channel.concat(), scalars].concat())]
+    }
 }

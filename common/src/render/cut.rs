@@ -10,8 +10,8 @@ use super::{
     pyramid::{Cell, LightPyramid, Node, strongest},
 };
 use crate::{
-    brdf::Incident,
-    math::{Rgb, Vec3, widen},
+    brdf::{Incident, Tail},
+    math::{Rgb, Vec3, elementary::ln, widen},
 };
 use std::f64::consts::PI;
 
@@ -20,8 +20,8 @@ use std::f64::consts::PI;
 pub enum Band {
     /// A lobe as wide as the hemisphere, with its [bend](crate::brdf::Lobe::bend).
     Diffuse(f64),
-    /// Microfacet lobes of GGX alpha from `.0` to `.1`.
-    Glossy(f64, f64),
+    /// Microfacet lobes of GGX alpha from `.0` to `.1`, and how their distribution falls.
+    Glossy(f64, f64, Tail),
 }
 
 impl Band {
@@ -30,7 +30,7 @@ impl Band {
     pub fn sharpest(self) -> f64 {
         match self {
             Self::Diffuse(_) => 1.0,
-            Self::Glossy(lower, _) => lower,
+            Self::Glossy(lower, ..) => lower,
         }
     }
 }
@@ -73,7 +73,7 @@ impl Cut {
         // the same tolerance everywhere its relative error would be twenty times that of the lobe.
         let tolerance = match band {
             Band::Diffuse(_) => tolerance,
-            Band::Glossy(sharpest, _) => tolerance * point.cos_o.max(LEAST_COS_D) * (EVEN / sharpest).min(1.0),
+            Band::Glossy(sharpest, ..) => tolerance * point.cos_o.max(LEAST_COS_D) * (EVEN / sharpest).min(1.0),
         };
         self.nodes.clear();
         self.stack.clear();
@@ -124,6 +124,8 @@ struct Bound<'a> {
     shading: f64,
     /// Squares of the band's widths.
     squares: [f64; 2],
+    /// Of a distribution of long tail: its peak times the square of the width, at the largest width.
+    long_peak: f64,
     lower: f64,
 }
 
@@ -131,14 +133,18 @@ impl<'a> Bound<'a> {
     fn new(point: &'a Point, reach: f64, band: Band) -> Self {
         let (lower, upper) = match band {
             Band::Diffuse(_) => (1.0, 1.0),
-            Band::Glossy(lower, upper) => (lower, upper),
+            Band::Glossy(lower, upper, _) => (lower, upper),
         };
         let a2 = lower * lower;
         let shading = match band {
             Band::Diffuse(_) => 1.0 / PI,
             Band::Glossy(..) => 0.5 / (point.cos_o + (a2 + (1.0 - a2) * point.cos_o * point.cos_o).sqrt()),
         };
-        Self { point, reach, band, shading, squares: [a2, upper * upper], lower }
+        let long_peak = match band {
+            Band::Glossy(_, upper, Tail::Long) => (1.0 - upper * upper) / (-2.0 * PI * ln(upper)),
+            _ => 0.0,
+        };
+        Self { point, reach, band, shading, squares: [a2, upper * upper], long_peak, lower }
     }
 
     #[inline]
@@ -149,8 +155,8 @@ impl<'a> Bound<'a> {
             // The cosine has curvature cos; at the horizon it has a kink, a first-order error over the part that is cut off.
             Band::Diffuse(_) if horizon => DIFFUSE_CARE * KINK * spread2.sqrt(),
             Band::Diffuse(bend) => DIFFUSE_CARE * 0.5 * spread2 * (cos_i.abs() + bend),
-            Band::Glossy(..) => {
-                let (distribution, curvature) = self.peak_over(node, centroid);
+            Band::Glossy(.., tail) => {
+                let (distribution, curvature) = self.peak_over(node, centroid, tail);
                 let kink = if horizon { KINK * (spread2.sqrt() / self.lower).min(1.0) } else { 0.0 };
                 spread2 * (curvature + SLOW_FACTORS * distribution) + kink * distribution
             }
@@ -161,7 +167,7 @@ impl<'a> Bound<'a> {
     /// Upper bounds over the node and the band's widths of the distribution `D` and of its curvature along the sphere of light
     /// directions (per square chord).
     #[inline]
-    fn peak_over(&self, node: &Node, centroid: Vec3) -> (f64, f64) {
+    fn peak_over(&self, node: &Node, centroid: Vec3, tail: Tail) -> (f64, f64) {
         let half = centroid + self.point.view;
         let inverse = 1.0 / half.length_squared().max(f64::MIN_POSITIVE);
         // A step of light direction moves the half vector by at most 1 / (2 v.h) of it.
@@ -172,12 +178,17 @@ impl<'a> Bound<'a> {
         let sin = if along > 0.0 { sin2.sqrt() } else { 1.0 };
         let nearest = (sin - f64::from(node.radius) * turn - self.reach).max(0.0);
         let t2 = nearest * nearest;
+        let [low2, high2] = self.squares;
+        if tail == Tail::Long {
+            // `k / d` with a factor `k` that grows slowly with the width and a divisor `d` that grows with it.
+            let d = t2 + low2 * (1.0 - t2);
+            return (self.long_peak / d, 2.0 * turn * turn * self.long_peak / (d * d));
+        }
         let d = |a2: f64| {
             let q = t2 + a2 * (1.0 - t2);
             (a2 / (PI * q * q), q)
         };
         // a^2/q^2 is largest at a = t, a^2/q^3 at a = t / sqrt(2).
-        let [low2, high2] = self.squares;
         let (distribution, _) = d(t2.clamp(low2, high2));
         let (sharpest, q) = d((0.5 * t2).clamp(low2, high2));
         (distribution, 2.0 * turn * turn * sharpest / q)

@@ -4,7 +4,10 @@
 //! finite differences (six knots in all), so the interpolant is continuously differentiable and its error is
 //! `h^4/384 f''''`, nine times less than that of four-point Lagrange interpolation.
 
-use crate::math::elementary::{exp, ln};
+use crate::{
+    brdf::{Model, Width},
+    math::elementary::{exp, ln},
+};
 
 /// Knots of the widest stencil.
 pub const STENCIL: usize = 6;
@@ -129,6 +132,24 @@ impl Knots {
         }
     }
 }
+
+/// The grid of every lobe of a model; `None` for a lobe of fixed shape.
+///
+/// The first lobe that has a width, the main one, has the grid `main`, which may cover no more than the widths that are of interest. Any
+/// other covers all of its widths: those of a coat are few.
+#[must_use]
+pub fn of_lobes(model: &dyn Model, main: Knots) -> Vec<Option<Knots>> {
+    let mut main = Some(main);
+    let whole = |width: Width| {
+        let (lower, upper) = width.span(model.parameters());
+        Knots::covering(lower, upper, OTHERS_PER_OCTAVE)
+    };
+    let widths = model.lobes().iter().map(|basis| basis.width);
+    widths.map(|width| width.map(|width| main.take().unwrap_or_else(|| whole(width)))).collect()
+}
+
+/// Knots per factor of two for lobes that are not the main one.
+const OTHERS_PER_OCTAVE: f64 = 5.0;
 
 #[cfg(test)]
 mod tests {

@@ -74,7 +74,7 @@ impl TransportTable {
         std::array::from_fn(|_| vec![0.0; self.pixels])
     }
 
-    /// Smallest and largest width of every lobe that has one.
+    /// Smallest and largest width of the model's main lobe, the first that has one.
     #[must_use]
     pub fn span(&self) -> Option<(f64, f64)> {
         self.lobes.iter().find_map(|l| l.knots.map(|k| k.span()))

@@ -4,7 +4,7 @@
 use super::{
     cut::{Band, Cut, Point},
     footprint::{self, Position},
-    knots::Knots,
+    knots::{self, Knots},
     pyramid::LightPyramid,
     table::{LobeTable, TransportTable},
 };
@@ -42,7 +42,7 @@ impl Accuracy {
 pub struct TransportPlan {
     /// The model whose lobes are integrated.
     pub model: &'static dyn Model,
-    /// The grid of widths, for every lobe that has one.
+    /// The grid of widths of the model's main lobe, its first that has one; others have [grids of their own](knots::of_lobes).
     pub knots: Knots,
     /// How finely.
     pub accuracy: Accuracy,
@@ -81,8 +81,8 @@ impl TransportPlan {
             .map_init(Cut::default, |cut, tile| self.tile(geometry, pyramid, tile, cut))
             .flatten_iter()
             .collect();
-        let lobes = self.model.lobes().iter().enumerate().map(|(l, basis)| {
-            let knots = basis.width.map(|_| self.knots);
+        let knots = knots::of_lobes(self.model, self.knots);
+        let lobes = self.model.lobes().iter().zip(knots).enumerate().map(|(l, (basis, knots))| {
             let terms = lobe_terms(basis.lobe);
             // From `pixel -> term x channel x knot` to `knot x term x channel x pixel`.
             let slices = knots.map_or(1, |k| k.count());
@@ -99,8 +99,8 @@ impl TransportPlan {
 
     fn tile(&self, geometry: &Geometry, pyramid: &LightPyramid, pixels: &[Pixel], cut: &mut Cut) -> Vec<Sums> {
         let mut sums: Vec<Sums> = vec![Vec::new(); pixels.len()];
-        for basis in self.model.lobes() {
-            let widths = if basis.width.is_some() { self.knots.widths() } else { vec![0.0] };
+        for (basis, knots) in self.model.lobes().iter().zip(knots::of_lobes(self.model, self.knots)) {
+            let widths = knots.map_or_else(|| vec![0.0], |knots| knots.widths());
             let rows = lobe_terms(basis.lobe) * 3;
             sums.iter_mut().for_each(|pixel| pixel.push(vec![0.0; rows * widths.len()]));
             for (band, range) in bands(basis.lobe, &widths) {
@@ -219,7 +219,7 @@ fn bands(lobe: &dyn Lobe, widths: &[f64]) -> Vec<(Band, std::ops::Range<usize>)>
         .map(|b| {
             let range = b * alphas.len() / count..(b + 1) * alphas.len() / count;
             let (first, last) = (alphas[range.start], alphas[range.end - 1]);
-            (Band::Glossy(first.min(last), first.max(last)), range)
+            (Band::Glossy(first.min(last), first.max(last), lobe.tail()), range)
         })
         .collect()
 }

@@ -198,7 +198,7 @@ fn what_is_not_there_yet_is_never_ignored() {
         (&["--exposure-gain", "rgb"][..], "--anchor f0=VALUE"),
         (&["--exposure-gain", "rgb", "--anchor", "f0=0.04"], "is not there yet"),
         (&["--anchor", "albedo<=1"], "give --exposure-gain"),
-        (&["--model", "disney"], "the model disney is not there yet"),
+        (&["--model", "merl"], "the model merl is not there yet"),
         (&["--sphere", "1,2,3", "--normals", "n.exr"], "give one of them"),
         (&["--workers", "0", "--listen", "0.0.0.0:4100"], "--advertise HOST"),
     ] {

@@ -5,7 +5,7 @@
 
 use super::material::Target;
 use lookalike::{
-    brdf::Reflectance,
+    brdf::{Reflectance, Tail},
     image::Image,
     light::Environment,
     math::{
@@ -58,7 +58,7 @@ fn radiance_at(geometry: &Geometry, pyramid: &LightPyramid, column: usize, row: 
     };
     let alphas = Target.sampling_alphas();
     let sharpest = alphas.iter().fold(1.0_f64, |least, a| least.min(*a));
-    cut.refine(pyramid, &point, 0.0, Band::Glossy(sharpest, 1.0), TOLERANCE * pyramid.mean_radiance());
+    cut.refine(pyramid, &point, 0.0, Band::Glossy(sharpest, 1.0, Tail::Short), TOLERANCE * pyramid.mean_radiance());
     let frame = Frame::from_normal(point.normal);
     let wo = frame.to_local(point.view);
     let reflected = cut

@@ -69,7 +69,8 @@ struct Entry {
 }
 
 impl References {
-    /// Integrates every lobe whose name passes `keep`, those that have a width at each of `widths`.
+    /// Integrates every lobe whose name passes `keep`, those that have a width at each of `widths` that they
+    /// can have.
     #[must_use]
     pub fn new(
         scene: &Scene,
@@ -82,8 +83,9 @@ impl References {
         let coarse = coarse_table(scene, model);
         let mut entries = Vec::new();
         for (lobe, basis) in model.lobes().iter().enumerate().filter(|(_, basis)| keep(basis.lobe.name())) {
+            let (least, most) = basis.width.map_or((0.0, 0.0), |width| width.span(model.parameters()));
             let widths = if basis.width.is_some() { widths } else { &[0.0] };
-            for (w, &width) in widths.iter().enumerate() {
+            for (w, &width) in widths.iter().enumerate().filter(|(_, width)| (least..=most).contains(*width)) {
                 let split = SplitLobe { lobe: basis.lobe, width };
                 let [rest, fresnel, whole] = [0, 1, 2].map(|c| mean(&part(model, &coarse, lobe, width, c)));
                 let darkest = if lobe_terms(basis.lobe) == 1 { fresnel } else { DIELECTRIC_F0 * rest + fresnel };

@@ -197,7 +197,7 @@ impl FitPlanner {
     }
 }
 
-/// The width of a parameter vector's lobes.
+/// The width of a parameter vector's main lobe.
 fn width(model: &dyn Model, parameters: &[f64]) -> Option<f64> {
     model.lobes().iter().find_map(|basis| basis.width_at(parameters))
 }

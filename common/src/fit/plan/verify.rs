@@ -12,7 +12,10 @@ use crate::{
         wire::{PolishedWire, ScoresWire, TableWire, read},
     },
     graph::{Blob, GraphEdit, Input, NodeId, PlanError},
-    render::{knots::Knots, table::TransportTable},
+    render::{
+        knots::{self, Knots},
+        table::TransportTable,
+    },
 };
 use std::{
     collections::{BTreeMap, btree_map::Entry},
@@ -59,7 +62,7 @@ fn table_of(model: &dyn Model, search: NodeId, graph: &GraphEdit<'_>) -> Result<
 pub(super) struct Shard {
     /// How many pixels.
     pub(super) pixels: usize,
-    /// The grid of widths.
+    /// The grid of widths of the main lobe.
     pub(super) knots: Knots,
 }
 
@@ -73,8 +76,10 @@ pub(super) fn check_shard(model: &dyn Model, asked: Shard, output: &Blob) -> Res
     if table.pixels != asked.pixels {
         return Err(wrong(format!("{} pixels", asked.pixels), &table.pixels));
     }
-    if let Some(other) = table.lobes.iter().filter_map(|lobe| lobe.knots).find(|knots| *knots != asked.knots) {
-        return Err(wrong(format!("widths on {:?}", asked.knots), &format!("{other:?}")));
+    for (lobe, expected) in table.lobes.iter().zip(knots::of_lobes(model, asked.knots)) {
+        if lobe.knots != expected {
+            return Err(wrong(format!("widths on {expected:?}"), &format!("{:?}", lobe.knots)));
+        }
     }
     match table.lobes.iter().flat_map(|lobe| &lobe.values).find(|value| !value.is_finite()) {
         Some(value) => Err(wrong("finite radiance", value)),

@@ -1,0 +1,169 @@
+//! `disney`: Burley's principled BRDF of 2012, isotropic and without tints.
+//!
+//! `f = (1 - metallic) (base_color ((1 - subsurface) f_d + subsurface f_ss) + sheen F5) + F D G / (4 n.l n.v) + clearcoat/4 F_c D_c G_c / (4 n.l n.v)`
+//! with `F5 = (1 - v.h)^5` (Schlick 1994) and
+//! - `f_d`, `f_ss`: a diffuse lobe whose rim follows the roughness, and an approximation of light that travels below the surface after
+//!   Hanrahan & Krueger 1993 (`disney/diffuse.rs`),
+//! - `D`: GGX of `alpha = roughness^2`; `G`: Smith's masking of light and view, each for itself, of the wider
+//!   `alpha_g = (0.5 + roughness/2)^2`; `F = c + (1 - c) F5`, `c = (1 - metallic) 0.08 specular + metallic base_color`,
+//! - `D_c`: the distribution with the long tail, `1/(a^2 + tan^2)` to the first power (GTR 1), `a = 0.1 - 0.099 clearcoat_gloss`; `G_c`
+//!   Smith's of 0.25; `F_c = 0.04 + 0.96 F5` (`disney/specular.rs`).
+//!
+//! (Burley 2012, sections 5.3 to 5.6 and the reference implementation, `disney.brdf`; its `specularTint`, `sheenTint` and `anisotropic`
+//! are 0.) Fresnel's term is split as that of `ggx`. The diffuse lobes are polynomials of the second degree in the roughness, so that
+//! they need no grid of widths: three basis lobes each.
+//!
+//! | parameter | meaning | bounds |
+//! |---|---|---|
+//! | `base_color` | colour of the surface, linear Rec. 709: diffuse, and specular where it is metallic | [0, 1] |
+//! | `subsurface` | from the diffuse lobe to that of light below the surface | [0, 1] |
+//! | `metallic` | from a dielectric to a metal | [0, 1] |
+//! | `specular` | of the dielectric: its reflectance at normal incidence is 0.08 times this | [0, 1] |
+//! | `roughness` | square root of the width of the specular lobe | [0.0707, 1] |
+//! | `sheen` | weight of a white rim | [0, 1] |
+//! | `clearcoat` | weight of the coat | [0, 1] |
+//! | `clearcoat_gloss` | from a satin coat to a glossy one | [0, 0.9595] |
+//!
+//! Burley's roughness and gloss reach 0 and 1; here both lobes end at a width of 0.005, as that of every model does.
+
+mod diffuse;
+mod specular;
+
+use super::{BasisLobe, Channels, Model, Parameter, Role, Scale};
+use crate::math::Rgb;
+use diffuse::{Diffuse, Sheen, Subsurface};
+use specular::{Clearcoat, Specular};
+
+/// The model `disney`.
+#[derive(Debug, Clone, Copy)]
+pub struct Disney;
+
+const BASE: usize = 0;
+const SUBSURFACE: usize = 3;
+const METALLIC: usize = 4;
+const SPECULAR: usize = 5;
+const ROUGHNESS: usize = 6;
+const SHEEN: usize = 7;
+const CLEARCOAT: usize = 8;
+const GLOSS: usize = 9;
+
+/// Reflectance at normal incidence of a dielectric of `specular` 1.
+const MOST_DIELECTRIC: f64 = 0.08;
+
+/// Share of the coat's lobe in the sum where `clearcoat` is 1.
+const COAT: f64 = 0.25;
+
+/// Reflectance of the coat at normal incidence: of polyurethane, of index 1.5.
+const COAT_F0: f64 = 0.04;
+
+/// Terms of the specular lobe and of the coat, after three of the diffuse lobe, three of the one below the surface, and the sheen.
+const SHEEN_TERM: usize = 6;
+const SPECULAR_TERM: usize = 7;
+const COAT_TERM: usize = 9;
+
+const fn scalar(name: &'static str, meaning: &'static str, role: Role) -> Parameter {
+    let (channels, scale) = (Channels::Scalar, Scale::Linear);
+    Parameter { name, meaning, channels, lower: 0.0, upper: 1.0, start: 0.3, role, scale }
+}
+
+static PARAMETERS: [Parameter; 8] = [
+    Parameter {
+        channels: Channels::Rgb,
+        ..scalar("base_color", "colour of the surface, linear Rec. 709: diffuse, and specular of a metal", Role::Linear)
+    },
+    scalar("subsurface", "from diffuse to light that travels below the surface", Role::Scanned(&[0.0, 1.0])),
+    scalar("metallic", "from a dielectric to a metal", Role::Scanned(&[0.0, 0.5, 1.0])),
+    scalar("specular", "of a dielectric: 0.08 times this is its reflectance at normal incidence", Role::Linear),
+    Parameter {
+        lower: specular::LEAST_ROUGHNESS,
+        ..scalar("roughness", "square root of the width of the specular lobe", Role::Width)
+    },
+    scalar("sheen", "weight of a white rim", Role::Linear),
+    scalar("clearcoat", "weight of the clear coat", Role::Linear),
+    Parameter {
+        upper: specular::MOST_GLOSS,
+        ..scalar("clearcoat_gloss", "from a satin coat to a glossy one", Role::Scanned(&[0.0, 0.5, 0.9]))
+    },
+];
+
+static LOBES: [BasisLobe; 9] = [
+    BasisLobe { lobe: &Diffuse::<0>, width: None },
+    BasisLobe { lobe: &Diffuse::<1>, width: None },
+    BasisLobe { lobe: &Diffuse::<2>, width: None },
+    BasisLobe { lobe: &Subsurface::<0>, width: None },
+    BasisLobe { lobe: &Subsurface::<1>, width: None },
+    BasisLobe { lobe: &Subsurface::<2>, width: None },
+    BasisLobe { lobe: &Sheen, width: None },
+    BasisLobe { lobe: &Specular, width: Some(specular::roughness(ROUGHNESS)) },
+    BasisLobe { lobe: &Clearcoat, width: Some(specular::gloss(GLOSS)) },
+];
+
+impl Model for Disney {
+    fn name(&self) -> &'static str {
+        "disney"
+    }
+
+    fn summary(&self) -> &'static str {
+        "Burley 2012, isotropic, without tints: diffuse, subsurface, sheen, GGX metal or dielectric, clear coat"
+    }
+
+    fn parameters(&self) -> &'static [Parameter] {
+        &PARAMETERS
+    }
+
+    fn lobes(&self) -> &'static [BasisLobe] {
+        &LOBES
+    }
+
+    fn weights(&self, p: &[f64], weights: &mut [Rgb]) {
+        let base = Rgb::from_slice(&p[BASE..]);
+        let (dielectric, below) = (1.0 - p[METALLIC], p[SUBSURFACE]);
+        let mut power = 1.0;
+        for t in 0..3 {
+            weights[t] = base * (dielectric * (1.0 - below) * power);
+            weights[3 + t] = base * (dielectric * below * power);
+            power *= p[ROUGHNESS];
+        }
+        weights[SHEEN_TERM] = Rgb::splat(dielectric * p[SHEEN]);
+        weights[SPECULAR_TERM] = self.normal_incidence_specular(p);
+        weights[SPECULAR_TERM + 1] = Rgb::ONE;
+        weights[COAT_TERM] = Rgb::splat(COAT * COAT_F0 * p[CLEARCOAT]);
+        weights[COAT_TERM + 1] = Rgb::splat(COAT * p[CLEARCOAT]);
+    }
+
+    fn weight_derivatives(&self, p: &[f64], push: &mut dyn FnMut(usize, usize, usize, f64)) {
+        let (dielectric, below, roughness) = (1.0 - p[METALLIC], p[SUBSURFACE], p[ROUGHNESS]);
+        let powers = [(1.0, 0.0), (roughness, 1.0), (roughness * roughness, 2.0 * roughness)];
+        for c in 0..3 {
+            let base = p[BASE + c];
+            for (t, (power, slope)) in powers.into_iter().enumerate() {
+                for (term, share, sign) in [(t, 1.0 - below, -1.0), (3 + t, below, 1.0)] {
+                    push(term, c, BASE + c, dielectric * share * power);
+                    push(term, c, SUBSURFACE, sign * dielectric * base * power);
+                    push(term, c, METALLIC, -share * base * power);
+                    push(term, c, ROUGHNESS, dielectric * share * base * slope);
+                }
+            }
+            push(SHEEN_TERM, c, METALLIC, -p[SHEEN]);
+            push(SHEEN_TERM, c, SHEEN, dielectric);
+            push(SPECULAR_TERM, c, BASE + c, p[METALLIC]);
+            push(SPECULAR_TERM, c, METALLIC, base - MOST_DIELECTRIC * p[SPECULAR]);
+            push(SPECULAR_TERM, c, SPECULAR, MOST_DIELECTRIC * dielectric);
+            push(COAT_TERM, c, CLEARCOAT, COAT * COAT_F0);
+            push(COAT_TERM + 1, c, CLEARCOAT, COAT);
+        }
+    }
+
+    fn normal_incidence_specular(&self, p: &[f64]) -> Rgb {
+        let dielectric = (1.0 - p[METALLIC]) * MOST_DIELECTRIC * p[SPECULAR];
+        Rgb::splat(dielectric) + Rgb::from_slice(&p[BASE..]) * p[METALLIC]
+    }
+
+    /// Seen and lit along the normal the lobe below the surface is 5/8 of the diffuse one.
+    fn diffuse_albedo(&self, p: &[f64]) -> Rgb {
+        Rgb::from_slice(&p[BASE..]) * ((1.0 - p[METALLIC]) * (1.0 - 0.375 * p[SUBSURFACE]))
+    }
+}
+
+#[cfg(test)]
+mod tests;
