@@ -150,7 +150,7 @@ impl Lobe for Sheen {
     }
 
     fn care(&self) -> f64 {
-        CARE
+        4.0 * CARE
     }
 
     fn bend(&self) -> f64 {

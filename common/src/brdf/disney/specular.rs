@@ -118,6 +118,11 @@ impl Lobe for Clearcoat {
         Tail::Long
     }
 
+    /// No more than a quarter of it is seen.
+    fn care(&self) -> f64 {
+        0.5
+    }
+
     fn eval(&self, angles: &Angles, width: f64) -> f64 {
         clearcoat(angles, &Spread::default(), width)
     }
