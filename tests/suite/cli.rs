@@ -89,7 +89,7 @@ fn bad_usage_is_code_two_and_says_what_is_possible() {
         ("fitt".to_owned(), &["unrecognized subcommand 'fitt'", "'fit'"][..]),
         ("fit ball.exr".into(), &["required arguments", "--env <MAP>", "--out <DIR>"]),
         (format!("{fit} --sampel 3"), &["unexpected argument '--sampel'", "'--samples'"]),
-        (format!("{fit} --model phong"), &["'phong'", "--model", "possible values: ggx, cook-torrance"]),
+        (format!("{fit} --model phong"), &["'phong'", "--model", "possible values: ggx, ggx-f90, cook-torrance"]),
         (format!("{fit} --search simplex"), &["'simplex'", "[possible values: least-squares, pattern]"]),
         (format!("{fit} --polish maybe"), &["'maybe'", "[possible values: on, off]"]),
         (format!("{fit} --gammas 3:1:0.1"), &["--gammas", "the last gamma must lie between"]),
@@ -134,7 +134,7 @@ fn what_is_not_there_yet_says_so_and_what_to_do() {
             format!("{fit} --model merl"),
             &[
                 "the model merl is not there yet",
-                "this version fits ggx, cook-torrance, ward, blinn-phong, ashikhmin-shirley, disney",
+                "this version fits ggx, ggx-f90, cook-torrance, ward, blinn-phong, ashikhmin-shirley, disney",
             ],
         ),
     ] {

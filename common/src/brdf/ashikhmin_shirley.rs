@@ -143,7 +143,7 @@ impl Lobe for DiffuseLobe {
         4.0
     }
 
-    /// `28/23 (1 - (1 - x/2)^5)^2 x` is most bent at the horizon of the light: by 5 times 28/23.
+    /// `28/23 (1 - (1 - n.l/2)^5) (1 - (1 - n.v/2)^5) n.l` is most bent at the horizon of the light: by 5 times 28/23.
     fn bend(&self) -> f64 {
         6.1
     }

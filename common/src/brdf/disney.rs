@@ -19,12 +19,13 @@
 //! | `subsurface` | from the diffuse lobe to that of light below the surface | [0, 1] |
 //! | `metallic` | from a dielectric to a metal | [0, 1] |
 //! | `specular` | of the dielectric: its reflectance at normal incidence is 0.08 times this | [0, 1] |
-//! | `roughness` | square root of the width of the specular lobe | [0.0707, 1] |
+//! | `roughness` | square root of the width of the specular lobe | [0.071, 1] |
 //! | `sheen` | weight of a white rim | [0, 1] |
 //! | `clearcoat` | weight of the coat | [0, 1] |
 //! | `clearcoat_gloss` | from a satin coat to a glossy one | [0, 0.9595] |
 //!
-//! Burley's roughness and gloss reach 0 and 1; here both lobes end at a width of 0.005, as that of every model does.
+//! Burley's roughness and gloss reach 0 and 1; here both lobes end at a width of 0.005, as that of `ggx` does. At grazing views the
+//! lobe below the surface and the satin coat reflect up to a quarter more than they receive: so they are published.
 
 mod diffuse;
 mod specular;
@@ -71,8 +72,8 @@ static PARAMETERS: [Parameter; 8] = [
         channels: Channels::Rgb,
         ..scalar("base_color", "colour of the surface, linear Rec. 709: diffuse, and specular of a metal", Role::Linear)
     },
-    scalar("subsurface", "from diffuse to light that travels below the surface", Role::Scanned(&[0.0, 1.0])),
-    scalar("metallic", "from a dielectric to a metal", Role::Scanned(&[0.0, 0.5, 1.0])),
+    scalar("subsurface", "from diffuse to light that travels below the surface", Role::Blend(&[0.0, 1.0])),
+    scalar("metallic", "from a dielectric to a metal", Role::Blend(&[0.0, 0.5, 1.0])),
     scalar("specular", "of a dielectric: 0.08 times this is its reflectance at normal incidence", Role::Linear),
     Parameter {
         lower: specular::LEAST_ROUGHNESS,
@@ -159,9 +160,9 @@ impl Model for Disney {
         Rgb::splat(dielectric) + Rgb::from_slice(&p[BASE..]) * p[METALLIC]
     }
 
-    /// Seen and lit along the normal the lobe below the surface is 5/8 of the diffuse one.
+    /// That of the lobe below the surface is about three quarters of that of the diffuse one.
     fn diffuse_albedo(&self, p: &[f64]) -> Rgb {
-        Rgb::from_slice(&p[BASE..]) * ((1.0 - p[METALLIC]) * (1.0 - 0.375 * p[SUBSURFACE]))
+        Rgb::from_slice(&p[BASE..]) * ((1.0 - p[METALLIC]) * (1.0 - 0.25 * p[SUBSURFACE]))
     }
 }
 

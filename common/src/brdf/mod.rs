@@ -19,6 +19,7 @@ mod blinn_phong;
 mod cook_torrance;
 mod disney;
 mod ggx;
+mod ggx_f90;
 mod lambert;
 mod lobe;
 pub mod merl;
@@ -35,6 +36,7 @@ pub use blinn_phong::BlinnPhong;
 pub use cook_torrance::CookTorrance;
 pub use disney::Disney;
 pub use ggx::Ggx;
+pub use ggx_f90::GgxF90;
 pub use lambert::Lambert;
 pub use lobe::{Incident, Lobe, Split, Spread, Tail};
 pub use model::{BasisLobe, Model, lobe_terms, term_count};
@@ -44,7 +46,7 @@ pub use ward::Ward;
 pub use width::Width;
 
 /// Every model, by the name users give it. The first is the default.
-pub static MODELS: &[&dyn Model] = &[&Ggx, &CookTorrance, &Ward, &BlinnPhong, &AshikhminShirley, &Disney];
+pub static MODELS: &[&dyn Model] = &[&Ggx, &GgxF90, &CookTorrance, &Ward, &BlinnPhong, &AshikhminShirley, &Disney];
 
 /// Looks a model up by name.
 ///

@@ -30,10 +30,13 @@ impl Channels {
 pub enum Role {
     /// The weights are affine in it while all other parameters are held.
     Linear,
-    /// The width of a lobe: radiance depends on it through the table's knots.
+    /// The width of the main lobe: radiance depends on it through the table's knots.
     Width,
-    /// It multiplies other parameters: the scan tries these values and solves for the linear ones.
+    /// It multiplies other parameters, or is the width of a lobe that is not the main one: the scan tries these values and solves for the
+    /// linear ones.
     Scanned(&'static [f64]),
+    /// As `Scanned`: the share of one kind of surface in a mixture of two, whose ends are kinds and no limits.
+    Blend(&'static [f64]),
 }
 
 /// The coordinate in which a search moves.
@@ -62,7 +65,7 @@ pub struct Parameter {
     pub start: f64,
     /// The part it plays in a search.
     pub role: Role,
-    /// The coordinate pattern search moves in. Least squares always moves widths by their logarithm.
+    /// The coordinate pattern search moves in. Least squares always moves the width of the main lobe by its logarithm.
     pub scale: Scale,
 }
 

@@ -85,7 +85,12 @@ impl Reflectance for Material {
     }
 
     fn sampling_alphas(&self) -> Vec<f64> {
-        let widths = self.model.lobes().iter().map(|b| b.lobe.equivalent_alpha(self.width(b)).unwrap_or(1.0));
-        widths.collect()
+        // Lobes as wide as the hemisphere are drawn from together.
+        let mut has_wide = false;
+        let alpha = |b: &BasisLobe| match b.lobe.equivalent_alpha(self.width(b)) {
+            Some(alpha) => Some(alpha),
+            None => (!std::mem::replace(&mut has_wide, true)).then_some(1.0),
+        };
+        self.model.lobes().iter().filter_map(alpha).collect()
     }
 }

@@ -158,15 +158,18 @@ mod tests {
     use crate::{
         brdf::{MODELS, flat_bounds, lobe_terms},
         math::sampling::{key, uniform},
-        render::{knots::Knots, table::LobeTable},
+        render::{
+            knots::{self, Knots},
+            table::LobeTable,
+        },
         search::derivative::check_gradient,
     };
 
     /// A table of smooth random integrals.
     fn table(model: &dyn Model, pixels: usize) -> TransportTable {
         let knots = Knots::covering(0.005, 1.0, 6.0);
-        let lobes = model.lobes().iter().enumerate().map(|(l, basis)| {
-            let (knots, terms) = (basis.width.map(|_| knots), lobe_terms(basis.lobe));
+        let lobes = model.lobes().iter().zip(knots::of_lobes(model, knots)).enumerate().map(|(l, (basis, knots))| {
+            let terms = lobe_terms(basis.lobe);
             let slices = knots.map_or(1, |k| k.count());
             let mut values = Vec::new();
             for slice in 0..slices {

@@ -123,7 +123,12 @@ fn polish_bounds(view: &FullView<'_>) -> Result<(Bounds, [bool; 2]), SearchError
         }
     }
     // Where a reflectance is small, small steps of it are seen.
-    let scale = |role| if matches!(role, Role::Width) { Scale::Logarithmic } else { Scale::OffsetLogarithmic };
-    let scales: Vec<Scale> = flat_roles(view.model).into_iter().map(scale).collect();
+    let is_width = |entry| view.model.lobes().iter().any(|b| b.width.is_some_and(|width| width.entry == entry));
+    let scale = |(entry, role)| match role {
+        Role::Width => Scale::Logarithmic,
+        _ if is_width(entry) => Scale::Linear,
+        _ => Scale::OffsetLogarithmic,
+    };
+    let scales: Vec<Scale> = flat_roles(view.model).into_iter().enumerate().map(scale).collect();
     Ok((Bounds::new(lower, upper, scales)?, tighter))
 }

@@ -1,24 +1,25 @@
 //! Starts for the least-squares search (design section 2).
 //!
-//! For every width of the table's grid, and every scanned value of the parameters that multiply others, the remaining
+//! For every width of the main lobe's grid, and every scanned value of the parameters that multiply others, the remaining
 //! parameters enter linearly: at gamma = 1 their best values are a small bounded linear least-squares problem, one per
 //! channel where no scalar joins them. Terms of fixed weight move to the right-hand side. A model where one of these multiplies another gives coordinates in which
 //! they do not (`Model::scan_weights`).
 
 use super::objective::{flat_roles, observed};
 use crate::{
-    brdf::{BasisLobe, Channels, Model, Role, flat_bounds, flat_len, term_count},
+    brdf::{BasisLobe, Channels, Model, Role, flat_bounds, flat_len, lobe_terms, term_count},
     math::Rgb,
     render::table::{Planes, TransportTable},
     search::{NormalEquations, bvls},
 };
 use std::ops::Range;
 
-/// All points of the scan, in the order of widths, then scanned values.
+/// All points of the scan, in the order of widths, then scanned values. Of points that make the same material, such as those that differ
+/// in a lobe of no weight, the first.
 pub(super) fn scan(model: &dyn Model, table: &TransportTable, weights: &[f64], photo: &[[f32; 3]]) -> Vec<Vec<f64>> {
     let grids = grids(model, table);
     let mut terms: Vec<Planes> = (0..term_count(model)).map(|_| table.planes()).collect();
-    let mut points = Vec::new();
+    let mut points: Vec<Vec<f64>> = Vec::new();
     let mut index = vec![0; grids.len()];
     loop {
         let mut point = vec![0.0; flat_len(model.parameters())];
@@ -26,7 +27,9 @@ pub(super) fn scan(model: &dyn Model, table: &TransportTable, weights: &[f64], p
             point[*entry] = values[i];
         }
         table.terms(model, &point, false, &mut terms);
-        if solve_linear(model, &terms, weights, photo, &mut point) {
+        if solve_linear(model, &terms, weights, photo, &mut point)
+            && !points.iter().any(|known| same(model, known, &point))
+        {
             points.push(point);
         }
         // Odometer over the grids, the last running fastest.
@@ -36,12 +39,31 @@ pub(super) fn scan(model: &dyn Model, table: &TransportTable, weights: &[f64], p
     }
 }
 
+/// Whether two points have the same weights, and the same widths of all lobes that have any weight.
+fn same(model: &dyn Model, a: &[f64], b: &[f64]) -> bool {
+    const EQUAL: f64 = 1e-9;
+    let weights = |point: &[f64]| {
+        let mut weights = vec![Rgb::ZERO; term_count(model)];
+        model.weights(point, &mut weights);
+        weights
+    };
+    let (of_a, of_b) = (weights(a), weights(b));
+    let mut first = 0;
+    model.lobes().iter().all(|basis| {
+        let terms = first..first + lobe_terms(basis.lobe);
+        first = terms.end;
+        let is_dark = of_a[terms.clone()].iter().all(|weight| *weight == Rgb::ZERO);
+        (is_dark || basis.width_at(a) == basis.width_at(b))
+            && terms.into_iter().all(|t| (of_a[t] - of_b[t]).abs().max_element() <= EQUAL)
+    })
+}
+
 /// Entries of the flat vector that are scanned, with their values.
 fn grids(model: &dyn Model, table: &TransportTable) -> Vec<(usize, Vec<f64>)> {
     let (lower, upper) = flat_bounds(model.parameters());
     let scanned = flat_roles(model).into_iter().enumerate().filter_map(|(entry, role)| match role {
         Role::Linear => None,
-        Role::Scanned(values) => Some((entry, values.to_vec())),
+        Role::Scanned(values) | Role::Blend(values) => Some((entry, values.to_vec())),
         Role::Width => {
             let of_entry = |b: &BasisLobe| b.width.filter(|width| width.entry == entry);
             let (lobe, width) = model.lobes().iter().enumerate().find_map(|(l, b)| Some((l, of_entry(b)?)))?;

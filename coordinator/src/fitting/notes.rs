@@ -1,7 +1,7 @@
 //! What a user should know about a result beyond its numbers.
 
 use lookalike::{
-    brdf::{Model, flat_bounds, flat_names},
+    brdf::{Model, Role, flat_bounds, flat_names},
     fit::{FitOutcome, Method, Uncertainty, gamma_range},
 };
 
@@ -35,9 +35,13 @@ pub(crate) fn notes(method: &Method, outcome: &FitOutcome) -> Vec<String> {
 fn at_bounds(model: &dyn Model, parameters: &[f64], is_determined: impl Fn(usize) -> bool) -> Option<String> {
     let (lower, upper) = flat_bounds(model.parameters());
     let names = flat_names(model.parameters());
-    // A colour of zero is an answer (no diffuse part); an upper bound or a width at its end is a limit of the model.
+    // A colour of zero is an answer (no diffuse part), and so are both ends of a blend (a metal); any other upper bound or a width at its
+    // end is a limit of the model.
     let is_width = |i: usize| model.lobes().iter().any(|b| b.width.is_some_and(|width| width.entry == i));
-    let limited = |&i: &usize| parameters[i] == upper[i] || (is_width(i) && parameters[i] == lower[i]);
+    let roles: Vec<Role> =
+        model.parameters().iter().flat_map(|p| std::iter::repeat_n(p.role, p.channels.count())).collect();
+    let is_kind = |i: usize| matches!(roles[i], Role::Blend(_));
+    let limited = |&i: &usize| (parameters[i] == upper[i] && !is_kind(i)) || (is_width(i) && parameters[i] == lower[i]);
     let limited: Vec<String> = (0..parameters.len())
         .filter(limited)
         .filter(|&i| is_determined(i))

@@ -81,10 +81,10 @@ pub enum ProgressKind {
 /// Where the searches of stage one start. Not a flag of its own: `--preset paper` sets it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Start {
-    /// From a scan of the model's width and scalar reflectance.
+    /// From a scan of the model's width and of what multiplies other parameters.
     #[default]
     Scan,
-    /// From the paper's one point: kd .3, colour .3, scalar f0 .3, width .3.
+    /// From the paper's one point: .3 in every parameter (20 in an exponent).
     Paper,
 }
 

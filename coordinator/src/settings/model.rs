@@ -106,11 +106,11 @@ mod tests {
         let planned = "merl".parse::<ModelName>().unwrap_err().to_string();
         assert!(
             planned.contains("not there yet")
-                && planned.contains("ggx, cook-torrance, ward, blinn-phong, ashikhmin-shirley, disney"),
+                && planned.contains("ggx, ggx-f90, cook-torrance, ward, blinn-phong, ashikhmin-shirley, disney"),
             "{planned}"
         );
         let unknown = "phong".parse::<ModelName>().unwrap_err().to_string();
-        assert!(unknown.contains("possible values: ggx, cook-torrance"), "{unknown}");
+        assert!(unknown.contains("possible values: ggx, ggx-f90, cook-torrance"), "{unknown}");
     }
 
     #[test]

@@ -332,15 +332,14 @@ impl Plan<'_> {
         }
     }
 
-    /// The first of the other models in every scene, the rest on a few materials under the light of the experiments that repeat.
+    /// The same fit with other models: some in every scene, more where experiments repeat.
     fn other_models(&mut self, scene: Scene, is_repeat_probe: bool) -> anyhow::Result<()> {
-        let materials = self.study.numbers(&self.study.file.repeat_materials);
-        let is_repeated = is_repeat_probe && materials.contains(&scene.material);
-        for (m, name) in self.study.file.models.clone().into_iter().enumerate() {
-            if m == 0 || is_repeated {
-                let method = Method { model: brdf::model(&name)?, ..self.method() };
-                self.fit(scene, MethodName::Ours, method, |task| task);
-            }
+        let file = &self.study.file;
+        let repeats = is_repeat_probe && self.study.numbers(&file.repeat_materials).contains(&scene.material);
+        let more = if repeats { file.more_models.clone() } else { Vec::new() };
+        for name in [file.models.clone(), more].concat() {
+            let method = Method { model: brdf::model(&name)?, ..self.method() };
+            self.fit(scene, MethodName::Ours, method, |task| task);
         }
         Ok(())
     }

@@ -27,10 +27,12 @@ pub(super) struct StudyFile {
     /// The model of most experiments.
     #[serde(default = "default_model")]
     pub(super) model: String,
-    /// Models of the table of models, beside it: the first of them on every material under every probe, the others on the
-    /// materials of the experiments that repeat, under the light of these.
+    /// Models of the table of models, beside it, on every material under every probe.
     #[serde(default)]
     pub(super) models: Vec<String>,
+    /// More of them, on the materials of the experiments that repeat and under the light of these alone.
+    #[serde(default)]
+    pub(super) more_models: Vec<String>,
     /// Columns and rows of the photos.
     #[serde(default = "default_size")]
     pub(super) size: u32,
@@ -211,7 +213,7 @@ impl Study {
             let distinct: BTreeSet<&String> = list.iter().collect();
             ensure!(distinct.len() == list.len(), "{what} names a material twice");
         }
-        for model in std::iter::once(&self.file.model).chain(&self.file.models) {
+        for model in std::iter::once(&self.file.model).chain(&self.file.models).chain(&self.file.more_models) {
             brdf::model(model)?;
         }
         let sizes = [self.file.size, self.file.large].into_iter().chain(self.file.low_resolutions.iter().copied());

@@ -118,9 +118,9 @@ impl<const POWER: u8> Lobe for Subsurface<POWER> {
         CARE
     }
 
-    /// At grazing views `1/(n.l + n.v)` bends it over a few times `n.v`.
+    /// At grazing views `1/(n.l + n.v)` bends it, over a few times `n.v`.
     fn bend(&self) -> f64 {
-        30.0
+        60.0
     }
 
     fn footprint(&self, width: f64, cos_o: f64) -> f64 {

@@ -9,11 +9,11 @@ use super::super::{
 use crate::math::elementary::ln_positive;
 use std::f64::consts::FRAC_1_PI;
 
-/// Square root of the smallest width, 0.005.
-pub(super) const LEAST_ROUGHNESS: f64 = 0.070_710_678_118_654_76;
+/// Smallest roughness: of a width of 0.005.
+pub(super) const LEAST_ROUGHNESS: f64 = 0.071;
 
-/// The gloss of a coat of that width.
-pub(super) const MOST_GLOSS: f64 = (SATIN - 0.005) / GLOSS_RANGE;
+/// Largest gloss of a coat: of a width of 0.005.
+pub(super) const MOST_GLOSS: f64 = 0.9595;
 
 /// Width of a coat of gloss 0, and how much narrower it is at gloss 1.
 const SATIN: f64 = 0.1;

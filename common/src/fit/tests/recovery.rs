@@ -4,9 +4,11 @@ use super::scene::{StageOne, method};
 use crate::fit::{Candidate, Method, SearchKind, Start, search_gamma};
 
 /// Materials in the inside of the models' boxes.
-const KNOWN: [(&str, &[f64]); 9] = [
+const KNOWN: [(&str, &[f64]); 13] = [
     ("ggx", &[0.3, 0.2, 0.1, 0.05, 0.05, 0.05, 0.15]),
     ("ggx", &[0.05, 0.1, 0.2, 0.6, 0.5, 0.3, 0.35]),
+    ("ggx-f90", &[0.3, 0.2, 0.1, 0.05, 0.05, 0.05, 0.3, 0.15]),
+    ("ggx-f90", &[0.05, 0.1, 0.2, 0.6, 0.5, 0.3, 0.7, 0.35]),
     ("cook-torrance", &[0.2, 0.3, 0.1, 0.5, 0.4, 0.6, 0.3, 0.2]),
     ("ward", &[0.3, 0.2, 0.1, 0.05, 0.05, 0.05, 0.15]),
     ("ward", &[0.05, 0.1, 0.2, 0.6, 0.5, 0.3, 0.35]),
@@ -14,6 +16,8 @@ const KNOWN: [(&str, &[f64]); 9] = [
     ("blinn-phong", &[0.05, 0.1, 0.2, 0.6, 0.5, 0.3, 15.0]),
     ("ashikhmin-shirley", &[0.3, 0.2, 0.1, 0.05, 0.05, 0.05, 90.0]),
     ("ashikhmin-shirley", &[0.15, 0.1, 0.2, 0.6, 0.5, 0.3, 15.0]),
+    ("disney", &[0.5, 0.2, 0.1, 0.3, 0.2, 0.6, 0.4, 0.3, 0.5, 0.7]),
+    ("disney", &[0.7, 0.5, 0.3, 0.2, 0.8, 0.5, 0.5, 0.2, 0.8, 0.3]),
 ];
 
 fn search(method: &Method, scene: &StageOne, gamma: f64) -> Candidate {

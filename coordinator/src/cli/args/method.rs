@@ -14,7 +14,7 @@ pub(crate) struct MethodArgs {
     /// paper's one start, 21 gammas, no polish
     #[arg(long, value_name = "PRESET", value_enum)]
     pub(crate) preset: Option<Preset>,
-    /// BRDF model: ggx, cook-torrance, ward, blinn-phong, ashikhmin-shirley, disney
+    /// BRDF model: ggx, ggx-f90, cook-torrance, ward, blinn-phong, ashikhmin-shirley, disney
     #[arg(long, value_name = "NAME", default_value_t)]
     model: ModelName,
     /// Exponents of the cost that are tried: START:STOP:STEP, or one number
