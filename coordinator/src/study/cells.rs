@@ -478,6 +478,20 @@ mod tests {
     }
 
     #[test]
+    fn some_models_are_fitted_in_every_cell_and_more_where_experiments_repeat() {
+        let text = "experiments = ['methods', 'models']\nmore-models = ['ward']\nrepeat-materials = ['nickel']";
+        let cells = plan(&study(text)).unwrap();
+        let of = |model: &str| {
+            let fits = cells.iter().filter(|cell| match &cell.task {
+                Task::Fit(task) => task.method.model.name() == model && task.name == MethodName::Ours,
+                _ => false,
+            });
+            fits.map(|cell| cell.scene.material).collect::<Vec<usize>>()
+        };
+        assert_eq!((of("cook-torrance"), of("ward")), (vec![0, 1], vec![1]));
+    }
+
+    #[test]
     fn starts_are_inside_the_bounds_of_every_model() {
         for model in brdf::MODELS {
             let (lower, upper) = brdf::flat_bounds(model.parameters());

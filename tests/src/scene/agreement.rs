@@ -8,7 +8,7 @@ use lookalike::{
     brdf::{Model, flat_bounds, lobe_terms, term_count},
     math::{Rgb, cell},
     render::{
-        knots::Knots,
+        knots::{self, Knots},
         table::TransportTable,
         transport::{Accuracy, Pixel, TransportPlan},
     },
@@ -70,23 +70,24 @@ struct Entry {
 }
 
 impl References {
-    /// Integrates every lobe whose name passes `keep`, those that have a width at each of `widths` that they
-    /// can have.
+    /// Integrates every lobe whose name passes `keep`; the main one at each of `widths`, which are mid-knots of `knots`, any other that
+    /// has a width at the nearest mid-knots of its own grid.
     #[must_use]
     pub fn new(
         scene: &Scene,
         model: &'static dyn Model,
         pixels: &[Pixel],
-        widths: &[f64],
+        (knots, widths): (Knots, &[f64]),
         effort: Effort,
         keep: impl Fn(&str) -> bool,
     ) -> Self {
         let coarse = coarse_table(scene, model);
         let mut entries = Vec::new();
+        let grids = knots::of_lobes(model, knots);
         for (lobe, basis) in model.lobes().iter().enumerate().filter(|(_, basis)| keep(basis.lobe.name())) {
-            let (least, most) = basis.width.map_or((0.0, 0.0), |width| width.span(model.parameters()));
-            let widths = if basis.width.is_some() { widths } else { &[0.0] };
-            for (w, &width) in widths.iter().enumerate().filter(|(_, width)| (least..=most).contains(*width)) {
+            let mut widths = grids[lobe].map_or_else(|| vec![0.0], |grid| mid_knots(&grid, widths));
+            widths.dedup();
+            for (w, &width) in widths.iter().enumerate() {
                 let split = SplitLobe { lobe: basis.lobe, width };
                 let [rest, fresnel, whole] = [0, 1, 2].map(|c| mean(&part(model, &coarse, lobe, width, c)));
                 let darkest = if lobe_terms(basis.lobe) == 1 { fresnel } else { DIELECTRIC_F0 * rest + fresnel };

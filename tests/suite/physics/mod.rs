@@ -75,7 +75,8 @@ impl Case<'_> {
         for model in self.models {
             // A lobe that several models share is integrated once.
             let is_new = |name: &str| !seen.contains(&name) && !self.except.contains(&name);
-            let references = References::new(scene, *model, &pixels, &widths, self.rigour.effort, is_new);
+            let references =
+                References::new(scene, *model, &pixels, (knots(PER_OCTAVE), &widths), self.rigour.effort, is_new);
             seen.extend(model.lobes().iter().map(|basis| basis.lobe.name()));
             for &(accuracy, tolerance) in self.accuracies {
                 for agreement in references.compare(scene, knots(PER_OCTAVE), accuracy) {

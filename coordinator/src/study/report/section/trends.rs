@@ -65,7 +65,8 @@ pub(super) fn section(study: &Study<'_>) -> anyhow::Result<Section> {
 
 /// The microfacet width, whatever the model calls it.
 fn width(row: &Row) -> Option<f64> {
-    row.parameters.get("alpha").or_else(|| row.parameters.get("m")).copied()
+    let named = |name: &str| row.parameters.get(name).copied();
+    named("alpha").or_else(|| named("m")).or_else(|| named("roughness").map(|roughness| roughness * roughness))
 }
 
 /// The mean of the diffuse channels.
@@ -73,7 +74,7 @@ fn diffuse(row: &Row) -> Option<f64> {
     let channels: Vec<f64> = row
         .parameters
         .iter()
-        .filter(|(name, _)| *name == "kd" || name.starts_with("kd."))
+        .filter(|(name, _)| *name == "kd" || name.starts_with("kd.") || name.starts_with("base_color."))
         .map(|(_, value)| *value)
         .collect();
     mean(&channels)
