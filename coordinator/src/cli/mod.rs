@@ -55,6 +55,10 @@ fn parse(argv: Vec<OsString>) -> anyhow::Result<Cli> {
         args.given = expand::given_flags::<MethodArgs>(grammar, &argv)?;
         return Ok(cli);
     }
+    if let Command::Study(args) = &mut cli.command {
+        args.typed = tokens::subcommand_first(&grammar, &argv);
+        return Ok(cli);
+    }
     let Some(preset) = cli.command.preset() else { return Ok(cli) };
     let argv = expand::insert_flags(&grammar, argv, preset::flags(preset));
     Ok(Cli::try_parse_from(argv)?)
@@ -72,7 +76,7 @@ fn start_tracing(filter: &str) -> anyhow::Result<()> {
 }
 
 fn dispatch(Cli { log, command }: Cli) -> anyhow::Result<ExitCode> {
-    use crate::commands::{access, batch, compare, demo, fit, render, status, worker};
+    use crate::commands::{access, batch, compare, demo, fit, render, status, study, worker};
     match command {
         Command::Demo(args) => demo::run(DemoSettings { log: Some(log), ..args.into_settings()? }),
         Command::Fit(args) => {
@@ -98,9 +102,13 @@ fn dispatch(Cli { log, command }: Cli) -> anyhow::Result<ExitCode> {
         Command::Check(_) => later("lookalike check", "`lookalike fit` refuses inputs that it cannot use"),
         Command::Export(_) => later("lookalike export", "the parameters are in OUT/fit.json"),
         Command::Study(args) => {
+            let job = args.job();
             let mut settings = args.into_settings()?;
             settings.cluster.log = Some(log);
-            crate::study::run(settings)
+            match job {
+                Some(job) => study::submit(&settings, job),
+                None => study::run(settings),
+            }
         }
         Command::Report(_) => later("lookalike report", "the numbers are in OUT/fit.json and OUT/candidates.csv"),
     }

@@ -9,4 +9,6 @@ pub(crate) mod fit;
 mod output;
 pub(crate) mod render;
 pub(crate) mod status;
+pub(crate) mod study;
+mod submit;
 pub(crate) mod worker;

@@ -29,7 +29,7 @@ pub struct BatchSettings {
     pub progress: ProgressKind,
 }
 
-/// What `lookalike batch --slurm` submits.
+/// What `lookalike batch --slurm` and `lookalike study --slurm` submit.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct JobSettings {
     /// The user's command line, the command first.

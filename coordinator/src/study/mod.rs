@@ -90,6 +90,15 @@ pub(crate) fn run(settings: StudySettings) -> anyhow::Result<ExitCode> {
     Ok(if failed.is_empty() { Exit::Done } else { Exit::SomeFitsFailed }.into())
 }
 
+/// Tells what is wrong with a study, without running it.
+pub(crate) fn check(settings: &StudySettings) -> anyhow::Result<()> {
+    let study = Study::read(&settings.study)?;
+    for (_, path) in study.materials.iter().chain(&study.lights) {
+        fs::File::open(path).with_context(|| format!("cannot read {}", path.display()))?;
+    }
+    cells::plan(&study).map(|_| ())
+}
+
 /// Computes the cells that are not complete; how many workers there were.
 fn run_cells(
     settings: &StudySettings,

@@ -1,4 +1,4 @@
-//! `lookalike batch --slurm` from end to end, with a stand-in for `sbatch`.
+//! `lookalike batch --slurm` and `lookalike study --slurm` from end to end, with a stand-in for `sbatch`.
 
 use crate::fit::scene::folder;
 use std::{fs, os::unix::fs::PermissionsExt, path::Path, process::Command};
@@ -9,6 +9,9 @@ fn site(sbatch: &str) -> TempDir {
     let folder = folder();
     let manifest = "photos = [\"photo.exr\"]\nenvironments = [\"map.exr\"]\nmodels = [\"ggx\", \"cook-torrance\"]\n";
     fs::write(folder.path().join("two.toml"), manifest).unwrap();
+    let study = "materials = [\"paint.binary\"]\nprobes = [\"map.exr\"]\n";
+    fs::write(folder.path().join("study.toml"), study).unwrap();
+    fs::write(folder.path().join("paint.binary"), b"").unwrap();
     let path = folder.path().join("sbatch");
     fs::write(&path, format!("#!/bin/sh\n{sbatch}\n")).unwrap();
     fs::set_permissions(&path, fs::Permissions::from_mode(0o755)).unwrap();
@@ -40,6 +43,16 @@ fn batch_is_submitted_with_its_command_line_and_the_options_behind_the_dashes() 
 }
 
 #[test]
+fn study_is_submitted_as_a_batch_is() {
+    let site = site("echo 4711");
+    let (code, stdout, stderr) = say(site.path(), "study study.toml -o run --slurm -- --nodes=2");
+    assert_eq!((code, stdout.as_str()), (Some(0), "4711\n"), "{stderr}");
+    let script = fs::read_to_string(site.path().join("run/lookalike.sbatch")).unwrap();
+    assert!(script.contains("\n#SBATCH --nodes=2\n"), "{script}");
+    assert!(script.contains("\nset -- study study.toml -o run\n"), "{script}");
+}
+
+#[test]
 fn what_is_wrong_is_told_before_anything_is_submitted() {
     let site = site("touch submitted; echo 4711");
     for (line, words) in [
@@ -47,6 +60,8 @@ fn what_is_wrong_is_told_before_anything_is_submitted() {
         ("batch two.toml --out run --slurm --access a.json", "--access"),
         ("batch two.toml --out run -- --nodes=4", "--slurm"),
         ("batch missing.toml --out run --slurm", "missing.toml"),
+        ("study study.toml --out run --slurm --workers 3", "--workers"),
+        ("study missing.toml --out run --slurm", "missing.toml"),
     ] {
         let (code, stdout, stderr) = say(site.path(), line);
         assert_eq!((code, stdout.as_str()), (Some(2), ""), "{line}: {stderr}");
@@ -54,6 +69,8 @@ fn what_is_wrong_is_told_before_anything_is_submitted() {
     }
     fs::remove_file(site.path().join("map.exr")).unwrap();
     let (code, _, stderr) = say(site.path(), "batch two.toml --out run --slurm");
+    assert!(code == Some(2) && stderr.contains("map.exr"), "{stderr}");
+    let (code, _, stderr) = say(site.path(), "study study.toml --out run --slurm");
     assert!(code == Some(2) && stderr.contains("map.exr"), "{stderr}");
     assert!(!site.path().join("submitted").exists() && !site.path().join("run").exists());
 }

@@ -1,9 +1,9 @@
 //! `lookalike study`.
 
 use super::{cluster::ClusterArgs, fit::DiagnosticsArgs};
-use crate::settings::StudySettings;
+use crate::settings::{JobSettings, StudySettings};
 use clap::Args;
-use std::path::PathBuf;
+use std::{ffi::OsString, path::PathBuf};
 
 #[derive(Debug, Args)]
 #[command(args_override_self = true, after_long_help = EXAMPLES)]
@@ -19,6 +19,15 @@ pub(crate) struct StudyArgs {
     resume: bool,
     #[command(flatten)]
     cluster: ClusterArgs,
+    /// Submit the run to Slurm, which starts coordinator and workers where there is room, and return
+    #[arg(long, conflicts_with_all = ["workers", "listen", "advertise", "access"], help_heading = "Workers")]
+    slurm: bool,
+    /// With --slurm: options of sbatch, such as --nodes=4 --cpus-per-task=16 --time=2:00:00
+    #[arg(last = true, requires = "slurm", value_name = "SBATCH_OPTION")]
+    sbatch: Vec<String>,
+    /// The whole command line, the command first.
+    #[arg(skip)]
+    pub(crate) typed: Vec<OsString>,
     #[command(flatten)]
     diagnostics: DiagnosticsArgs,
 }
@@ -36,6 +45,11 @@ impl StudyArgs {
             command,
         })
     }
+
+    /// The job that the run is to be, if it is to be one.
+    pub(crate) fn job(&self) -> Option<JobSettings> {
+        self.slurm.then(|| JobSettings { typed: self.typed.clone(), options: self.sbatch.clone() })
+    }
 }
 
 const EXAMPLES: &str = "\
@@ -43,6 +57,7 @@ Examples:
   lookalike study STUDY.toml --out study
   lookalike study STUDY.toml --out study --resume
   lookalike study STUDY.toml --out study --workers 0 --listen 10.0.0.1:4100
+  lookalike study STUDY.toml --out study --slurm -- --nodes=4 --cpus-per-task=16 --time=2:00:00
 
 where STUDY.toml is, for instance (its relative paths are relative to the file):
   materials = [\"merl/*.binary\"]           # measured materials in MERL's format

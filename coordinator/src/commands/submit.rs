@@ -1,0 +1,36 @@
+//! A run as a job of Slurm: what is submitted, and what the user is told.
+
+use crate::{
+    outputs::print_result,
+    settings::JobSettings,
+    slurm::{SlurmJob, command_line},
+};
+use anyhow::Context;
+use std::{env, path, path::Path, process::ExitCode};
+
+/// Submits a run whose results go to the folder `out`. What `check` finds wrong is told now, and not when the job's turn comes.
+pub(crate) fn submit(
+    job: JobSettings,
+    out: &Path,
+    check: impl FnOnce() -> anyhow::Result<()>,
+) -> anyhow::Result<ExitCode> {
+    let job = SlurmJob {
+        command: command_line(&job.typed)?,
+        program: env::current_exe().context("the system does not tell where this program is")?,
+        folder: env::current_dir().context("the current folder cannot be told")?,
+        options: job.options,
+        out: path::absolute(out).context("--out")?,
+    };
+    job.script()?;
+    check()?;
+    if job.options.is_empty() {
+        eprintln!(
+            "note: no options of sbatch behind a lone --, such as -- --nodes=4 --cpus-per-task=16: the job gets what the \
+             cluster gives by itself, often one CPU"
+        );
+    }
+    let submitted = job.submit("sbatch")?;
+    eprintln!("{}", submitted.advice());
+    print_result(&format!("{}\n", submitted.job)).context("cannot write to stdout")?;
+    Ok(ExitCode::SUCCESS)
+}
