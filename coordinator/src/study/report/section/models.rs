@@ -97,7 +97,7 @@ fn by_material(study: &Study<'_>, models: &[&str], caption: &str) -> Table {
 const FREE_RIM: &str = "ggx-f90";
 
 /// What the bright rim of Schlick's Fresnel term costs: GGX beside GGX whose rim is free, where the paper's model was fitted too.
-fn grazing(study: &Study<'_>) -> Option<String> {
+pub(super) fn grazing(study: &Study<'_>) -> Option<String> {
     const GGX: &str = "ggx";
     let of = study.cells().into_iter().map(|cell| scores(study, cell, &[GGX, FREE_RIM, PAPER]));
     let complete: Vec<Vec<f64>> = of.filter_map(|scores| scores.into_iter().collect()).collect();
