@@ -6,7 +6,7 @@ use super::{
 };
 use std::{collections::BTreeSet, fs, process::Command};
 
-const DOCUMENTS: [&str; 15] = [
+const DOCUMENTS: [&str; 16] = [
     "README.md",
     "ARCHITECTURE.md",
     "CONTRIBUTING.md",
@@ -19,6 +19,7 @@ const DOCUMENTS: [&str; 15] = [
     "docs/overhead.md",
     "docs/progress.md",
     "docs/real-materials.md",
+    "docs/results-ggx-f90.md",
     "docs/results.md",
     "docs/security.md",
     "docs/study.md",
