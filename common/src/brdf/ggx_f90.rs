@@ -2,9 +2,9 @@
 //!
 //! `f = kd/pi + F D V` with `D` and `V` of `ggx` and `F = f0 + (f90 - f0) F5`, `F5 = (1 - v.h)^5` (Schlick 1994, with his 1 replaced).
 //!
-//! Every real surface reflects everything at grazing incidence, but measurements and photos end before it, and lose light of sharp
-//! lobes: measured metals that reflect a tenth at normal incidence have no rim as bright as `ggx` must give them (docs/results.md).
-//! It is the generalized Schlick BSDF of MaterialX with a grey `color90`, and the `specular` of glTF's extension of that name.
+//! A smooth interface reflects everything at grazing incidence. The measured materials of docs/results.md do not: they darken towards the
+//! rim, whether by their roughness or by how they were measured and fitted, and `ggx` must give them a rim that they have not.
+//! In MaterialX it is the generalized Schlick BSDF with a grey `color90`.
 //!
 //! Split: `F = f0 (1 - F5) + f90 F5`, so the weights are `kd`, `f0` and `f90`.
 //!

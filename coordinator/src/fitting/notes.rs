@@ -32,6 +32,9 @@ pub(crate) fn notes(method: &Method, outcome: &FitOutcome) -> Vec<String> {
     notes
 }
 
+/// A reflectance of 1 at grazing incidence is what a smooth interface has.
+const FULL_RIM: &str = "f90";
+
 fn at_bounds(model: &dyn Model, parameters: &[f64], is_determined: impl Fn(usize) -> bool) -> Option<String> {
     let (lower, upper) = flat_bounds(model.parameters());
     let names = flat_names(model.parameters());
@@ -40,7 +43,7 @@ fn at_bounds(model: &dyn Model, parameters: &[f64], is_determined: impl Fn(usize
     let is_width = |i: usize| model.lobes().iter().any(|b| b.width.is_some_and(|width| width.entry == i));
     let roles: Vec<Role> =
         model.parameters().iter().flat_map(|p| std::iter::repeat_n(p.role, p.channels.count())).collect();
-    let is_kind = |i: usize| matches!(roles[i], Role::Blend(_));
+    let is_kind = |i: usize| matches!(roles[i], Role::Blend(_)) || names[i] == FULL_RIM;
     let limited = |&i: &usize| (parameters[i] == upper[i] && !is_kind(i)) || (is_width(i) && parameters[i] == lower[i]);
     let limited: Vec<String> = (0..parameters.len())
         .filter(limited)

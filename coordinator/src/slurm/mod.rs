@@ -1,4 +1,4 @@
-//! A batch as a job of Slurm (design section 8, "Beyond one machine"): the job script with the command line in it, and its
+//! A batch or a study as a job of Slurm (design section 8, "Beyond one machine"): the job script with the command line in it, and its
 //! submission. Where the job runs, with how much and until when, is Slurm's to say, and its options are passed on as they are.
 
 mod command_line;

@@ -62,9 +62,14 @@ pub(super) enum What {
     Polished,
     /// The candidate of gamma 1.
     L2,
+    /// The best candidate of the gammas that are at least [`APART`] from the winner's.
+    RunnerUp,
     /// The best that brute force has found.
     Minimum,
 }
+
+/// How far the gamma of a runner-up is from the winner's: those beside it have found the same match.
+pub(super) const APART: f64 = 0.5;
 
 /// A fit of a study.
 #[derive(Debug, Clone)]
@@ -355,9 +360,9 @@ impl Plan<'_> {
             let fitted = self.main(self.scene(material, light));
             for shown in (0..self.study.lights.len()).filter(|&shown| shown != light) {
                 let scene = self.scene(material, shown);
-                let of = [What::Polished, What::L2, What::Winner].map(|what| (fitted, what)).to_vec();
+                let of = [What::Polished, What::L2, What::Winner, What::RunnerUp].map(|what| (fitted, what)).to_vec();
                 let needs = vec![self.photo(scene), self.table(scene), fitted];
-                let name = self.name(scene, &format!("of-{}", self.study.lights[light].0));
+                let name = self.name(scene, &format!("from-{}", self.study.lights[light].0));
                 self.cell(name, scene, Task::Appraise { of, pictures: 2 }, needs);
             }
         }
@@ -465,7 +470,7 @@ mod tests {
         let count = names.len();
         names.dedup();
         assert_eq!(names.len(), count);
-        assert!(names.contains(&"gold-grace-128-brute") && names.contains(&"gold-uffizi-128-of-grace"), "{names:?}");
+        assert!(names.contains(&"gold-grace-128-brute") && names.contains(&"gold-uffizi-128-from-grace"), "{names:?}");
         assert!(!names.contains(&"gold-uffizi-128-brute"));
     }
 

@@ -262,6 +262,7 @@ impl Collector<'_> {
                 (_, What::Polished) => MethodName::OursPolished,
                 (_, What::Winner) => MethodName::Ours,
                 (_, What::L2) => MethodName::L2,
+                (_, What::RunnerUp) => MethodName::RunnerUp,
                 (_, What::Minimum) => MethodName::Brute,
             };
             let searched = self.records.get(from);

@@ -92,11 +92,17 @@ pub(crate) fn run(settings: StudySettings) -> anyhow::Result<ExitCode> {
 
 /// Tells what is wrong with a study, without running it.
 pub(crate) fn check(settings: &StudySettings) -> anyhow::Result<()> {
-    let study = Study::read(&settings.study)?;
-    for (_, path) in study.materials.iter().chain(&study.lights) {
-        fs::File::open(path).with_context(|| format!("cannot read {}", path.display()))?;
+    let journal = settings.out.join(JOURNAL_FILE);
+    if !settings.resume && journal.exists() {
+        bail!(
+            "{} says that a run was begun there already: go on with it with --resume, choose another --out, or remove that folder first",
+            journal.display()
+        );
     }
-    cells::plan(&study).map(|_| ())
+    let study = Study::read(&settings.study)?;
+    cells::plan(&study)?;
+    read_materials(&study)?;
+    read_lights(&study).map(|_| ())
 }
 
 /// Computes the cells that are not complete; how many workers there were.
@@ -165,6 +171,11 @@ fn lock(tally: &Mutex<Tally>) -> std::sync::MutexGuard<'_, Tally> {
 
 /// Reads materials and lights, which is also their check.
 fn load(study: Study, cells: Vec<cells::Cell>, out: OutFolder, workers: usize) -> anyhow::Result<Inputs> {
+    let (materials, lights) = (read_materials(&study)?, read_lights(&study)?);
+    Ok(Inputs { study, cells, materials, lights, out, workers })
+}
+
+fn read_materials(study: &Study) -> anyhow::Result<Vec<Blob>> {
     let mut materials = Vec::new();
     for (_, path) in &study.materials {
         let shown = path.display().to_string();
@@ -172,6 +183,10 @@ fn load(study: Study, cells: Vec<cells::Cell>, out: OutFolder, workers: usize) -
         MerlTable::read(&shown, &bytes)?;
         materials.push(Blob::new(bytes));
     }
+    Ok(materials)
+}
+
+fn read_lights(study: &Study) -> anyhow::Result<Vec<Light>> {
     let mut lights = Vec::new();
     for (_, path) in &study.lights {
         let settings = EnvironmentSettings { path: path.clone(), mapping: None, rotation_deg: 0.0 };
@@ -180,7 +195,7 @@ fn load(study: Study, cells: Vec<cells::Cell>, out: OutFolder, workers: usize) -
         let encoded = encode_light(&loaded.environment)?;
         lights.push(Light { environment: loaded.environment, encoded });
     }
-    Ok(Inputs { study, cells, materials, lights, out, workers })
+    Ok(lights)
 }
 
 /// What the run is a run of. What the file says counts, not how it is written.

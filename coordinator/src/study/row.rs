@@ -65,6 +65,9 @@ pub(crate) enum Method {
     /// `Ours`, then polished on CSSIM.
     #[serde(rename = "ours+polish")]
     OursPolished,
+    /// The best candidate of `Ours` of the gammas that are far from the winner's.
+    #[serde(rename = "runner-up")]
+    RunnerUp,
     /// The candidate of one gamma of `Ours`: one row for each.
     #[serde(rename = "candidate")]
     Candidate,
@@ -103,6 +106,7 @@ impl Method {
         match self {
             Self::Ours => "ours",
             Self::OursPolished => "ours+polish",
+            Self::RunnerUp => "runner-up",
             Self::Candidate => "candidate",
             Self::Subsets => "subsets",
             Self::SubsetsPolished => "subsets+polish",

@@ -2,10 +2,10 @@
 //! record and its images behind.
 
 use super::{
-    cells::{Cell, CellId, Scene, Task, What},
+    cells::{APART, Cell, CellId, Scene, Task, What},
     file::Study,
     planner::{CellPlanner, Outcome},
-    record::{self, Content, Record},
+    record::{self, Content, Match, Record},
 };
 use crate::outputs::OutFolder;
 use anyhow::{Context, anyhow};
@@ -255,6 +255,11 @@ impl Supply {
             (Content::Fit { candidates, winner, .. }, What::Winner) => candidates.get(*winner)?,
             (Content::Fit { polished, .. }, What::Polished) => polished.as_ref()?,
             (Content::Fit { candidates, .. }, What::L2) => candidates.iter().find(|c| c.gamma == Some(1.0))?,
+            (Content::Fit { candidates, winner, .. }, What::RunnerUp) => {
+                let won = candidates.get(*winner)?.gamma?;
+                let far = |found: &&Match| found.gamma.is_some_and(|gamma| (gamma - won).abs() >= APART);
+                candidates.iter().filter(far).min_by(|a, b| a.cssim.total_cmp(&b.cssim))?
+            }
             (Content::Survey { .. }, What::Minimum) => content.minimum()?,
             _ => return None,
         };

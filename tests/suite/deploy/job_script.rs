@@ -195,8 +195,9 @@ fn command_lines_that_cannot_work_are_refused_before_anything_is_started() {
     let site = site();
     let cases = [
         ("", "expected a command line of lookalike"),
-        ("demo --out run", "expected the command batch or fit, found demo"),
+        ("demo --out run", "expected the command batch, study or fit, found demo"),
         ("fit photo.exr --env map.exr", "expected --out DIR"),
+        ("study study.toml", "expected --out DIR"),
         ("fit photo.exr --env map.exr --out run --workers 3", "--workers is not for a job of Slurm"),
         ("fit photo.exr --env map.exr --out run --listen=0.0.0.0:1", "--listen is not for a job of Slurm"),
     ];

@@ -1,6 +1,8 @@
 //! `lookalike batch --slurm` and `lookalike study --slurm` from end to end, with a stand-in for `sbatch`.
 
 use crate::fit::scene::folder;
+use lookalike::brdf::{Ggx, Material};
+use lookalike_tests::merl;
 use std::{fs, os::unix::fs::PermissionsExt, path::Path, process::Command};
 use tempfile::TempDir;
 
@@ -11,7 +13,8 @@ fn site(sbatch: &str) -> TempDir {
     fs::write(folder.path().join("two.toml"), manifest).unwrap();
     let study = "materials = [\"paint.binary\"]\nprobes = [\"map.exr\"]\n";
     fs::write(folder.path().join("study.toml"), study).unwrap();
-    fs::write(folder.path().join("paint.binary"), b"").unwrap();
+    let paint = Material::new(&Ggx, vec![0.3, 0.12, 0.08, 0.05, 0.05, 0.05, 0.25]).unwrap();
+    fs::write(folder.path().join("paint.binary"), merl::file_of(&paint)).unwrap();
     let path = folder.path().join("sbatch");
     fs::write(&path, format!("#!/bin/sh\n{sbatch}\n")).unwrap();
     fs::set_permissions(&path, fs::Permissions::from_mode(0o755)).unwrap();
@@ -72,6 +75,9 @@ fn what_is_wrong_is_told_before_anything_is_submitted() {
     assert!(code == Some(2) && stderr.contains("map.exr"), "{stderr}");
     let (code, _, stderr) = say(site.path(), "study study.toml --out run --slurm");
     assert!(code == Some(2) && stderr.contains("map.exr"), "{stderr}");
+    fs::write(site.path().join("paint.binary"), b"no table").unwrap();
+    let (code, _, stderr) = say(site.path(), "study study.toml --out run --slurm");
+    assert!(code == Some(2) && stderr.contains("paint.binary"), "{stderr}");
     assert!(!site.path().join("submitted").exists() && !site.path().join("run").exists());
 }
 

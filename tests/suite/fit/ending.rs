@@ -70,7 +70,7 @@ fn results_that_cannot_be_written_are_refused_before_any_work() {
 fn unknown_model_is_refused_with_the_known_ones() {
     let folder = folder();
     let answer = fit(folder.path(), "out", &format!("{QUICK} --model phong"));
-    answer.refused(&["--model", "phong", "ggx, cook-torrance"]);
+    answer.refused(&["--model", "phong", "ggx, ggx-f90, cook-torrance"]);
     assert!(!folder.path().join("out").exists());
 }
 

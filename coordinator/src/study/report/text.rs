@@ -60,6 +60,7 @@ pub(super) fn probability(p: f64) -> String {
 pub(super) const fn minimised(method: Method) -> &'static str {
     match method {
         Method::Ours
+        | Method::RunnerUp
         | Method::Candidate
         | Method::Subsets
         | Method::Paper
@@ -123,6 +124,7 @@ pub(super) const fn method(method: Method) -> &'static str {
     match method {
         Method::Ours => "ours",
         Method::OursPolished => "ours + polish",
+        Method::RunnerUp => "runner-up",
         Method::Candidate => "candidate",
         Method::Subsets => "more subsets",
         Method::SubsetsPolished => "more subsets + polish",

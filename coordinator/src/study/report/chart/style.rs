@@ -39,7 +39,7 @@ pub(in crate::study::report) const fn method_colour(method: Method) -> RGBColor 
         Method::Paper => 3,
         Method::L2 => 4,
         Method::Ours | Method::Candidate => 5,
-        Method::Log | Method::CubeRoot => 6,
+        Method::Log | Method::CubeRoot | Method::RunnerUp => 6,
     }]
 }
 

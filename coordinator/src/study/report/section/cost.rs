@@ -18,7 +18,8 @@ pub(super) const PAPER_RATIO: f64 = 10.0;
 
 /// What a second is.
 pub(super) const SECONDS: &str = "CPU seconds are wall time from the start of a node to the arrival of its output, on workers \
-                                  of one thread each; where workers share a core with other work they count that as well.";
+                                  of one thread each if they are local; where a worker shares a core with other work they count \
+                                  that as well, and where a remote one has more threads they leave the others out.";
 /// What the charge leaves out.
 const SCORE: &str = "about a millisecond at 128 x 128";
 /// The start of brute force that is the paper's.

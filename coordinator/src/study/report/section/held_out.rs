@@ -1,6 +1,7 @@
 //! The paper's Figure 4: matches under a light that the fit has not seen.
 
 use crate::study::{
+    cells::APART,
     report::{
         chart::{Bars, Group, method_colour},
         document::{Block, Panel, Section, StripRow, Table},
@@ -14,12 +15,12 @@ use crate::study::{
 use std::collections::BTreeSet;
 
 /// As the bars are ordered.
-const METHODS: [Method; 3] = [Method::L2, Method::Ours, Method::OursPolished];
+const METHODS: [Method; 4] = [Method::L2, Method::RunnerUp, Method::Ours, Method::OursPolished];
 /// Pictures of so many materials.
 const SHOWN: usize = 4;
 
 /// A match under another light: the cell, that light, and the scores by [`METHODS`].
-type Case<'a> = ((&'a str, &'a str), &'a str, [Option<f64>; 3]);
+type Case<'a> = ((&'a str, &'a str), &'a str, [Option<f64>; 4]);
 
 pub(super) fn section(study: &Study<'_>) -> anyhow::Result<Section> {
     let mut section = Section::new("held-out", "Figure 4: under a light that the fit has not seen");
@@ -52,6 +53,9 @@ pub(super) fn section(study: &Study<'_>) -> anyhow::Result<Section> {
     }
     if let Some((verdict, words)) = polish(&cases) {
         section.finding(verdict, words);
+    }
+    if let Some(words) = runner_up(&cases) {
+        section.finding(Verdict::Measured, words);
     }
     Ok(section)
 }
@@ -103,18 +107,34 @@ pub(super) fn claim(study: &Study<'_>, method: Method) -> (Verdict, String) {
 /// Whether polish on the fitting light helps under another, and the numbers.
 fn polish(cases: &[Case<'_>]) -> Option<(Verdict, String)> {
     let margins: Vec<f64> =
-        cases.iter().filter_map(|(_, _, [_, ours, polished])| Some((*ours)? - (*polished)?)).collect();
+        cases.iter().filter_map(|(_, _, [.., ours, polished])| Some((*ours)? - (*polished)?)).collect();
     let mean = mean(&margins)?;
     let wins = margins.iter().filter(|margin| **margin > 0.0).count();
     let verb = if mean > 0.0 { "helps" } else { "hurts" };
     let words = format!(
-        "Polish on the fitting light {verb} under held-out lights: it lowers CSSIM by {} in the mean, and in {} cases; that \
+        "Polish on the fitting light {verb} under held-out lights: it {} CSSIM by {} in the mean, and lowers it in {} cases; that \
          it helps is judged so: {}.",
-        text::signed(Some(mean)),
+        if mean > 0.0 { "lowers" } else { "raises" },
+        text::score(Some(mean.abs())),
         text::share(wins, margins.len()),
         verdict::rule(&margins)
     );
     Some((verdict::paired(&margins), words))
+}
+
+/// Whether stage two, which judges under the fitting light, takes what is best under another.
+fn runner_up(cases: &[Case<'_>]) -> Option<String> {
+    let pairs: Vec<(f64, f64)> =
+        cases.iter().filter_map(|(_, _, [_, runner_up, ours, _])| Some(((*runner_up)?, (*ours)?))).collect();
+    let wins = pairs.iter().filter(|(runner_up, ours)| ours < runner_up).count();
+    let column = |value: fn(&(f64, f64)) -> f64| mean(&pairs.iter().map(value).collect::<Vec<_>>());
+    Some(format!(
+        "The winner of stage two scores {} under held-out lights in the mean, its runner-up (the best of the γs that are at least \
+         {APART} from the winner's) {}; the winner is the better one in {} cases.",
+        text::score(Some(column(|pair| pair.1)?)),
+        text::score(Some(column(|pair| pair.0)?)),
+        text::share(wins, pairs.len())
+    ))
 }
 
 fn draw(material: &str, cases: &[&Case<'_>]) -> anyhow::Result<String> {
@@ -137,7 +157,7 @@ fn part(table: &Table, material: &str) -> crate::study::report::document::Csv {
 fn strip(study: &Study<'_>, cases: &[Case<'_>]) -> Vec<StripRow> {
     let mut rows = Vec::new();
     let mut done: Vec<&str> = Vec::new();
-    for (cell, shown, [l2, _, polished]) in cases {
+    for (cell, shown, [l2, .., polished]) in cases {
         let picture = |what| study.held_out_picture(*cell, shown, what);
         if done.contains(&cell.0) || done.len() == SHOWN || picture("photo").is_none() {
             continue;

@@ -10,6 +10,7 @@ use crate::study::{
     },
     row::Method,
 };
+use lookalike::brdf::MODELS;
 use std::collections::BTreeSet;
 
 /// The model of the paper's results.
@@ -22,7 +23,9 @@ pub(super) fn section(study: &Study<'_>) -> anyhow::Result<Section> {
     let models: Vec<&str> = models.into_iter().collect();
     let scored = scored(study, &models);
     if scored.is_empty() {
-        return Ok(section.missing("the experiment \"models\" beside \"methods\""));
+        return Ok(section.missing(
+            "\"models\" or \"more-models\" with names of models, and the experiments \"models\" and \"methods\"",
+        ));
     }
     let everywhere: Vec<&str> = (0..models.len())
         .filter(|&i| study.cells().len() == scored.iter().filter(|(_, scores)| scores[i].is_some()).count())
@@ -96,17 +99,18 @@ fn by_material(study: &Study<'_>, models: &[&str], caption: &str) -> Table {
 /// `ggx` with a free reflectance at grazing incidence.
 const FREE_RIM: &str = "ggx-f90";
 
+const GGX: &str = "ggx";
+
 /// What the bright rim of Schlick's Fresnel term costs: GGX beside GGX whose rim is free, where the paper's model was fitted too.
 pub(super) fn grazing(study: &Study<'_>) -> Option<String> {
-    const GGX: &str = "ggx";
     let of = study.cells().into_iter().map(|cell| scores(study, cell, &[GGX, FREE_RIM, PAPER]));
     let complete: Vec<Vec<f64>> = of.filter_map(|scores| scores.into_iter().collect()).collect();
     let column = |i: usize| mean(&complete.iter().map(|scores| scores[i]).collect::<Vec<_>>());
     let (bound, free, paper) = (column(0)?, column(1)?, column(2)?);
     let wins = |rival: usize| complete.iter().filter(|scores| scores[1] < scores[rival]).count();
     Some(format!(
-        "{GGX} reflects everything at grazing incidence, as surfaces do; {FREE_RIM} leaves that reflectance free and is the same \
-         otherwise. Its mean CSSIM is {} against {} of {GGX} (lower in {} cells) and {} of {PAPER} (lower in {}), all with polish.",
+        "The Fresnel term of {GGX} rises to 1 at grazing incidence, as that of a smooth interface does; {FREE_RIM} is {GGX} with that end \
+         as one more parameter. Its mean CSSIM is {} against {} of {GGX} (lower in {} cells) and {} of {PAPER} (lower in {}), all with polish.",
         text::score(Some(free)),
         text::score(Some(bound)),
         text::share(wins(0), complete.len()),
@@ -179,11 +183,8 @@ pub(super) fn claim(study: &Study<'_>) -> (Verdict, String) {
     if parts.is_empty() {
         return (Verdict::NotDecided, text::ABSENT.to_owned());
     }
-    let words = format!(
-        "{} [BP20a] holds GGX to be the better model; judged by the first: {}.",
-        parts.join(" "),
-        verdict::rule(judged)
-    );
+    let held = if study.model == GGX { " [BP20a] holds GGX to be the better model." } else { "" };
+    let words = format!("{}{held} Judged by the first: {}.", parts.join(" "), verdict::rule(judged));
     (verdict::paired(judged), words)
 }
 
@@ -195,8 +196,9 @@ fn compared(study: &Study<'_>, pairs: &Pairs<'_>, how: &str) -> Option<String> {
     let (cell, worst_ours, worst_rival) = pairs.iter().max_by(|a, b| (a.1 - a.2).total_cmp(&(b.1 - b.2)))?;
     let verb = if ours > rival { "loses to" } else { "beats" };
     Some(format!(
-        "The default model {} {verb} {PAPER} by {} in mean CSSIM ({} against {}; {how}): it is the better one in {} cells, and \
+        "{} {} {verb} {PAPER} by {} in mean CSSIM ({} against {}; {how}): it is the better one in {} cells, and \
          does worst against it at {} ({} against {}).",
+        if study.model == MODELS[0].name() { "The default model" } else { "The model" },
         study.model,
         text::score(Some((rival - ours).abs())),
         text::score(Some(ours)),

@@ -74,14 +74,14 @@ fn diffuse(row: &Row) -> Option<f64> {
     let channels: Vec<f64> = row
         .parameters
         .iter()
-        .filter(|(name, _)| *name == "kd" || name.starts_with("kd.") || name.starts_with("base_color."))
+        .filter(|(name, _)| *name == "kd" || name.starts_with("kd."))
         .map(|(_, value)| *value)
         .collect();
     mean(&channels)
 }
 
 fn label(name: &str) -> &'static str {
-    if name == "width" { "width of the lobe (alpha, m)" } else { "mean diffuse albedo (kd)" }
+    if name == "width" { "width of the lobe (alpha, m, roughness squared)" } else { "mean diffuse albedo (kd)" }
 }
 
 fn points(rows: &[&Row], value: fn(&Row) -> Option<f64>) -> Vec<(f64, f64)> {

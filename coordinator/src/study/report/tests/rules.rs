@@ -103,7 +103,7 @@ fn the_study_says_what_its_grid_is() {
 
 #[test]
 fn a_default_model_that_loses_is_said_to_lose() {
-    let claim = "The default model against the paper's";
+    let claim = "The study's model against the paper's";
     let summary = |data: &StudyData| row(tables(&section_of(data, "summary"))[0], &[claim]);
     assert!(summary(&whole())[2].starts_with("The default model ggx beats cook-torrance by 0.0060"));
     let mut data = whole();
@@ -124,12 +124,27 @@ fn a_default_model_that_loses_is_said_to_lose() {
 #[test]
 fn polish_under_held_out_lights_helps_or_hurts() {
     let (verdict, words) = finding(&whole(), "held-out", "Polish on the fitting light");
-    assert!(verdict == Verdict::Confirmed && words.contains("helps") && words.contains("by +0.0020"), "{words}");
+    assert!(
+        verdict == Verdict::Confirmed && words.contains("helps") && words.contains("lowers CSSIM by 0.0020"),
+        "{words}"
+    );
     let mut data = whole();
     let polished = |row: &&mut Row| row.method == Method::OursPolished && row.shown != row.probe;
     data.rows.iter_mut().filter(polished).for_each(|row| row.cssim += 0.01);
     let (verdict, words) = finding(&data, "held-out", "Polish on the fitting light");
-    assert!(verdict == Verdict::Refuted && words.contains("hurts"), "{words}");
+    assert!(
+        verdict == Verdict::Refuted && words.contains("hurts") && words.contains("it raises CSSIM by 0.0080"),
+        "{words}"
+    );
+}
+
+#[test]
+fn the_winner_stands_beside_its_runner_up_under_held_out_lights() {
+    let (_, words) = finding(&whole(), "held-out", "The winner of stage two");
+    assert!(
+        words.contains("0.0635 under") && words.contains("winner's) 0.0655; the winner is the better one in 36 of 36"),
+        "{words}"
+    );
 }
 
 #[test]
