@@ -40,6 +40,9 @@ pub(super) fn section(study: &Study<'_>) -> anyhow::Result<Section> {
     for (claim, (verdict, numbers)) in first.iter().cloned().chain(rim).chain(others.iter().cloned()).filter(tried) {
         table.rows.push(vec![Entry::of(claim), Entry::verdict(verdict), Entry::of(numbers)]);
     }
+    if table.rows.is_empty() {
+        return Ok(section.missing("an experiment that judges a claim, such as \"methods\""));
+    }
     let csv = table.csv("claims");
     section.blocks.extend([Block::Table(table), Block::Data(csv)]);
     worse(study, &mut section);
