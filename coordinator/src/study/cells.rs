@@ -112,7 +112,8 @@ impl Plan<'_> {
         let has = |experiment| self.study.has(experiment);
         let (has_held_out, has_agreement, has_direct) =
             (has(Experiment::HeldOut), has(Experiment::Agreement), has(Experiment::Direct));
-        let needs_main = has(Experiment::Methods) || has_held_out || has_agreement || has_direct;
+        let needs_main =
+            has(Experiment::Methods) || has(Experiment::Samples) || has_held_out || has_agreement || has_direct;
         let (methods, low, subsets, models) = (
             has(Experiment::Methods),
             has(Experiment::LowResolution),
@@ -478,7 +479,8 @@ mod tests {
     fn an_experiment_alone_plans_what_it_needs_and_no_more() {
         let cells = plan(&study("experiments = ['samples']")).unwrap();
         let fits = cells.iter().filter(|cell| matches!(cell.task, Task::Fit(_))).count();
-        assert_eq!(fits, 2 * 3);
+        // 256 pixels, 32, 64 and all.
+        assert_eq!(fits, 2 * 4);
         assert!(!cells.iter().any(|cell| matches!(cell.task, Task::Brute { .. } | Task::Appraise { .. })));
     }
 
