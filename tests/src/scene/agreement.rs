@@ -17,7 +17,7 @@ use lookalike::{
 
 /// Deviations of one term of one lobe at one width. All are shares of the mean radiance over the whole object: of the term's own, but
 /// for what no surface shows alone. That is the `F5` part, which is held to a dielectric's with F0 = 0.04 and no diffuse part; and what
-/// [`BESIDE`] names, which is held to its sum with the lobe beside it.
+/// shapes a lobe by the roughness, which is held to its sum with the lobe that it shapes.
 #[derive(Debug, Clone, Copy)]
 pub struct Agreement {
     /// Lobe of the model.
