@@ -87,7 +87,7 @@ fn bright(model: &dyn Model, parameters: &[f64]) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use lookalike::brdf::CookTorrance;
+    use lookalike::brdf::{CookTorrance, Disney, GgxF90};
 
     const KNOWN: Uncertainty = Uncertainty::StandardError(0.01);
 
@@ -108,5 +108,16 @@ mod tests {
         let parameters = [0.3, 0.3, 0.3, 0.0, 0.0, 0.0, 0.5, 1.0];
         assert!(at_bounds(&CookTorrance, &parameters, |_| true).is_some_and(|note| note.contains("m = 1")));
         assert_eq!(at_bounds(&CookTorrance, &parameters, |i| i != 7), None);
+    }
+
+    #[test]
+    fn a_metal_and_a_full_rim_are_answers_and_a_full_coat_is_a_limit() {
+        let rim = |f90: f64, f0: f64| at_bounds(&GgxF90, &[0.3, 0.3, 0.3, f0, 0.1, 0.1, f90, 0.2], |_| true);
+        assert_eq!(rim(1.0, 0.1), None);
+        assert!(rim(1.0, 1.0).is_some_and(|note| note.contains("f0.r = 1;")));
+        // Base colour, subsurface, metallic, specular, roughness, sheen, clear coat, its gloss.
+        let disney = |coat: f64| at_bounds(&Disney, &[0.5, 0.5, 0.5, 1.0, 1.0, 0.5, 0.5, 0.0, coat, 0.5], |_| true);
+        assert_eq!(disney(0.5), None);
+        assert!(disney(1.0).is_some_and(|note| note.contains("clearcoat = 1;") && !note.contains("metallic")));
     }
 }

@@ -52,8 +52,6 @@ struct Case<'a> {
     name: &'a str,
     /// Whose lobes.
     models: &'a [&'static dyn Model],
-    /// Names of lobes that are left out.
-    except: &'a [&'a str],
     /// Widths; the nearest mid-knots are taken.
     alphas: &'a [f64],
     /// Pixels of full coverage, spread over the object.
@@ -74,7 +72,7 @@ impl Case<'_> {
         let mut seen: Vec<&str> = Vec::new();
         for model in self.models {
             // A lobe that several models share is integrated once.
-            let is_new = |name: &str| !seen.contains(&name) && !self.except.contains(&name);
+            let is_new = |name: &str| !seen.contains(&name);
             let references =
                 References::new(scene, *model, &pixels, (knots(PER_OCTAVE), &widths), self.rigour.effort, is_new);
             seen.extend(model.lobes().iter().map(|basis| basis.lobe.name()));

@@ -26,9 +26,9 @@ fn survey(request: SurveyRequest) -> SurveyOutcome {
 #[test]
 fn brute_force_comes_near_the_material_and_its_score_is_that_of_its_point() {
     let found =
-        survey(SurveyRequest { starts: vec![START.to_vec()], max_evaluations: Some(600), ..Default::default() });
+        survey(SurveyRequest { starts: vec![START.to_vec()], max_evaluations: Some(3000), ..Default::default() });
     let minimum = &found.minima[0];
-    assert!(minimum.evaluations <= 600, "{minimum:?}");
+    assert!(minimum.evaluations <= 3000 && minimum.cssim < 0.05, "{minimum:?}");
     let points = vec![MATERIAL.to_vec(), minimum.parameters.clone(), START.to_vec()];
     let gammas = vec![1.0, 2.0];
     let appraised = survey(SurveyRequest { points, gammas, pictures: 2, ..Default::default() });
