@@ -3,7 +3,7 @@
 //! (Workshop on Material Appearance Modeling, 2020), cited below as **\[BP20b\]**.
 //!
 //! This crate is pure: the science ([`math`], [`image`], [`light`], [`scene`], [`brdf`], [`render`], [`metric`],
-//! [`search`], [`fit`]), the job graph ([`graph`]) and the wire format ([`protocol`]). Nothing in it opens a file or a
+//! [`search`], [`fit`]), its steps as a job graph ([`nodes`], [`plan`]), the job graph itself ([`graph`]) and the wire format ([`protocol`]). Nothing in it opens a file or a
 //! socket, reads a clock or an environment variable, or prints.
 //!
 //! Conventions: world right-handed, +Y up; the camera sits on +Z and looks along -Z; directions are unit vectors that
@@ -16,6 +16,8 @@ pub mod image;
 pub mod light;
 pub mod math;
 pub mod metric;
+pub mod nodes;
+pub mod plan;
 pub mod protocol;
 pub mod render;
 pub mod scene;

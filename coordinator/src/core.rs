@@ -4,6 +4,7 @@
 mod departed;
 mod members;
 mod pace;
+pub mod recall;
 mod waiting;
 
 use std::collections::VecDeque;
@@ -18,8 +19,8 @@ use self::members::{Size, weight};
 use self::pace::Pace;
 pub(crate) use self::waiting::{Place, Waiting};
 use crate::comm::{NodeName, Site};
+use crate::core::recall::Recall;
 pub use crate::policy::Policy;
-use crate::recall::Recall;
 
 /// What a run has cost, for people: nothing of it may reach a result.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

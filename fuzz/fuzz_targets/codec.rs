@@ -3,15 +3,7 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use lookalike::{
-    fit::nodes,
-    graph::{Blob, BlobHash, DecodedCache, RunContext},
-    protocol::{
-        Access, Challenge, FrameReader, FrameTag, IncomingBlob, Response, ToCoordinator, ToWorker, Verdict, decode_message,
-        encode_message, frame_header,
-    },
-    scene::GeometrySpec,
-};
+use lookalike::{nodes, graph::{Blob, BlobHash, DecodedCache, RunContext}, protocol::{Access, Challenge, FrameReader, FrameTag, IncomingBlob, Response, ToCoordinator, ToWorker, Verdict, decode_message, encode_message, frame_header}, scene::GeometrySpec};
 use std::{fmt::Debug, sync::Arc};
 
 fuzz_target!(|bytes: &[u8]| {

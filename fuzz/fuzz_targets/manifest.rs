@@ -23,7 +23,7 @@ fuzz_target!(|text: &str| {
     FOLDER.with(|folder| {
         let path = folder.path().join("manifest.toml");
         fs::write(&path, text).expect("a file of ours");
-        match lookalike_coordinator::fuzzing::manifest(&path) {
+        match lookalike_app::fuzzing::manifest(&path) {
             Ok(fits) => assert!(fits > 0),
             Err(error) => assert!(error.contains("manifest.toml"), "does not name its file: {error}"),
         }

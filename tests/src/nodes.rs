@@ -5,8 +5,8 @@ use std::net::TcpStream;
 use std::path::Path;
 use std::sync::Arc;
 
-use lookalike::fit::nodes;
 use lookalike::graph::{Blob, BlobHash, NodeFailure, NodeType, Registry, RunContext};
+use lookalike::nodes;
 
 /// All of them.
 #[must_use]

@@ -5,7 +5,7 @@ use lookalike::{
     image::Image,
     scene::{CircleSource, PixelStatus},
 };
-use lookalike_coordinator::{
+use lookalike_app::{
     inputs::{CaptureFiles, LoadedCapture, load_capture},
     settings::{CameraSpec, EnvironmentSettings, ViewSettings},
 };

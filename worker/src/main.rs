@@ -2,7 +2,7 @@
 
 use std::process::ExitCode;
 
-use lookalike::fit::nodes;
+use lookalike::nodes;
 
 fn main() -> ExitCode {
     lookalike_worker::main_with(nodes::registry())

@@ -20,7 +20,7 @@ impl BestScore {
         (!score.is_nan()).then_some(score)
     }
 
-    pub(super) fn set(&self, score: f64) {
+    pub(crate) fn set(&self, score: f64) {
         self.0.store(score.to_bits(), Ordering::Relaxed);
     }
 }

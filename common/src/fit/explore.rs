@@ -17,7 +17,7 @@ use crate::{
 use std::ops::ControlFlow;
 
 /// Most evaluations of CSSIM on the coarse picture, from each start.
-pub(super) const MAX_EXPLORATIONS: usize = 300;
+pub(crate) const MAX_EXPLORATIONS: usize = 300;
 
 /// The lobes that are tried beside that of the winner, as widths of GGX.
 const WIDTHS: [f64; 2] = [0.03, 0.1];
@@ -29,7 +29,7 @@ const SHARPEST: f64 = 0.015;
 const INSIDE: f64 = 0.01;
 
 /// The starts: the winner, the winner with other lobes, and the paper's generic start.
-pub(super) fn starts(model: &dyn Model, won: &[f64]) -> Vec<Vec<f64>> {
+pub(crate) fn starts(model: &dyn Model, won: &[f64]) -> Vec<Vec<f64>> {
     let (lower, upper) = flat_bounds(model.parameters());
     let width = model.lobes().iter().find_map(|basis| basis.width);
     let with_width = |alpha: f64| {
@@ -55,7 +55,7 @@ pub(super) fn starts(model: &dyn Model, won: &[f64]) -> Vec<Vec<f64>> {
 ///
 /// # Errors
 /// When no start can be rendered and scored.
-pub(super) fn explore(
+pub(crate) fn explore(
     view: &FullView<'_>,
     judge: &Judge,
     by: JudgedBy,
@@ -80,7 +80,7 @@ pub(super) fn explore(
 }
 
 /// The span of widths whose lobes a coarse picture shows; `None` for a model without widths.
-pub(super) fn explored_span(model: &dyn Model) -> Option<(f64, f64)> {
+pub(crate) fn explored_span(model: &dyn Model) -> Option<(f64, f64)> {
     let widths: Vec<f64> = grid(model)?.into_iter().filter(|(_, alpha)| *alpha >= SHARPEST).map(|(w, _)| w).collect();
     let (low, high) = (widths.iter().copied().reduce(f64::min)?, widths.iter().copied().reduce(f64::max)?);
     (low < high).then_some((low, high))

@@ -5,23 +5,20 @@
 //! 3. stage two, [`judge_candidates`]: render the candidates in full, keep the one of lowest CSSIM,
 //! 4. stage three, [`polish`]: a short search on CSSIM itself, from the winner or from another lobe that looks better on a coarse picture.
 //!
-//! [`nodes`] wraps these steps as nodes of the job graph, and [`FitPlanner`] joins them.
+//! [`crate::nodes`] wraps these steps as nodes of the job graph, and [`crate::plan`] joins them.
 
 mod best;
 mod brute_force;
 mod candidate;
 mod direct;
-mod explore;
+pub(crate) mod explore;
 mod method;
-pub mod nodes;
 mod objective;
-mod plan;
-mod polish;
+pub(crate) mod polish;
 mod scan;
-mod stage_one;
+pub(crate) mod stage_one;
 mod stage_two;
-mod uncertainty;
-mod wire;
+pub(crate) mod uncertainty;
 
 pub use best::BestScore;
 pub use brute_force::brute_force;
@@ -29,14 +26,10 @@ pub use candidate::{Candidate, SAME, distinct, needed_span};
 pub use direct::DirectPixels;
 pub use method::{Compress, Integration, JudgedBy, MOST_SEARCHES, Method, MethodError, SearchKind, Start, gamma_range};
 pub use objective::Objective;
-pub use plan::{
-    Appraisal, FitError, FitOutcome, FitPlanner, PhotoPlanner, Subject, SurveyOutcome, SurveyPlanner, SurveyRequest,
-    encode_light,
-};
 pub use polish::{MAX_EVALUATIONS, Polished, polish};
 pub use stage_one::{SearchFailure, search_gamma};
 pub use stage_two::{FullView, Judged, judge_candidates, winner};
 pub use uncertainty::{LARGEST_SHARE, Uncertainty};
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;

@@ -100,7 +100,7 @@ pub fn search_gamma(
 }
 
 /// What a search with `gamma` minimises. Coordinator and workers build it here, so that both find the same cost, bit for bit.
-pub(super) fn objective_of<'a>(
+pub(crate) fn objective_of<'a>(
     method: &Method,
     gamma: f64,
     table: &'a TransportTable,

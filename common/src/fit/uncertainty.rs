@@ -58,7 +58,7 @@ const AT_BOUND: f64 = 1e-5;
 ///
 /// # Errors
 /// When the model's bounds make no box.
-pub(super) fn uncertainties(
+pub(crate) fn uncertainties(
     model: &dyn Model,
     objective: &mut Objective<'_>,
     point: &[f64],

@@ -11,12 +11,13 @@ use super::{past, schema, status, unix_ms};
 
 /// A finished run's files of results, each with the BLAKE3 of its bytes.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) struct Finished {
-    pub(crate) outputs: Vec<(String, String)>,
+pub struct Finished {
+    /// Path below the folder of results and hash of its content, of each file.
+    pub outputs: Vec<(String, String)>,
 }
 
 /// Mark a run as finished. The outputs of its nodes are dropped: the results are written, and the outputs are large.
-pub(crate) fn finish(path: &Path, finished: &Finished) -> Result<(), JournalError> {
+pub fn finish(path: &Path, finished: &Finished) -> Result<(), JournalError> {
     let connection = schema::open(path)?;
     let outputs = fits::files_json(&finished.outputs);
     let write = || -> rusqlite::Result<()> {
@@ -39,7 +40,7 @@ pub(crate) fn finish(path: &Path, finished: &Finished) -> Result<(), JournalErro
 
 /// Write what the fits of a run came to after its journal was closed. With `ended`, all of them have ended, but not all of them well:
 /// how many did not.
-pub(crate) fn settle(path: &Path, ledger: &FitLedger, ended: Option<&str>) -> Result<(), JournalError> {
+pub fn settle(path: &Path, ledger: &FitLedger, ended: Option<&str>) -> Result<(), JournalError> {
     let mut connection = schema::open(path)?;
     let rows = ledger.take();
     let mut write = || -> rusqlite::Result<()> {
@@ -63,7 +64,7 @@ pub(crate) fn settle(path: &Path, ledger: &FitLedger, ended: Option<&str>) -> Re
 }
 
 /// The finished run of a journal, if it is finished, after a check that it is one of these inputs and settings.
-pub(crate) fn finished(path: &Path, identity: &RunIdentity) -> Result<Option<Finished>, JournalError> {
+pub fn finished(path: &Path, identity: &RunIdentity) -> Result<Option<Finished>, JournalError> {
     let connection = schema::open(path)?;
     past::check_identity(path, &connection, identity)?;
     let sql = "SELECT outputs FROM run WHERE outputs IS NOT NULL";

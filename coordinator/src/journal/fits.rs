@@ -29,12 +29,13 @@ pub struct FitStatus {
 
 /// The row of a fit.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(crate) struct FitRow {
+pub struct FitRow {
     /// Its place among the fits, from 0.
-    pub(crate) number: u32,
-    pub(crate) status: FitStatus,
+    pub number: u32,
+    /// How it is doing.
+    pub status: FitStatus,
     /// The files that it has written, each with the BLAKE3 of its bytes; empty until all are there.
-    pub(crate) outputs: Vec<(String, String)>,
+    pub outputs: Vec<(String, String)>,
 }
 
 /// What the journal is to be told of fits. Told from any thread, and written with the next transaction: what a fit has written is in
@@ -44,7 +45,7 @@ pub struct FitLedger(Arc<Mutex<BTreeMap<String, FitRow>>>);
 
 impl FitLedger {
     /// How a fit is doing now.
-    pub(crate) fn tell(&self, row: FitRow) {
+    pub fn tell(&self, row: FitRow) {
         self.lock().insert(row.status.name.clone(), row);
     }
 
@@ -69,15 +70,15 @@ impl FitLedger {
 
 /// What an earlier process of a run of many has left.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub(crate) struct WrittenFits {
+pub struct WrittenFits {
     /// Whether every fit was written.
-    pub(crate) is_finished: bool,
+    pub is_finished: bool,
     /// The files of each fit that was written, with the BLAKE3 of their bytes.
-    pub(crate) outputs: BTreeMap<String, Vec<(String, String)>>,
+    pub outputs: BTreeMap<String, Vec<(String, String)>>,
 }
 
 /// What the run of a journal has written, after a check that it is one of these inputs and settings.
-pub(crate) fn written(path: &Path, identity: &RunIdentity) -> Result<WrittenFits, JournalError> {
+pub fn written(path: &Path, identity: &RunIdentity) -> Result<WrittenFits, JournalError> {
     let connection = schema::open(path)?;
     past::check_identity(path, &connection, identity)?;
     let read = || -> rusqlite::Result<WrittenFits> {

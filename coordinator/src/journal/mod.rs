@@ -57,16 +57,16 @@ pub(crate) use self::batch::Batch;
 use self::deferred::Deferred;
 use self::disk::Disk;
 pub use self::error::JournalError;
-pub(crate) use self::finish::{Finished, finish, finished, settle};
+pub use self::finish::{Finished, finish, finished, settle};
 pub use self::fits::{FitLedger, FitStatus};
-pub(crate) use self::fits::{FitRow, written};
+pub use self::fits::{FitRow, written};
 pub use self::identity::{Difference, RunIdentity};
 pub use self::lock::{LOCK_FILE, LockError, RunLock};
 pub(crate) use self::past::Past;
-pub(crate) use self::schema::remove;
+pub use self::schema::remove;
 use self::writer::{Command, Writer};
 use crate::core::Deaths;
-use crate::recall::{Memory, Recall};
+use crate::core::recall::{Memory, Recall};
 
 /// The journal's file in a folder of results.
 pub const JOURNAL_FILE: &str = "run.sqlite";

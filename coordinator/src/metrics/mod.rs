@@ -8,10 +8,10 @@ mod histogram;
 mod http;
 mod text;
 
-use crate::{cli::Exit, comm::RunEvent, runner::Pulse, settings::MetricsAddress};
-use anyhow::Context;
+use crate::{comm::RunEvent, runner::Pulse};
 use book::Book;
 use std::{
+    io,
     net::{SocketAddr, TcpListener},
     sync::{Arc, Mutex, PoisonError},
     time::{Duration, Instant},
@@ -19,7 +19,7 @@ use std::{
 
 /// The metrics of a run, and where they are served. Clones are the same metrics.
 #[derive(Debug, Clone)]
-pub(crate) struct Metrics {
+pub struct Metrics {
     book: Arc<Mutex<Book>>,
     listener: Arc<TcpListener>,
     address: SocketAddr,
@@ -34,39 +34,34 @@ impl Metrics {
     ///
     /// # Errors
     /// If it cannot be listened on.
-    pub(crate) fn listen(address: MetricsAddress) -> anyhow::Result<Self> {
-        let bind = || {
-            let listener = TcpListener::bind(address.0)?;
-            listener.set_nonblocking(true)?;
-            Ok::<_, std::io::Error>((listener.local_addr()?, listener))
-        };
-        let cannot = || format!("cannot serve metrics on {address}; is the address this machine's, and the port free?");
-        let (address, listener) = bind().with_context(cannot).context(Exit::BadInput)?;
+    pub fn listen(address: SocketAddr) -> io::Result<Self> {
+        let listener = TcpListener::bind(address)?;
+        listener.set_nonblocking(true)?;
         Ok(Self {
             book: Arc::new(Mutex::new(Book::new(Instant::now()))),
+            address: listener.local_addr()?,
             listener: Arc::new(listener),
-            address,
             pulse: Arc::default(),
         })
     }
 
     /// What to type into a browser.
-    pub(crate) fn url(&self) -> String {
+    pub fn url(&self) -> String {
         format!("http://{}/metrics", self.address)
     }
 
     /// Takes note of what happened.
-    pub(crate) fn note(&self, event: &RunEvent) {
+    pub fn note(&self, event: &RunEvent) {
         self.with_book(|book| book.note(event, Instant::now()));
     }
 
     /// What the loop of the run has to show its rounds to.
-    pub(crate) fn pulse(&self) -> Arc<Pulse> {
+    pub fn pulse(&self) -> Arc<Pulse> {
         Arc::clone(&self.pulse)
     }
 
     /// How many fits there are in each state.
-    pub(crate) fn set_fits(&self, fits: &[(&'static str, usize)]) {
+    pub fn set_fits(&self, fits: &[(&'static str, usize)]) {
         self.with_book(|book| book.set_fits(fits));
     }
 
@@ -74,9 +69,8 @@ impl Metrics {
     ///
     /// # Errors
     /// If the runtime refuses the socket.
-    pub(crate) fn serve(&self) -> anyhow::Result<impl Future<Output = ()> + Send + use<>> {
-        let listener = self.listener.try_clone().and_then(tokio::net::TcpListener::from_std);
-        let listener = listener.context("cannot serve metrics")?;
+    pub fn serve(&self) -> io::Result<impl Future<Output = ()> + Send + use<>> {
+        let listener = self.listener.try_clone().and_then(tokio::net::TcpListener::from_std)?;
         Ok(http::serve(listener, self.clone()))
     }
 

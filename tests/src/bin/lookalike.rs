@@ -3,5 +3,5 @@
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    lookalike_coordinator::main()
+    lookalike_app::main()
 }

@@ -3,12 +3,14 @@
 
 use super::scene::{fit, fit_json, folder, without_timing};
 use lookalike::{
-    fit::{FitOutcome, FitPlanner, Method, nodes},
+    fit::Method,
     graph::{Execution, run_in_process},
     math::simd::{self, Level},
+    nodes,
+    plan::{FitOutcome, FitPlanner},
     render::subset::SampleCount,
 };
-use lookalike_coordinator::{
+use lookalike_app::{
     inputs::{CaptureFiles, load_capture, resolve_display_exposure},
     settings::{CameraSpec, DisplayExposure, EnvironmentSettings, ViewSettings},
 };

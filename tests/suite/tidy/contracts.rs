@@ -23,7 +23,7 @@ fn differences<'a>(there: &BTreeSet<&'a str>, here: &BTreeSet<&'a str>, page: &s
 
 #[test]
 fn events_of_the_stream_are_those_of_their_page() {
-    let (page, code) = ("docs/progress.md", "coordinator/src/progress/json.rs");
+    let (page, code) = ("docs/progress.md", "app/src/progress/json.rs");
     let (text, program) = (document(page), source(code));
     let table = text.lines().skip_while(|line| !line.starts_with("| event |")).skip(2);
     let rows = table.take_while(|line| line.starts_with('|'));

@@ -24,8 +24,19 @@ const DOCUMENTS: [&str; 16] = [
     "docs/security.md",
     "docs/study.md",
 ];
-const FOLDERS: [&str; 9] =
-    ["common/", "coordinator/", "deploy/", "docs/", "fuzz/", "tests/", "worker/", ".ci/", "experiments/"];
+const FOLDERS: [&str; 11] = [
+    "app/",
+    "common/",
+    "coordinator/",
+    "deploy/",
+    "docs/",
+    "fuzz/",
+    "report/",
+    "tests/",
+    "worker/",
+    ".ci/",
+    "experiments/",
+];
 
 /// A document without its HTML comments.
 pub(super) fn document(name: &str) -> String {

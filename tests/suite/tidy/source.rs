@@ -41,7 +41,7 @@ pub(super) fn root() -> PathBuf {
 pub(super) fn sources() -> Vec<Source> {
     let root = root();
     let mut paths = Vec::new();
-    for member in ["common", "coordinator", "fuzz", "tests", "worker"] {
+    for member in ["app", "common", "coordinator", "fuzz", "report", "tests", "worker"] {
         collect(&root, member, &mut paths);
     }
     assert!(paths.len() > 100, "found only {} files of Rust below {}", paths.len(), root.display());

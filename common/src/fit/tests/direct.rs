@@ -2,13 +2,11 @@
 
 use super::scene::{StageOne, capture, method, room};
 use crate::{
-    fit::{
-        DirectPixels, FitError, FitPlanner, Integration, Method, MethodError, Objective, SearchKind,
-        tests::scene::Bench,
-    },
+    fit::{DirectPixels, Integration, Method, MethodError, Objective, SearchKind, tests::scene::Bench},
     graph::{Blob, NodeSpec, PlanError},
     light::LightDistribution,
     metric::cost::Compression,
+    plan::{FitError, FitPlanner},
 };
 use std::{cell::RefCell, sync::Arc};
 

@@ -2,11 +2,10 @@
 
 use super::scene::{Bench, capture_of, method};
 use crate::{
-    fit::{
-        FitOutcome, FitPlanner, Method,
-        wire::{PolishedWire, read, write},
-    },
+    fit::Method,
     graph::{Blob, NodeSpec},
+    nodes::wire::{PolishedWire, read, write},
+    plan::{FitOutcome, FitPlanner},
     scene::Circle,
 };
 use std::cell::RefCell;

@@ -2,9 +2,7 @@
 
 mod direct;
 mod explore;
-mod planner;
 mod polish;
 mod recovery;
-mod scene;
-mod survey;
+pub(crate) mod scene;
 mod uncertainty;

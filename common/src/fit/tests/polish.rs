@@ -2,12 +2,11 @@
 
 use super::scene::{Bench, capture, method};
 use crate::{
-    fit::{
-        FitPlanner, FullView, JudgedBy, MAX_EVALUATIONS, polish,
-        wire::{PolishedWire, read, write},
-    },
+    fit::{FullView, JudgedBy, MAX_EVALUATIONS, polish},
     graph::{Blob, NodeSpec},
     metric::{Judge, JudgeOptions},
+    nodes::wire::{PolishedWire, read, write},
+    plan::FitPlanner,
     render::{
         knots::Knots,
         pyramid::LightPyramid,

@@ -2,7 +2,7 @@
 
 use crate::{
     brdf::{Model, model},
-    fit::{FitPlanner, FullView, Method, nodes},
+    fit::{FullView, Method},
     graph::{
         Blob, BlobHash, Change, DecodedCache, FailureReason, Graph, GraphEdit, NodeId, NodeSpec, PlanError, Planner,
         RunContext,
@@ -10,6 +10,8 @@ use crate::{
     image::Image,
     light::Environment,
     math::to_f32,
+    nodes,
+    plan::FitPlanner,
     render::{
         knots::{Knots, PER_OCTAVE},
         pyramid::LightPyramid,
@@ -24,7 +26,7 @@ use std::{collections::BTreeMap, sync::Arc};
 const SIZE: usize = 24;
 
 /// Dim walls with two windows, 16 x 8 texels.
-pub(super) fn room() -> Environment {
+pub(crate) fn room() -> Environment {
     let texel = |k: usize| match (k / 16, k % 16) {
         (2..=3, 2..=3) => [4.0, 5.0, 7.0],
         (3, 12) => [12.0, 10.0, 8.0],
@@ -34,7 +36,7 @@ pub(super) fn room() -> Environment {
 }
 
 /// A photo of a material in the room: its rendering, each pixel multiplied by 1 + `noise` times a number in \[-1, 1\].
-pub(super) fn capture(name: &str, parameters: &[f64], noise: f64) -> Arc<Capture> {
+pub(crate) fn capture(name: &str, parameters: &[f64], noise: f64) -> Arc<Capture> {
     capture_of(name, parameters, noise, (SIZE, SIZE), Circle::inscribed(SIZE, SIZE))
 }
 
@@ -97,13 +99,13 @@ impl StageOne {
 }
 
 /// Three gammas, 48 pixels.
-pub(super) fn method(name: &str) -> Method {
+pub(crate) fn method(name: &str) -> Method {
     let gammas = vec![1.0, 2.0, 3.0];
     Method { model: model(name).unwrap(), gammas, samples: SampleCount::Draws(48), ..Method::default() }
 }
 
 /// Runs graphs one node at a time. Outputs are remembered: a node is a pure function, so a second run costs nothing.
-pub(super) struct Bench {
+pub(crate) struct Bench {
     known: BTreeMap<(String, Vec<u8>, Vec<BlobHash>), Blob>,
     context: RunContext,
 }
@@ -117,7 +119,7 @@ impl Default for Bench {
 impl Bench {
     /// Runs a planner to its end. `pick` chooses among so many ready nodes; `change` may alter an output before the planner
     /// sees it.
-    pub(super) fn run(
+    pub(crate) fn run(
         &mut self,
         mut planner: FitPlanner,
         mut pick: impl FnMut(usize) -> usize,

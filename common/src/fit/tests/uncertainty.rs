@@ -1,7 +1,10 @@
 //! What the photo does not determine is said.
 
 use super::scene::{Bench, capture, method};
-use crate::fit::{FitOutcome, FitPlanner, Method, Uncertainty};
+use crate::{
+    fit::{Method, Uncertainty},
+    plan::{FitOutcome, FitPlanner},
+};
 
 fn outcome(name: &str, material: &[f64], noise: f64) -> FitOutcome {
     let method = Method { polish: false, ..method(name) };

@@ -1,0 +1,383 @@
+//! How every fit of a batch is doing. Whoever knows something tells the board, from any thread; the board tells the display, the
+//! metrics and the summaries.
+
+use super::{
+    results::Scores,
+    summary::{self, Summary},
+};
+use crate::{
+    exit::Exit,
+    outputs::{OutFolder, Timing},
+    progress::{Display, Ending, FitCount, FitEvent},
+    run::Clock,
+    settings::BatchFit,
+};
+use lookalike::{
+    brdf::{self, Model},
+    fit::BestScore,
+    graph::split_label,
+};
+use lookalike_coordinator::{
+    comm::RunEvent,
+    journal::{FitLedger, FitRow, FitStatus},
+    metrics::Metrics,
+};
+use std::{
+    collections::BTreeMap,
+    sync::{Arc, Mutex, MutexGuard, PoisonError},
+    time::Instant,
+};
+use tracing::warn;
+
+/// A fit, as the summaries show it.
+#[derive(Debug, Clone)]
+pub(super) struct Row {
+    pub(super) name: String,
+    pub(super) photo: String,
+    pub(super) env: String,
+    pub(super) model: &'static dyn Model,
+    pub(super) state: State,
+    /// From its start to its end, so far as it has one.
+    pub(super) seconds: Option<f64>,
+}
+
+/// How far a fit is.
+#[derive(Debug, Clone)]
+pub(super) enum State {
+    /// Its turn has not come.
+    Waiting,
+    /// Its nodes run, or its results are being written.
+    Running,
+    /// Its results are there.
+    Done(Scores),
+    /// It has no results and gets none.
+    Failed(String),
+    /// The run ended before it did.
+    Stopped,
+}
+
+impl State {
+    /// In one word, as the summaries and the metrics have it.
+    pub(super) fn name(&self) -> &'static str {
+        match self {
+            Self::Waiting => "waiting",
+            Self::Running => "running",
+            Self::Done(scores) if scores.is_missed => "missed",
+            Self::Done(_) => "done",
+            Self::Failed(_) => "failed",
+            Self::Stopped => "stopped",
+        }
+    }
+}
+
+impl Row {
+    /// As the journal has it.
+    fn for_the_journal(&self, number: u32) -> FitRow {
+        let (scores, error) = match &self.state {
+            State::Done(scores) => (Some(scores), None),
+            State::Failed(error) => (None, Some(error.clone())),
+            State::Waiting | State::Running | State::Stopped => (None, None),
+        };
+        let status = FitStatus {
+            name: self.name.clone(),
+            state: self.state.name().to_owned(),
+            cssim: scores.map(|scores| scores.cssim),
+            seconds: self.seconds,
+            error,
+        };
+        FitRow { number, status, outputs: scores.map(|scores| scores.files.clone()).unwrap_or_default() }
+    }
+}
+
+/// All words that [`State::name`] can say.
+const STATES: [&str; 6] = ["waiting", "running", "done", "missed", "failed", "stopped"];
+
+/// How every fit is doing.
+pub(super) struct Board {
+    inner: Mutex<Inner>,
+    out: OutFolder,
+    /// Held while the summaries are written, so that an older one never replaces a newer one.
+    writing: Mutex<()>,
+}
+
+/// Who is told how fits are doing.
+pub(super) struct Watchers {
+    pub(super) display: Box<dyn Display>,
+    pub(super) metrics: Option<Metrics>,
+    /// The journal.
+    pub(super) ledger: FitLedger,
+}
+
+struct Inner {
+    rows: Vec<Row>,
+    numbers: BTreeMap<String, u32>,
+    /// Of fits under way.
+    clocks: BTreeMap<u32, FitClock>,
+    watchers: Watchers,
+    workers_joined: usize,
+    /// How the run is doing: `running`, `finished` or `stopped`.
+    state: &'static str,
+    /// Whether a failed fit has ended the run.
+    is_stopped: bool,
+    began: Instant,
+}
+
+/// What a fit has cost so far.
+#[derive(Debug)]
+struct FitClock {
+    clock: Clock,
+    input_seconds: f64,
+    attempts: u64,
+    requeued: u64,
+}
+
+impl Board {
+    /// A board of fits that wait, or are complete, which their results say with their seconds; with their first summaries.
+    pub(super) fn new(
+        fits: &[BatchFit],
+        complete: Vec<Option<(Scores, f64)>>,
+        watchers: Watchers,
+        out: OutFolder,
+    ) -> anyhow::Result<Self> {
+        let row = |(fit, complete): (&BatchFit, Option<(Scores, f64)>)| {
+            let (scores, seconds) = complete.unzip();
+            Ok::<_, brdf::ParameterError>(Row {
+                name: fit.name.clone(),
+                photo: fit.photo.to_string_lossy().into_owned(),
+                env: fit.environment.path.to_string_lossy().into_owned(),
+                model: brdf::model(fit.method.model.as_str())?,
+                state: scores.map_or(State::Waiting, State::Done),
+                seconds,
+            })
+        };
+        let inner = Inner {
+            rows: fits.iter().zip(complete).map(row).collect::<Result<_, _>>()?,
+            numbers: (0..).zip(fits).map(|(number, fit)| (fit.name.clone(), number)).collect(),
+            clocks: BTreeMap::new(),
+            watchers,
+            workers_joined: 0,
+            state: "running",
+            is_stopped: false,
+            began: Instant::now(),
+        };
+        (0..).zip(&inner.rows).for_each(|(number, row)| inner.watchers.ledger.tell(row.for_the_journal(number)));
+        inner.show_metrics();
+        let board = Self { inner: Mutex::new(inner), out, writing: Mutex::new(()) };
+        board.write_summaries()?;
+        Ok(board)
+    }
+
+    /// Takes note of what happened in the run.
+    pub(super) fn note(&self, event: &RunEvent) {
+        let mut inner = self.lock();
+        inner.workers_joined += usize::from(matches!(event, RunEvent::WorkerJoined { .. }));
+        if let Some(clock) = inner.clock_of(event) {
+            clock.clock.note(event);
+            clock.attempts += u64::from(matches!(event, RunEvent::NodeStarted { .. }));
+            clock.requeued += u64::from(matches!(event, RunEvent::NodeRequeued { .. }));
+        }
+        inner.watchers.display.event(event);
+    }
+
+    /// The inputs of a fit are there, which took so many seconds.
+    pub(super) fn started(&self, number: u32, best: Arc<BestScore>, input_seconds: f64) {
+        let mut inner = self.lock();
+        let clock = FitClock { clock: Clock::start(), input_seconds, attempts: 0, requeued: 0 };
+        inner.clocks.insert(number, clock);
+        inner.set(number, State::Running);
+        let name = inner.name(number);
+        inner.show(number, &FitEvent::Started { number, name, best });
+    }
+
+    /// The nodes of a fit have ended: what they cost.
+    pub(super) fn computed(&self, number: u32) -> Timing {
+        let mut inner = self.lock();
+        let workers = inner.workers_joined;
+        let Some(clock) = inner.clocks.get_mut(&number) else { return Timing::default() };
+        clock.clock.end();
+        let mut seconds = vec![("inputs", clock.input_seconds)];
+        seconds.extend(clock.clock.stages());
+        seconds.push(("total", clock.input_seconds + clock.clock.total()));
+        let (attempts, requeued) = (clock.attempts, clock.requeued);
+        Timing { seconds, workers, attempts, requeued, ..Timing::default() }
+    }
+
+    /// The results of a fit are written.
+    pub(super) fn finished(self: &Arc<Self>, number: u32, scores: Scores) {
+        let mut inner = self.lock();
+        let Scores { cssim, cssim_object, is_missed, .. } = scores;
+        inner.set(number, State::Done(scores));
+        let name = inner.name(number);
+        let seconds = inner.end(number);
+        let event = FitEvent::Finished { number, name, cssim, cssim_object, is_missed, seconds };
+        inner.show(number, &event);
+        drop(inner);
+        self.write_summaries_soon();
+    }
+
+    /// A fit has failed.
+    pub(super) fn failed(self: &Arc<Self>, number: u32, error: &str) {
+        let mut inner = self.lock();
+        inner.set(number, State::Failed(error.to_owned()));
+        let name = inner.name(number);
+        inner.end(number);
+        inner.show(number, &FitEvent::Failed { number, name, error: error.to_owned() });
+        drop(inner);
+        self.write_summaries_soon();
+    }
+
+    /// Whether a fit has failed; if so, the run is taken to end for it.
+    pub(super) fn stop_if_failed(&self) -> bool {
+        let mut inner = self.lock();
+        inner.is_stopped |= inner.count().failed > 0;
+        inner.is_stopped
+    }
+
+    /// Whether the run was ended because a fit had failed.
+    pub(super) fn was_stopped_by_a_fit(&self) -> bool {
+        self.lock().is_stopped
+    }
+
+    /// What is wrong when all has come to its end: fits without results.
+    pub(super) fn problem(&self) -> Option<String> {
+        let FitCount { total, done, .. } = self.lock().count();
+        match (total, total - done) {
+            (_, 0) => None,
+            (1, _) => Some("the fit failed".to_owned()),
+            (_, failed) => Some(format!("{failed} of {total} fits failed")),
+        }
+    }
+
+    /// No fit will change any more: the last summaries.
+    ///
+    /// # Errors
+    /// If they cannot be written.
+    pub(super) fn close(&self) -> anyhow::Result<()> {
+        let mut inner = self.lock();
+        for row in &mut inner.rows {
+            if matches!(row.state, State::Waiting | State::Running) {
+                row.state = State::Stopped;
+            }
+        }
+        inner.show_metrics();
+        let is_whole = inner.rows.iter().all(|row| !matches!(row.state, State::Stopped));
+        inner.state = if is_whole { "finished" } else { "stopped" };
+        drop(inner);
+        self.write_summaries()
+    }
+
+    /// All is written, and the run is over.
+    pub(super) fn end(&self, ending: Ending<'_>) {
+        self.lock().watchers.display.finish(ending);
+    }
+
+    /// The summaries for people.
+    pub(super) fn table(&self) -> String {
+        self.summary().table()
+    }
+
+    /// The exit code that the fits ask for.
+    pub(super) fn exit(&self) -> Exit {
+        super::exit(&self.lock().count())
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Inner> {
+        // Every change is whole before anything that could panic.
+        self.inner.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn summary(&self) -> Summary {
+        let inner = self.lock();
+        let (rows, count, state) = (inner.rows.clone(), inner.count(), inner.state);
+        Summary { rows, count, state, seconds: inner.began.elapsed().as_secs_f64() }
+    }
+
+    /// Writes the summaries without letting the caller wait for the disk.
+    fn write_summaries_soon(self: &Arc<Self>) {
+        let board = Arc::clone(self);
+        rayon::spawn(move || {
+            if let Err(error) = board.write_summaries() {
+                warn!("{error:#}");
+            }
+        });
+    }
+
+    /// Writes the summaries as of now: one that comes late, after the end of the run, repeats the last ones.
+    fn write_summaries(&self) -> anyhow::Result<()> {
+        let _writing = self.writing.lock().unwrap_or_else(PoisonError::into_inner);
+        summary::write(&self.summary(), &self.out)
+    }
+}
+
+impl Inner {
+    fn name(&self, number: u32) -> String {
+        self.rows.get(number as usize).map(|row| row.name.clone()).unwrap_or_default()
+    }
+
+    fn set(&mut self, number: u32, state: State) {
+        if let Some(row) = self.rows.get_mut(number as usize) {
+            row.state = state;
+        }
+    }
+
+    /// Stops the clock of a fit: its seconds.
+    fn end(&mut self, number: u32) -> f64 {
+        let clock = self.clocks.remove(&number);
+        let seconds = clock.map(|clock| clock.input_seconds + clock.clock.total());
+        if let Some(row) = self.rows.get_mut(number as usize) {
+            row.seconds = seconds;
+        }
+        seconds.unwrap_or(0.0)
+    }
+
+    /// The clock of the fit that an event of a node is about.
+    fn clock_of(&mut self, event: &RunEvent) -> Option<&mut FitClock> {
+        let name = match event {
+            RunEvent::NodeStarted { name, .. }
+            | RunEvent::NodeFinished { name, .. }
+            | RunEvent::NodeRequeued { name, .. } => name,
+            _ => return None,
+        };
+        let number = self.numbers.get(split_label(&name.label).0?)?;
+        self.clocks.get_mut(number)
+    }
+
+    fn count(&self) -> FitCount {
+        let mut count = FitCount { total: self.rows.len(), ..FitCount::default() };
+        for row in &self.rows {
+            match &row.state {
+                State::Running => count.running += 1,
+                State::Done(scores) => {
+                    count.done += 1;
+                    count.missed += usize::from(scores.is_missed);
+                }
+                State::Failed(_) => count.failed += 1,
+                State::Waiting | State::Stopped => {}
+            }
+        }
+        count
+    }
+
+    /// Tells everybody of a change of a fit.
+    fn show(&mut self, number: u32, event: &FitEvent) {
+        if let Some(row) = self.rows.get(number as usize) {
+            self.watchers.ledger.tell(row.for_the_journal(number));
+        }
+        self.show_metrics();
+        let count = self.count();
+        self.watchers.display.fit(event, count);
+    }
+
+    fn show_metrics(&self) {
+        if let Some(metrics) = &self.watchers.metrics {
+            let of = |state: &str| self.rows.iter().filter(|row| row.state.name() == state).count();
+            metrics.set_fits(&STATES.map(|state| (state, of(state))));
+        }
+    }
+}
+
+impl std::fmt::Debug for Board {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Board").field("rows", &self.lock().rows.len()).finish_non_exhaustive()
+    }
+}

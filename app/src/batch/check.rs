@@ -1,0 +1,79 @@
+//! Before any work: the inputs of every fit are read, and everything that is wrong is told at once.
+
+use super::{lights::Lights, prepare::Prepared};
+use crate::{
+    problems::Problems,
+    settings::{BatchFit, BatchSettings},
+};
+use rayon::prelude::*;
+use serde_json::Value;
+
+/// What is known of a fit from its check.
+#[derive(Debug, Clone)]
+pub(super) struct Checked {
+    /// The `inputs` of its `fit.json`, with the hashes of their contents.
+    pub(super) inputs: Value,
+    /// Pixels of its photo.
+    pub(super) pixels: usize,
+    /// What may not change when the batch is gone on with, by name.
+    pub(super) identity: Vec<(&'static str, String)>,
+}
+
+/// All fits, as they were found, and what the user should know.
+#[derive(Debug)]
+pub(super) struct AllChecked {
+    pub(super) fits: Vec<Checked>,
+    pub(super) warnings: Vec<String>,
+}
+
+/// Reads the inputs of every fit, a few at a time, and lets go of them.
+///
+/// # Errors
+/// Everything that is wrong, with the names of the fits that it concerns.
+pub(super) fn check(settings: &BatchSettings, lights: &Lights) -> anyhow::Result<AllChecked> {
+    let found: Vec<anyhow::Result<(Checked, Vec<String>)>> = settings
+        .fits
+        .par_iter()
+        .map(|fit| {
+            let prepared = Prepared::new(fit, lights, settings.stage_two)?;
+            let (pixels, identity) = (prepared.pixels(), prepared.identity(fit)?);
+            Ok((Checked { inputs: prepared.inputs, pixels, identity }, prepared.warnings))
+        })
+        .collect();
+    let (mut fits, mut warnings, mut problems) = (Vec::new(), Vec::new(), Vec::<(String, Vec<&BatchFit>)>::new());
+    for (fit, found) in settings.fits.iter().zip(found) {
+        match found {
+            Ok((checked, of_fit)) => {
+                fits.push(checked);
+                // Fits of one photo or one light have them in common.
+                for warning in of_fit {
+                    if !warnings.contains(&warning) {
+                        warnings.push(warning);
+                    }
+                }
+            }
+            Err(error) => {
+                let text = format!("{error:#}");
+                match problems.iter_mut().find(|(known, _)| *known == text) {
+                    Some((_, concerned)) => concerned.push(fit),
+                    None => problems.push((text, vec![fit])),
+                }
+            }
+        }
+    }
+    let manifest = settings.manifest.display().to_string();
+    let lines = problems.iter().map(|(text, fits)| line(&manifest, text, fits)).collect();
+    Problems::check(lines, &manifest)?;
+    Ok(AllChecked { fits, warnings })
+}
+
+/// A problem with the fits that have it: the first by name.
+fn line(manifest: &str, text: &str, fits: &[&BatchFit]) -> String {
+    let Some(first) = fits.first() else { return text.to_owned() };
+    let others = match fits.len() - 1 {
+        0 => String::new(),
+        1 => " and one other".to_owned(),
+        more => format!(" and {more} others"),
+    };
+    format!("{manifest}:{}: {}{others}: {text}", first.line, first.name)
+}

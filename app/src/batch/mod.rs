@@ -1,0 +1,177 @@
+//! Many fits as one run.
+//!
+//! ```text
+//!   manifest ──► fits ──► check: read the inputs of every fit, tell all that is wrong
+//!                           │
+//!                  loader (a thread): reads a fit's files again when its turn is near
+//!                           ▼
+//!                  supply ──► Many planners on one graph ──► runner
+//!                           │ a fit ends
+//!                  results (rayon): OUT/<name>/..., then the summaries
+//! ```
+//! The board knows how every fit is doing. Everybody tells it, and it tells the display, the metrics and the summaries.
+
+mod backlog;
+mod board;
+mod check;
+mod lights;
+mod loader;
+mod prepare;
+mod results;
+mod resume;
+mod summary;
+mod supply;
+mod window;
+
+use crate::{
+    exit::Exit,
+    inputs::show_warnings,
+    outputs::{FIT_FILES, OutFolder, print_result},
+    progress::{Ending, display_of_many},
+    run::{journal_failed, run_to_end, runner_options},
+    settings::{BatchFit, BatchSettings, OnFailure, ProgressKind},
+};
+use anyhow::Context;
+use board::{Board, Watchers};
+use lights::Lights;
+use lookalike::graph::Many;
+use lookalike_coordinator::journal::{self, Finished, FitLedger, JOURNAL_FILE, JournalOptions};
+use std::{process::ExitCode, sync::Arc};
+use supply::{Supply, SupplyOptions};
+use tokio::sync::Notify;
+use window::{Demand, Window};
+
+/// Runs a batch and writes its results.
+pub(crate) fn run(settings: BatchSettings) -> anyhow::Result<ExitCode> {
+    // Whatever can fail fails before any work is done.
+    resume::refuse_old(&settings)?;
+    let out = OutFolder::create(&settings.out, settings.resume)?;
+    let metrics = settings.metrics.map(|address| address.listen()).transpose()?;
+    let lights = Arc::new(Lights::default());
+    let checked = check::check(&settings, &lights)?;
+    let out_name = settings.out.display().to_string();
+    let identity = resume::identity(&settings.fits, &checked.fits);
+    let resume::Earlier { is_finished, complete, remark } =
+        resume::earlier(&out, &out_name, &identity, &settings.fits)?;
+    let open: Vec<u32> =
+        (0..).zip(&complete).filter(|(_, complete)| complete.is_none()).map(|(number, _)| number).collect();
+    let fits: Arc<[_]> = settings.fits.into();
+    let mut display = display_of_many(settings.progress, fits.len());
+    match settings.progress {
+        ProgressKind::Json => checked.warnings.iter().for_each(|text| display.say(&format!("warning: {text}"))),
+        _ => show_warnings(&checked.warnings),
+    }
+    remark.iter().for_each(|text| display.say(text));
+    metrics.iter().for_each(|metrics| display.say(&format!("metrics at {}", metrics.url())));
+    let ledger = FitLedger::default();
+    let watchers = Watchers { display, metrics: metrics.clone(), ledger: ledger.clone() };
+    let board = Arc::new(Board::new(&fits, complete, watchers, out.clone()).context(Exit::ClusterFailed)?);
+    if is_finished {
+        return end(&board, Ok(()));
+    }
+    let workers = settings.cluster.workers.count();
+    let demand = Arc::new(Demand::expecting(workers));
+    let wake = Arc::new(Notify::new());
+    let (supply, written) = Supply::new(SupplyOptions {
+        fits: Arc::clone(&fits),
+        open: open.into(),
+        checks: checked.fits.into(),
+        lights,
+        board: Arc::clone(&board),
+        window: Window::new(Arc::clone(&demand), settings.stage_two),
+        stage_two: settings.stage_two,
+        is_fail_fast: settings.on_failure == OnFailure::FailFast,
+        out: out.clone(),
+        out_name,
+        wake: Arc::clone(&wake),
+    })?;
+    let seed = fits.first().map_or(0, |fit| fit.method.seed);
+    let mut options = runner_options(&settings.cluster, &out, seed);
+    options.wake = Some(wake);
+    options.journal = Some(JournalOptions {
+        path: out.file(JOURNAL_FILE),
+        identity,
+        resume: settings.resume,
+        survivors: true,
+        best: None,
+        fits: ledger.clone(),
+    });
+    let run = run_to_end(options, Many::new(supply), metrics.as_ref(), |event| {
+        demand.note(event);
+        board.note(event);
+    });
+    // Also of a run that failed: what was computed is written.
+    let run = run.map(|(planner, summary)| (drop(planner), summary).1);
+    written.wait();
+    let closed = close(&out, &board, &ledger, run.is_ok(), &fits);
+    end(&board, first_error(run.map(|_| ()), closed))
+}
+
+/// Tells the journal what has come after it was closed: fits whose results were written last, and how all of it ended.
+fn close(out: &OutFolder, board: &Board, ledger: &FitLedger, is_whole: bool, fits: &[BatchFit]) -> anyhow::Result<()> {
+    let path = out.file(JOURNAL_FILE);
+    if !path.exists() {
+        // The run could not begin.
+        return Ok(());
+    }
+    let ended = board.problem().filter(|_| is_whole);
+    journal::settle(&path, ledger, ended.as_deref()).map_err(journal_failed)?;
+    if is_whole && ended.is_none() {
+        let finished = Finished { outputs: outputs(out, fits).context(Exit::ClusterFailed)? };
+        journal::finish(&path, &finished).map_err(journal_failed)?;
+    }
+    Ok(())
+}
+
+/// Tells all that is wrong with a batch, without running it.
+pub(crate) fn check(settings: &BatchSettings) -> anyhow::Result<()> {
+    resume::refuse_old(settings)?;
+    show_warnings(&check::check(settings, &Lights::default())?.warnings);
+    Ok(())
+}
+
+/// The files of all fits, each with its hash.
+fn outputs(out: &OutFolder, fits: &[BatchFit]) -> anyhow::Result<Vec<(String, String)>> {
+    let files = fits.iter().flat_map(|fit| FIT_FILES.map(|file| format!("{}/{file}", fit.name)));
+    let there = files.filter_map(|name| out.hash(&name).transpose().map(|hash| hash.map(|hash| (name, hash))));
+    there.collect()
+}
+
+/// Writes the last summaries and tells how it went.
+fn end(board: &Board, run: anyhow::Result<()>) -> anyhow::Result<ExitCode> {
+    // A disk that is full may have room later.
+    let written = board.close().context(Exit::ClusterFailed);
+    let stopped =
+        run.as_ref().err().filter(|_| board.was_stopped_by_a_fit()).map(|error| error.root_cause().to_string());
+    let outcome = first_error(if stopped.is_some() { Ok(()) } else { run }, written);
+    let failed = outcome.as_ref().err().map(|error| format!("{error:#}"));
+    board.end(match (&failed, &stopped) {
+        (Some(error), _) => Ending::Failed(error),
+        (None, Some(reason)) => Ending::Stopped(reason),
+        (None, None) => Ending::Finished,
+    });
+    let printed = print_result(&board.table()).context("cannot write to stdout");
+    first_error(outcome, printed).map(|()| board.exit().into())
+}
+
+/// What went wrong first is the one to tell; what followed from it is logged.
+fn first_error(first: anyhow::Result<()>, then: anyhow::Result<()>) -> anyhow::Result<()> {
+    match (first, then) {
+        (Err(first), Err(then)) => {
+            tracing::warn!("{then:#}");
+            Err(first)
+        }
+        (first, then) => first.and(then),
+    }
+}
+
+/// The exit code of a batch: a fit that failed outweighs one that missed its score.
+fn exit(count: &crate::progress::FitCount) -> Exit {
+    if count.failed > 0 {
+        Exit::SomeFitsFailed
+    } else if count.missed > 0 {
+        Exit::MissedMaxCssim
+    } else {
+        Exit::Done
+    }
+}

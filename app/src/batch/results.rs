@@ -1,0 +1,150 @@
+//! The results of fits that have ended: written beside the run, so that it never waits for a disk.
+
+use super::{backlog::Backlog, board::Board};
+use crate::{
+    fit::{final_parameters, final_score, final_scores, notes, write_results},
+    outputs::{FIT_FILES, FitRecord, OutFolder, Timing},
+    settings::MethodSettings,
+};
+use anyhow::Context;
+use lookalike::{fit::Method, plan::FitOutcome, scene::Capture};
+use serde_json::Value;
+use std::sync::{
+    Arc, Mutex, PoisonError,
+    mpsc::{Receiver, Sender, channel},
+};
+use tokio::sync::Notify;
+
+/// What a fit was made from.
+#[derive(Debug)]
+pub(super) struct Inputs {
+    pub(super) capture: Arc<Capture>,
+    pub(super) settings: MethodSettings,
+    pub(super) method: Method,
+    pub(super) exposure: f64,
+    /// The `inputs` of `fit.json`.
+    pub(super) inputs: Value,
+    pub(super) max_cssim: Option<f64>,
+}
+
+/// A fit that has ended, with all that its files need.
+#[derive(Debug)]
+pub(super) struct Fitted {
+    pub(super) number: u32,
+    pub(super) name: String,
+    pub(super) inputs: Inputs,
+    pub(super) outcome: FitOutcome,
+    pub(super) timing: Timing,
+}
+
+/// What the summaries say of a fit with results.
+#[derive(Debug, Clone)]
+pub(super) struct Scores {
+    pub(super) cssim: f64,
+    pub(super) cssim_object: f64,
+    /// Of the winner of stage two.
+    pub(super) gamma: f64,
+    /// The flat vector that the fit ends with.
+    pub(super) parameters: Vec<f64>,
+    pub(super) is_polished: bool,
+    /// Whether the score lies above the fit's `max-cssim`.
+    pub(super) is_missed: bool,
+    /// The files that were written, each with the BLAKE3 of its bytes.
+    pub(super) files: Vec<(String, String)>,
+}
+
+/// Writes results on the rayon pool.
+#[derive(Debug)]
+pub(super) struct Writers {
+    board: Arc<Board>,
+    out: OutFolder,
+    out_name: String,
+    /// Every result that is being written holds a clone.
+    open: Sender<()>,
+    /// Fits whose results were written since somebody asked.
+    safe: Arc<Mutex<Vec<u32>>>,
+    backlog: Backlog,
+    /// Told whenever a fit is written.
+    wake: Arc<Notify>,
+}
+
+/// Waits for the writers.
+#[derive(Debug)]
+pub(super) struct Written(Receiver<()>);
+
+impl Written {
+    /// Until everything is written. The [`Writers`] have to be dropped before.
+    pub(super) fn wait(self) {
+        while self.0.recv().is_ok() {}
+    }
+}
+
+impl Writers {
+    pub(super) fn new(board: Arc<Board>, out: OutFolder, out_name: String, wake: Arc<Notify>) -> (Self, Written) {
+        let (open, written) = channel();
+        let (safe, backlog) = (Arc::default(), Backlog::default());
+        (Self { board, out, out_name, open, safe, backlog, wake }, Written(written))
+    }
+
+    /// The fits that are being written.
+    pub(super) fn backlog(&self) -> &Backlog {
+        &self.backlog
+    }
+
+    /// The fits whose results were written since the last call.
+    pub(super) fn newly_safe(&self) -> Vec<u32> {
+        std::mem::take(&mut self.safe.lock().unwrap_or_else(PoisonError::into_inner))
+    }
+
+    /// Begins to write the results of a fit.
+    pub(super) fn write(&self, fitted: Fitted) {
+        let (board, out, open) = (Arc::clone(&self.board), self.out.clone(), self.open.clone());
+        let (safe, wake) = (Arc::clone(&self.safe), Arc::clone(&self.wake));
+        let entry = self.backlog.add(fitted.inputs.capture.photo().width() * fitted.inputs.capture.photo().height());
+        let out_name = format!("{}/{}", self.out_name, fitted.name);
+        rayon::spawn(move || {
+            match write(&out, out_name, &fitted) {
+                Ok(scores) => {
+                    board.finished(fitted.number, scores);
+                    safe.lock().unwrap_or_else(PoisonError::into_inner).push(fitted.number);
+                }
+                Err(error) => board.failed(fitted.number, &format!("{error:#}")),
+            }
+            drop((fitted, entry));
+            wake.notify_one();
+            drop(open);
+        });
+    }
+}
+
+fn write(out: &OutFolder, out_name: String, fitted: &Fitted) -> anyhow::Result<Scores> {
+    let Fitted { inputs, outcome, timing, .. } = fitted;
+    let folder = out.sub(&fitted.name)?;
+    let notes = notes(&inputs.method, outcome);
+    let record = FitRecord {
+        settings: &inputs.settings,
+        method: &inputs.method,
+        capture: &inputs.capture,
+        inputs: &inputs.inputs,
+        outcome,
+        display_exposure: inputs.exposure,
+        notes: &notes,
+    };
+    write_results(&folder, &record, &Timing { out: out_name, ..timing.clone() })?;
+    let (cssim, cssim_object) = final_scores(outcome);
+    let best = final_score(&inputs.method, outcome);
+    let files = FIT_FILES.iter().map(|name| {
+        let hash = folder.hash(name)?.with_context(|| format!("{} is gone already", folder.file(name).display()))?;
+        Ok(((*name).to_owned(), hash))
+    });
+    let files = files.collect::<anyhow::Result<_>>()?;
+    Ok(Scores {
+        cssim,
+        cssim_object,
+        gamma: outcome.judged[outcome.winner].candidate.gamma,
+        parameters: final_parameters(outcome).to_vec(),
+        is_polished: outcome.polished.is_some(),
+        is_missed: inputs.max_cssim.is_some_and(|limit| best > limit),
+        files,
+    })
+}

@@ -1,0 +1,161 @@
+//! What an earlier run of a batch has left: the same batch or another one, and which fits are complete.
+
+use super::{check::Checked, results::Scores};
+use crate::{
+    fit::version,
+    outputs::{MARK, OutFolder},
+    problems::Problems,
+    run::{journal_failed, missing},
+    settings::{BatchFit, BatchSettings, Judge},
+};
+use anyhow::bail;
+use lookalike::brdf::{self, Channels, Model};
+use lookalike_coordinator::journal::{self, JOURNAL_FILE, RunIdentity};
+use serde_json::Value;
+use std::{fs, path::Path};
+
+/// Refuses a folder that holds a batch which is not to be gone on with, or fits that a new one would write over.
+pub(super) fn refuse_old(settings: &BatchSettings) -> anyhow::Result<()> {
+    let out = &settings.out;
+    let old = out.join(super::summary::JSON);
+    if !settings.resume && old.exists() {
+        bail!(
+            "{} says that a batch was run there already: go on with it with --resume, choose another --out, or remove that folder first",
+            old.display()
+        );
+    }
+    if out.join(JOURNAL_FILE).exists() {
+        return Ok(());
+    }
+    refuse_strangers(out, &settings.fits, |folder| folder.join(MARK).exists() || folder.join(JOURNAL_FILE).exists())
+}
+
+/// What the run of these fits is a run of. Their order does not matter.
+pub(super) fn identity(fits: &[BatchFit], checks: &[Checked]) -> RunIdentity {
+    fits.iter().zip(checks).fold(version(), |identity, (fit, checked)| {
+        let parts = checked.identity.iter();
+        parts.fold(identity, |identity, (name, value)| identity.with(format!("{}: {name}", fit.name), value.as_str()))
+    })
+}
+
+/// What an earlier run of a batch has left.
+#[derive(Debug)]
+pub(super) struct Earlier {
+    /// Whether there is nothing left to do.
+    pub(super) is_finished: bool,
+    /// The scores of each fit whose files are all there as it wrote them, with its seconds.
+    pub(super) complete: Vec<Option<(Scores, f64)>>,
+    /// What the user should know of it.
+    pub(super) remark: Option<String>,
+}
+
+/// What the run in a folder has left, if there is one and it is to be gone on with. Only what its journal says that it wrote is taken
+/// for its work.
+///
+/// # Errors
+/// If the run there is one of other inputs or settings, a result was changed, or folders of fits hold what this run did not write.
+pub(super) fn earlier(
+    out: &OutFolder,
+    out_name: &str,
+    run: &RunIdentity,
+    fits: &[BatchFit],
+) -> anyhow::Result<Earlier> {
+    let path = out.file(JOURNAL_FILE);
+    if !path.exists() {
+        return Ok(Earlier { is_finished: false, complete: vec![None; fits.len()], remark: None });
+    }
+    let written = journal::written(&path, run).map_err(journal_failed)?;
+    let (mut complete, mut gone) = (Vec::new(), Vec::new());
+    for fit in fits {
+        let Some(files) = written.outputs.get(&fit.name) else {
+            complete.push(None);
+            continue;
+        };
+        let paths: Vec<_> = files.iter().map(|(name, hash)| (format!("{}/{name}", fit.name), hash.clone())).collect();
+        let missing = missing(out, out_name, &paths)?;
+        complete.push(if missing.is_empty() { complete_fit(out, fit, files) } else { None });
+        gone.extend(missing);
+    }
+    let open: Vec<&BatchFit> =
+        fits.iter().zip(&complete).filter(|(_, complete)| complete.is_none()).map(|(fit, _)| fit).collect();
+    // Its own files may lie there without an entry: it was killed just then. A journal there is never its own.
+    let is_finished = written.is_finished && open.is_empty();
+    refuse_strangers(Path::new(out_name), open, |folder| folder.join(JOURNAL_FILE).exists())?;
+    let remark = if is_finished {
+        Some(format!("the run in {out_name} is finished, and its results are as it wrote them"))
+    } else {
+        (!gone.is_empty()).then(|| format!("of the run in {out_name}, {} is missing: fitting again", gone.join(", ")))
+    };
+    Ok(Earlier { is_finished, complete, remark })
+}
+
+/// Refuses all folders of fits that hold another run, which this one would write over.
+fn refuse_strangers<'a>(
+    out: &Path,
+    fits: impl IntoIterator<Item = &'a BatchFit>,
+    holds_another: impl Fn(&Path) -> bool,
+) -> anyhow::Result<()> {
+    let taken = fits.into_iter().map(|fit| out.join(&fit.name)).filter(|folder| holds_another(folder));
+    let lines = taken.map(|folder| {
+        format!(
+            "{} holds a fit that is not of this run: choose another --out, or move that folder elsewhere",
+            folder.display()
+        )
+    });
+    Problems::check(lines.collect(), &out.display().to_string())
+}
+
+/// The scores of a fit whose files are there, with its seconds.
+fn complete_fit(out: &OutFolder, fit: &BatchFit, files: &[(String, String)]) -> Option<(Scores, f64)> {
+    let json: Value = serde_json::from_slice(&fs::read(out.file(&fit.name).join(MARK)).ok()?).ok()?;
+    let (stage_two, polished) = (&json["stage_two"], &json["polished"]);
+    let last = if polished.is_null() { stage_two } else { polished };
+    let (cssim, cssim_object) = (last["cssim"].as_f64()?, last["cssim_object"].as_f64()?);
+    let judged = match fit.method.judge {
+        Judge::Image => cssim,
+        Judge::Object => cssim_object,
+    };
+    let model = brdf::model(fit.method.model.as_str()).ok()?;
+    let scores = Scores {
+        cssim,
+        cssim_object,
+        gamma: stage_two["gamma"].as_f64()?,
+        parameters: flat(model, &last["parameters"])?,
+        is_polished: !polished.is_null(),
+        is_missed: fit.max_cssim.is_some_and(|limit| judged > limit),
+        files: files.to_vec(),
+    };
+    Some((scores, json["timing"]["seconds"]["total"].as_f64()?))
+}
+
+/// The flat vector of parameters by name.
+fn flat(model: &dyn Model, parameters: &Value) -> Option<Vec<f64>> {
+    let mut flat = Vec::new();
+    for parameter in model.parameters() {
+        let value = &parameters[parameter.name];
+        match parameter.channels {
+            Channels::Scalar => flat.push(value.as_f64()?),
+            Channels::Rgb => {
+                let channels = value.as_array()?.iter().map(Value::as_f64).collect::<Option<Vec<_>>>()?;
+                flat.extend((channels.len() == 3).then_some(channels)?);
+            }
+        }
+    }
+    Some(flat)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::outputs::parameters_json;
+
+    #[test]
+    fn parameters_come_back_from_their_names() {
+        let model = brdf::model("cook-torrance").unwrap();
+        let vector: Vec<f64> = (1..=8).map(f64::from).collect();
+        let mut json = parameters_json(model, &vector);
+        assert_eq!(flat(model, &json), Some(vector));
+        json["m"] = Value::Null;
+        assert_eq!(flat(model, &json), None);
+    }
+}

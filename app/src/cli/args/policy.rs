@@ -1,0 +1,95 @@
+//! Flags of the coordinator: how long it waits, whom it takes for lost, and what it does about slow and dangerous nodes.
+
+use anyhow::bail;
+use clap::Args;
+use lookalike_coordinator::policy::{Policy, Speculation};
+use std::{str::FromStr, time::Duration};
+
+#[derive(Debug, Args)]
+pub(crate) struct PolicyArgs {
+    /// How long to wait for the first worker, such as 10min or 90s
+    #[arg(long, value_name = "T", default_value = "10min", value_parser = humantime::parse_duration)]
+    #[arg(help_heading = "Workers")]
+    wait_for_workers: Duration,
+    /// How long to wait for another worker after losing the last
+    #[arg(long, value_name = "T", default_value = "60s", value_parser = humantime::parse_duration)]
+    #[arg(help_heading = "Workers")]
+    grace: Duration,
+    /// How often a worker tells that it lives
+    #[arg(long, value_name = "T", default_value = "1s", value_parser = humantime::parse_duration)]
+    #[arg(help_heading = "Policy", hide_short_help = true)]
+    heartbeat: Duration,
+    /// A worker that was not heard of for this long is lost, and so is one that reads nothing for this long; at least two
+    /// heartbeats
+    #[arg(long, value_name = "T", default_value = "5s", value_parser = humantime::parse_duration)]
+    #[arg(help_heading = "Policy", hide_short_help = true)]
+    lost_after: Duration,
+    /// How many nodes a worker is given beyond its threads, so that it never waits for the next one
+    #[arg(long, value_name = "N", default_value_t = Policy::default().spare_leases)]
+    #[arg(help_heading = "Policy", hide_short_help = true)]
+    spare_leases: usize,
+    /// After so many deaths of workers that were executing a node, it runs alone on a fresh worker
+    #[arg(long, value_name = "N", default_value_t = Policy::default().suspect_after)]
+    #[arg(help_heading = "Policy", hide_short_help = true)]
+    suspect_after: u32,
+    /// A node that runs alone fails after so many deaths of its workers
+    #[arg(long, value_name = "N", default_value_t = Policy::default().node_crashes)]
+    #[arg(help_heading = "Policy", hide_short_help = true)]
+    node_crashes: u32,
+    /// Whether an idle worker runs a slow node too, and the first answer counts: on, off, or how many times the median of its kind a
+    /// slow node takes (on: 2)
+    #[arg(long, value_name = "on|off|FACTOR", default_value = "on")]
+    #[arg(help_heading = "Policy", hide_short_help = true)]
+    speculate: Speculate,
+    /// A node that has not run for this long is not slow
+    #[arg(long, value_name = "T", default_value = "5s", value_parser = humantime::parse_duration)]
+    #[arg(help_heading = "Policy", hide_short_help = true)]
+    speculate_after: Duration,
+    /// The share of transport nodes, from 0 to 1, that is run again on another worker, to compare the outputs bit for bit
+    #[arg(long, value_name = "F", default_value_t = 0.0, allow_negative_numbers = true)]
+    #[arg(help_heading = "Policy", hide_short_help = true)]
+    verify_fraction: f64,
+    /// How long a worker that is asked to end may take to finish what it executes, unless it was told otherwise
+    #[arg(long, value_name = "T", default_value = "30s", value_parser = humantime::parse_duration)]
+    #[arg(help_heading = "Policy", hide_short_help = true)]
+    drain_time: Duration,
+}
+
+/// How much slower than usual a slow node is; none: no node is slow.
+#[derive(Clone, Copy, Debug)]
+struct Speculate(Option<f64>);
+
+impl FromStr for Speculate {
+    type Err = anyhow::Error;
+
+    fn from_str(text: &str) -> anyhow::Result<Self> {
+        Ok(Self(match text {
+            "on" => Speculation::default().factor,
+            "off" => None,
+            factor => match factor.parse() {
+                Ok(factor) => Some(factor),
+                Err(_) => bail!("expected on, off, or a factor such as 3"),
+            },
+        }))
+    }
+}
+
+impl PolicyArgs {
+    pub(crate) fn into_policy(self) -> anyhow::Result<Policy> {
+        let policy = Policy {
+            heartbeat: self.heartbeat,
+            lost_after: self.lost_after,
+            spare_leases: self.spare_leases,
+            suspect_after: self.suspect_after,
+            node_crashes: self.node_crashes,
+            speculation: Speculation { factor: self.speculate.0, after: self.speculate_after },
+            verify_fraction: self.verify_fraction,
+            drain_time: self.drain_time,
+            wait_for_workers: self.wait_for_workers,
+            grace: self.grace,
+            ..Policy::default()
+        };
+        policy.check()?;
+        Ok(policy)
+    }
+}

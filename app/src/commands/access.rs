@@ -1,0 +1,16 @@
+//! `lookalike access new`: an access file before the runs it is for.
+
+use crate::settings::AccessSettings;
+use lookalike_coordinator::access::{Credentials, key_path};
+use std::{process::ExitCode, time::SystemTime};
+
+pub(crate) fn run(settings: AccessSettings) -> anyhow::Result<ExitCode> {
+    let AccessSettings { address, out } = settings;
+    Credentials::new(address.to_string(), SystemTime::now())?.create(&out)?;
+    eprintln!(
+        "wrote {}, which workers need, and {}, which only their coordinator may have",
+        out.display(),
+        key_path(&out).display()
+    );
+    Ok(ExitCode::SUCCESS)
+}

@@ -1,0 +1,36 @@
+//! `lookalike fit`: from a photo and its light to the parameters of a BRDF.
+
+use crate::{
+    fit::{self, FitJob},
+    inputs::{load_capture, resolve_display_exposure, show_warnings},
+    outputs::OutFolder,
+    settings::FitSettings,
+};
+use std::{process::ExitCode, sync::Arc, time::Instant};
+
+pub(crate) fn run(settings: FitSettings) -> anyhow::Result<ExitCode> {
+    let began = Instant::now();
+    // Whatever can fail fails before any work is done.
+    let out = OutFolder::create(&settings.out, settings.resume)?;
+    let loaded = load_capture(&(&settings).into())?;
+    show_warnings(&loaded.warnings);
+    let coverage = loaded.capture.scoring_coverage();
+    let exposure = resolve_display_exposure(&settings.display_exposure, loaded.capture.photo(), &coverage)?;
+    let job = FitJob {
+        inputs: loaded.to_json(),
+        capture: Arc::new(loaded.capture),
+        settings: settings.method,
+        exposure,
+        cluster: settings.cluster,
+        progress: settings.progress,
+        metrics: settings.metrics,
+        out,
+        out_name: settings.out.display().to_string(),
+        max_cssim: settings.max_cssim,
+        also_render: Vec::new(),
+        resume: settings.resume,
+        is_resumable: true,
+        input_seconds: began.elapsed().as_secs_f64(),
+    };
+    Ok(fit::run(job)?.map_or(ExitCode::SUCCESS, |finished| finished.code))
+}

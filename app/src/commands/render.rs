@@ -1,0 +1,134 @@
+//! `lookalike render`: a sphere, or a map of normals, of one material under one light, by the direct integrator.
+
+mod encode;
+
+use super::output::{check_writable, write_file};
+use crate::{
+    exit::Exit,
+    inputs::{
+        self, LoadedEnvironment, LoadedGeometry, LoadedTable, flat_parameters, load_environment, load_normals,
+        load_table, show_warnings, sphere_geometry,
+    },
+    settings::{self, RenderSettings},
+};
+use anyhow::Context;
+use encode::{Format, Subject};
+use indicatif::{ProgressBar, ProgressStyle};
+use lookalike::{
+    brdf::{self, Material, Reflectance, flat_names},
+    light::LightDistribution,
+    math::Rgb,
+    render::image::{Noise, Rendering, Shot},
+    scene::Circle,
+};
+use std::process::ExitCode;
+
+/// Renders a material.
+pub(crate) fn run(settings: RenderSettings) -> anyhow::Result<ExitCode> {
+    let format = Format::of(&settings.out)?;
+    let samples = u32::try_from(settings.samples.get())
+        .with_context(|| format!("--samples must be at most {}, found {}", u32::MAX, settings.samples))?;
+    check_writable(&settings.out)?;
+    let material = LoadedMaterial::load(&settings.material)?;
+    let shape = shape(&settings)?;
+    let light = load_environment(&settings.environment)?;
+    show_warnings(&[&light.warnings[..], &shape.warnings].concat());
+
+    let distribution = LightDistribution::new(light.environment.clone());
+    let shot = Shot {
+        geometry: &shape.geometry,
+        light: &distribution,
+        reflectance: material.reflectance.as_ref(),
+        samples,
+        seed: settings.seed,
+    };
+    let rendering = with_progress(&shot);
+    let subject = Subject { settings: &settings, material: &material, shape: &shape, light: &light };
+    let file = subject.encode(format, &rendering)?;
+    write_file(&settings.out, &file.bytes)?;
+    tell(&settings, &light, &rendering, file.exposure);
+    Ok(Exit::Done.into())
+}
+
+/// A material with what names it in metadata.
+#[derive(Debug)]
+struct LoadedMaterial {
+    reflectance: Box<dyn Reflectance>,
+    /// The model's name; `merl` for a measured one.
+    model: &'static str,
+    /// `name=value` pairs of a model.
+    parameters: Option<String>,
+    /// The file of a measured material, with its hash.
+    file: Option<inputs::InputFile>,
+}
+
+impl LoadedMaterial {
+    fn load(material: &settings::Material) -> anyhow::Result<Self> {
+        match material {
+            settings::Material::Measured(path) => {
+                let LoadedTable { table, source } = load_table(path)?;
+                Ok(Self { reflectance: Box::new(table), model: "merl", parameters: None, file: Some(source) })
+            }
+            settings::Material::Analytic { model, params } => {
+                let model = brdf::model(model.as_str())?;
+                let flat = flat_parameters(model, params).context("--params")?;
+                let pairs = flat_names(model.parameters()).into_iter().zip(&flat);
+                let parameters = pairs.map(|(name, value)| format!("{name}={value}")).collect::<Vec<_>>().join(",");
+                let reflectance = Box::new(Material::new(model, flat).context("--params")?);
+                Ok(Self { reflectance, model: model.name(), parameters: Some(parameters), file: None })
+            }
+        }
+    }
+}
+
+fn shape(settings: &RenderSettings) -> anyhow::Result<LoadedGeometry> {
+    match &settings.view.normals {
+        Some(path) => load_normals(path, settings.view.camera),
+        None => {
+            let size = settings.size_px.get();
+            if size > LARGEST_PX {
+                anyhow::bail!("--size must be at most {LARGEST_PX} pixels, found {size}");
+            }
+            let geometry = sphere_geometry(size, size, Circle::inscribed(size, size), &settings.view);
+            let geometry = geometry.context("cannot place the sphere in the image")?;
+            Ok(LoadedGeometry { geometry, normals: None, warnings: Vec::new() })
+        }
+    }
+}
+
+/// Renders under a bar of rows on stderr, which shows on terminals only.
+fn with_progress(shot: &Shot<'_>) -> Rendering {
+    let rows = ProgressBar::new(shot.geometry.height() as u64);
+    if let Ok(style) = ProgressStyle::with_template("rendering {wide_bar} {pos}/{len} rows, {eta} left") {
+        rows.set_style(style);
+    }
+    let rendering = shot.render(|| rows.inc(1));
+    rows.finish_and_clear();
+    rendering
+}
+
+/// What was made, for people.
+fn tell(settings: &RenderSettings, light: &LoadedEnvironment, rendering: &Rendering, exposure: Option<f64>) {
+    let Rgb { x: r, y: g, z: b } = rendering.mean_radiance;
+    eprintln!("light: {} ({})", light.source.path.display(), light.mapping);
+    eprintln!("mean radiance over the object: {r:.5} {g:.5} {b:.5} (linear Rec. 709)");
+    match rendering.noise {
+        Some(Noise { typical, rms }) => eprintln!(
+            "noise: {:.2} % of its luminance for a typical pixel, {:.2} % of the mean radiance by root mean square (standard \
+             errors, from two independent halves of {} samples)",
+            100.0 * typical,
+            100.0 * rms,
+            settings.samples
+        ),
+        None => eprintln!("noise: not estimated (needs two samples per pixel and some light)"),
+    }
+    if let Some(exposure) = exposure {
+        eprintln!(
+            "display exposure: {exposure} (auto: 97th percentile of the object's largest channel to 0.9), clipped, sRGB"
+        );
+    }
+    eprintln!("wrote {}", settings.out.display());
+}
+
+/// What the image writers and readers take.
+const LARGEST_PX: usize = 1 << 14;

@@ -1,0 +1,70 @@
+//! What a fit is a fit of: what may not change when its run is gone on with.
+
+use crate::{outputs::name_of, settings::MethodSettings};
+use anyhow::Context;
+use lookalike::scene::Capture;
+use lookalike_coordinator::journal::RunIdentity;
+use serde_json::Value;
+
+/// Everything that shapes the result of a fit.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct FitIdentity<'a> {
+    /// The `inputs` of `fit.json`.
+    pub(crate) inputs: &'a Value,
+    pub(crate) capture: &'a Capture,
+    pub(crate) settings: &'a MethodSettings,
+    /// Exposure before the metric.
+    pub(crate) exposure: f64,
+    /// Gammas whose candidates are rendered as well.
+    pub(crate) also_render: &'a [f64],
+}
+
+impl FitIdentity<'_> {
+    /// As the identity of a run of this fit alone.
+    pub(crate) fn of_run(&self) -> anyhow::Result<RunIdentity> {
+        Ok(self.parts()?.into_iter().fold(version(), |identity, (name, value)| identity.with(name, value)))
+    }
+
+    /// The inputs, by content, and the settings. Names are those of the command line.
+    pub(crate) fn parts(&self) -> anyhow::Result<Vec<(&'static str, String)>> {
+        let mut parts = Vec::new();
+        let inputs = [("photo", "the photo"), ("environment", "--env"), ("mask", "--mask"), ("normals", "--normals")];
+        for (role, name) in inputs {
+            if let Some(content) = self.inputs[role]["blake3"].as_str() {
+                // Enough to tell contents apart, and short enough to be read.
+                parts.push((name, content.get(..16).unwrap_or(content).to_owned()));
+            }
+        }
+        let environment = &self.inputs["environment"];
+        for (field, name) in [("mapping", "--env-mapping"), ("rotation_deg", "--env-rotation")] {
+            if let Some(value) = environment.get(field) {
+                parts.push((name, value.to_string().trim_matches('"').to_owned()));
+            }
+        }
+        let geometry = serde_json::to_string(&self.capture.geometry().spec()).context("the geometry")?;
+        let settings = self.settings;
+        parts.extend([
+            ("the place of the object (--sphere, --camera)", geometry),
+            ("--display-exposure", self.exposure.to_string()),
+            ("--model", settings.model.to_string()),
+            ("--gammas", settings.gammas.to_string()),
+            ("--samples", settings.samples.to_string()),
+            ("--sampling", name_of(&settings.sampling)),
+            ("--subsets", settings.subsets.to_string()),
+            ("--search", name_of(&settings.search)),
+            ("--integrator", settings.integrator.to_string()),
+            ("the start of the searches (--preset)", format!("{:?}", settings.start).to_lowercase()),
+            ("compression at zero (--preset)", format!("{:?}", settings.compress_at_zero).to_lowercase()),
+            ("--polish", if settings.polish { "on" } else { "off" }.to_owned()),
+            ("--judge", name_of(&settings.judge)),
+            ("--seed", settings.seed.to_string()),
+            ("the gammas that are shown", format!("{:?}", self.also_render)),
+        ]);
+        Ok(parts)
+    }
+}
+
+/// What every run is a run of: this version.
+pub(crate) fn version() -> RunIdentity {
+    RunIdentity::default().with("the version of lookalike", env!("CARGO_PKG_VERSION"))
+}

@@ -1,0 +1,162 @@
+//! One fit from a checked capture to a folder of results: plans the graph, runs it on workers, writes what came out.
+
+mod identity;
+mod method;
+mod notes;
+mod results;
+
+pub(crate) use identity::{FitIdentity, version};
+pub(crate) use method::method;
+pub(crate) use notes::notes;
+pub(crate) use results::{final_parameters, final_score, final_scores, judge, write_results};
+
+use crate::run::{Clock, cpu_seconds, is_finished, journal_failed, run_to_end, runner_options};
+use crate::{
+    exit::Exit,
+    outputs::{FitRecord, OutFolder, Pictures, Timing, print_summary},
+    progress::{Display, Ending, display},
+    settings::{ClusterSettings, MethodSettings, MetricsAddress, ProgressKind},
+};
+use anyhow::Context;
+use lookalike::{
+    fit::Method,
+    plan::{FitOutcome, FitPlanner},
+    scene::Capture,
+};
+use lookalike_coordinator::{
+    journal::{self, FitLedger, JOURNAL_FILE, JournalOptions},
+    metrics::Metrics,
+};
+use serde_json::Value;
+use std::{process::ExitCode, sync::Arc};
+
+/// A fit that is ready to run.
+#[derive(Debug)]
+pub(crate) struct FitJob {
+    pub(crate) capture: Arc<Capture>,
+    pub(crate) settings: MethodSettings,
+    /// Exposure before the metric.
+    pub(crate) exposure: f64,
+    /// The `inputs` of `fit.json`.
+    pub(crate) inputs: Value,
+    pub(crate) cluster: ClusterSettings,
+    pub(crate) progress: ProgressKind,
+    pub(crate) metrics: Option<MetricsAddress>,
+    pub(crate) out: OutFolder,
+    pub(crate) out_name: String,
+    /// A final score above this makes the exit code 1.
+    pub(crate) max_cssim: Option<f64>,
+    /// Gammas whose candidates are rendered as well.
+    pub(crate) also_render: Vec<f64>,
+    /// Go on with the run that is in the folder, if there is one.
+    pub(crate) resume: bool,
+    /// Whether somebody may want to go on with this run.
+    pub(crate) is_resumable: bool,
+    /// Seconds spent on loading or making the inputs.
+    pub(crate) input_seconds: f64,
+}
+
+/// What a finished fit leaves for pictures of its own.
+#[derive(Debug)]
+pub(crate) struct Finished {
+    pub(crate) outcome: FitOutcome,
+    pub(crate) pictures: Pictures,
+    pub(crate) code: ExitCode,
+}
+
+/// Runs a fit and writes its results; `None` if that was done before.
+pub(crate) fn run(job: FitJob) -> anyhow::Result<Option<Finished>> {
+    let method = method(&job.settings)?;
+    let planner = FitPlanner::new(Arc::clone(&job.capture), method.clone(), job.exposure)
+        .context("the photo cannot be fitted")?
+        .also_render(&job.also_render);
+    let metrics = job.metrics.map(MetricsAddress::listen).transpose()?;
+    let mut display = display(job.progress, planner.best());
+    let done = run_shown(&job, &method, planner, metrics.as_ref(), &mut *display);
+    let problem = done.as_ref().err().map(|error| format!("{error:#}"));
+    display.finish(problem.as_deref().map_or(Ending::Finished, Ending::Failed));
+    let Some(Done { outcome, pictures, timing, notes }) = done? else { return Ok(None) };
+    let record = record(&job, &method, &outcome, &notes);
+    print_summary(&record, &timing, &job.out_name).context("cannot write to stdout")?;
+    let best = final_score(&method, &outcome);
+    let missed = job.max_cssim.is_some_and(|limit| best > limit);
+    if let (true, Some(limit)) = (missed, job.max_cssim) {
+        eprintln!("the match has a score of {best:.4} (--judge {}), more than --max-cssim {limit}", judge(&method));
+    }
+    let code = if missed { Exit::MissedMaxCssim } else { Exit::Done };
+    Ok(Some(Finished { outcome, pictures, code: code.into() }))
+}
+
+/// A fit whose results are written.
+struct Done {
+    outcome: FitOutcome,
+    pictures: Pictures,
+    timing: Timing,
+    notes: Vec<String>,
+}
+
+/// The part of a fit that its display shows: up to its last file.
+fn run_shown(
+    job: &FitJob,
+    method: &Method,
+    planner: FitPlanner,
+    metrics: Option<&Metrics>,
+    display: &mut dyn Display,
+) -> anyhow::Result<Option<Done>> {
+    let identity = FitIdentity {
+        inputs: &job.inputs,
+        capture: &job.capture,
+        settings: &job.settings,
+        exposure: job.exposure,
+        also_render: &job.also_render,
+    };
+    let identity = identity.of_run()?;
+    if job.resume && is_finished(&job.out, &job.out_name, &identity, |text| display.say(text))? {
+        return Ok(None);
+    }
+    let mut clock = Clock::start();
+    let mut options = runner_options(&job.cluster, &job.out, job.settings.seed);
+    options.journal = Some(JournalOptions {
+        path: job.out.file(JOURNAL_FILE),
+        identity,
+        resume: job.resume,
+        survivors: job.is_resumable,
+        best: Some(planner.best()),
+        fits: FitLedger::default(),
+    });
+    let (planner, summary) = run_to_end(options, planner, metrics, |event| {
+        clock.note(event);
+        display.event(event);
+    })?;
+    let outcome = planner.into_outcome().context("the graph ended without a result: please report this")?;
+    let notes = notes(method, &outcome);
+    let mut seconds = vec![("inputs", job.input_seconds)];
+    seconds.extend(clock.stages());
+    seconds.push(("total", job.input_seconds + clock.total()));
+    let timing = Timing {
+        seconds,
+        cpu_seconds: cpu_seconds(),
+        workers: usize::try_from(summary.workers_joined).unwrap_or(usize::MAX),
+        out: job.out_name.clone(),
+        attempts: summary.attempts,
+        requeued: summary.requeued_nodes,
+    };
+    // A disk that is full may have room later, and then nothing is computed again.
+    let pictures = write_results(&job.out, &record(job, method, &outcome, &notes), &timing);
+    let pictures = pictures.context(Exit::ClusterFailed)?;
+    let finished = journal::Finished { outputs: job.out.results().context(Exit::ClusterFailed)? };
+    journal::finish(&job.out.file(JOURNAL_FILE), &finished).map_err(journal_failed)?;
+    Ok(Some(Done { outcome, pictures, timing, notes }))
+}
+
+fn record<'a>(job: &'a FitJob, method: &'a Method, outcome: &'a FitOutcome, notes: &'a [String]) -> FitRecord<'a> {
+    FitRecord {
+        settings: &job.settings,
+        method,
+        capture: &job.capture,
+        inputs: &job.inputs,
+        outcome,
+        display_exposure: job.exposure,
+        notes,
+    }
+}

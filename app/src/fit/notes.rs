@@ -1,0 +1,124 @@
+//! What a user should know about a result beyond its numbers.
+
+use lookalike::{
+    brdf::{Model, Role, flat_bounds, flat_names},
+    fit::{Method, Uncertainty, gamma_range},
+    plan::FitOutcome,
+};
+
+/// Notes on the winner: at an end of the gammas, parameters at their bounds, reflecting more than it receives.
+pub(crate) fn notes(method: &Method, outcome: &FitOutcome) -> Vec<String> {
+    let winner = &outcome.judged[outcome.winner].candidate;
+    let last = outcome.polished.as_ref().map_or(&winner.parameters, |p| &p.parameters);
+    let mut notes = Vec::new();
+    if let Some((low, high)) = gamma_range(&method.gammas).filter(|(low, high)| low < high) {
+        if winner.gamma == high {
+            notes.push(format!(
+                "the winning gamma {high} is the largest that was tried: a wider range may match better, \
+                 such as --gammas {low}:{}:0.1",
+                2.0 * high
+            ));
+        } else if winner.gamma == low && low > 0.2 {
+            notes.push(format!(
+                "the winning gamma {low} is the smallest that was tried: a wider range may match better, \
+                 such as --gammas {}:{high}:0.1",
+                low / 2.0
+            ));
+        }
+    }
+    let is_determined = |i: usize| outcome.uncertainty.get(i) != Some(&Uncertainty::Undetermined);
+    notes.extend(at_bounds(method.model, last, is_determined));
+    notes.extend(undetermined(method.model, &outcome.uncertainty));
+    notes.extend(bright(method.model, last));
+    notes
+}
+
+/// A reflectance of 1 at grazing incidence is what a smooth interface has.
+const FULL_RIM: &str = "f90";
+
+fn at_bounds(model: &dyn Model, parameters: &[f64], is_determined: impl Fn(usize) -> bool) -> Option<String> {
+    let (lower, upper) = flat_bounds(model.parameters());
+    let names = flat_names(model.parameters());
+    // A colour of zero is an answer (no diffuse part), and so are both ends of a blend (a metal); any other upper bound or a width at its
+    // end is a limit of the model.
+    let is_width = |i: usize| model.lobes().iter().any(|b| b.width.is_some_and(|width| width.entry == i));
+    let roles: Vec<Role> =
+        model.parameters().iter().flat_map(|p| std::iter::repeat_n(p.role, p.channels.count())).collect();
+    let is_kind = |i: usize| matches!(roles[i], Role::Blend(_)) || names[i] == FULL_RIM;
+    let limited = |&i: &usize| (parameters[i] == upper[i] && !is_kind(i)) || (is_width(i) && parameters[i] == lower[i]);
+    let limited: Vec<String> = (0..parameters.len())
+        .filter(limited)
+        .filter(|&i| is_determined(i))
+        .map(|i| format!("{} = {}", names[i], parameters[i]))
+        .collect();
+    let list = limited.join(", ");
+    (!limited.is_empty()).then(|| format!("at the limit of the model's range: {list}; the photo asks for more"))
+}
+
+/// The parameters of which much of the range matches the photo as well.
+fn undetermined(model: &dyn Model, uncertainty: &[Uncertainty]) -> Option<String> {
+    let names = flat_names(model.parameters());
+    let mut list = Vec::new();
+    let mut first = 0;
+    for parameter in model.parameters() {
+        let entries = first..first + parameter.channels.count();
+        let open: Vec<usize> = entries.clone().filter(|&i| uncertainty[i] == Uncertainty::Undetermined).collect();
+        if open.len() == entries.len() {
+            list.push(parameter.name.to_owned());
+        } else {
+            list.extend(open.into_iter().map(|i| names[i].clone()));
+        }
+        first = entries.end;
+    }
+    let list = list.join(", ");
+    (!list.is_empty()).then(|| {
+        format!("the photo does not determine {list}: other values look the same, so do not read them as a measurement")
+    })
+}
+
+/// Colours are free, so a fit may reflect more light than it receives.
+fn bright(model: &dyn Model, parameters: &[f64]) -> Option<String> {
+    let sum = model.diffuse_albedo(parameters) + model.normal_incidence_specular(parameters);
+    let most = (0..3).map(|c| sum[c]).fold(0.0, f64::max);
+    (most > 1.0).then(|| {
+        format!("diffuse and specular reflectance add up to {most:.2} in a channel: more light than is received; check the exposure of photo and map")
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use lookalike::brdf::{CookTorrance, Disney, GgxF90};
+
+    const KNOWN: Uncertainty = Uncertainty::StandardError(0.01);
+
+    #[test]
+    fn parameters_that_are_not_determined_are_named_in_one_note() {
+        let mut uncertainty = [KNOWN; 8];
+        uncertainty[3] = Uncertainty::AtBound;
+        assert_eq!(undetermined(&CookTorrance, &uncertainty), None);
+        for open in [1, 3, 4, 5, 7] {
+            uncertainty[open] = Uncertainty::Undetermined;
+        }
+        let note = undetermined(&CookTorrance, &uncertainty).unwrap();
+        assert!(note.starts_with("the photo does not determine kd.g, ks, m: other values look the same"), "{note}");
+    }
+
+    #[test]
+    fn a_bound_that_means_nothing_is_not_called_a_limit_of_the_model() {
+        let parameters = [0.3, 0.3, 0.3, 0.0, 0.0, 0.0, 0.5, 1.0];
+        assert!(at_bounds(&CookTorrance, &parameters, |_| true).is_some_and(|note| note.contains("m = 1")));
+        assert_eq!(at_bounds(&CookTorrance, &parameters, |i| i != 7), None);
+    }
+
+    #[test]
+    fn a_metal_and_a_full_rim_are_answers_and_a_full_coat_is_a_limit() {
+        let rim = |f90: f64, f0: f64| at_bounds(&GgxF90, &[0.3, 0.3, 0.3, f0, 0.1, 0.1, f90, 0.2], |_| true);
+        assert_eq!(rim(1.0, 0.1), None);
+        assert!(rim(1.0, 1.0).is_some_and(|note| note.contains("f0.r = 1;")));
+        // Base colour, subsurface, metallic, specular, roughness, sheen, clear coat, its gloss.
+        let disney = |coat: f64| at_bounds(&Disney, &[0.5, 0.5, 0.5, 1.0, 1.0, 0.5, 0.5, 0.0, coat, 0.5], |_| true);
+        assert_eq!(disney(0.5), None);
+        assert!(disney(1.0).is_some_and(|note| note.contains("clearcoat = 1;") && !note.contains("metallic")));
+    }
+}

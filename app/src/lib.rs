@@ -1,0 +1,42 @@
+//! The program `lookalike`: its command line, and what its commands do. The engine that runs a job graph on workers is
+//! `lookalike_coordinator`; the science is `lookalike`.
+
+use std::process::ExitCode;
+
+mod batch;
+mod cli;
+mod commands;
+pub mod demo;
+mod exit;
+mod fit;
+pub mod inputs;
+mod outputs;
+mod problems;
+mod progress;
+mod run;
+pub mod settings;
+pub mod slurm;
+mod study;
+
+pub use exit::Exit;
+
+/// What only the fuzz targets call.
+#[cfg(fuzzing)]
+#[doc(hidden)]
+pub mod fuzzing {
+    use std::path::Path;
+
+    /// How many fits a manifest lists, or what is wrong with it.
+    ///
+    /// # Errors
+    /// What is wrong with it.
+    pub fn manifest(path: &Path) -> Result<usize, String> {
+        crate::cli::manifest(path, &[]).map(|fits| fits.len()).map_err(|error| format!("{error:#}"))
+    }
+}
+
+/// The program `lookalike`: reads the process's arguments, runs the command they name, reports errors on stderr.
+#[must_use]
+pub fn main() -> ExitCode {
+    cli::main(std::env::args_os().collect())
+}

@@ -1,0 +1,189 @@
+//! `fit.json`, the result of a fit for programs (design section 10).
+//!
+//! Without its `timing` block it is bit-identical from run to run: everything that depends on the run and not on the inputs
+//! lives there.
+
+use super::conventions;
+use crate::settings::MethodSettings;
+use lookalike::{
+    brdf::{Channels, Model},
+    fit::{Judged, Method, Uncertainty},
+    plan::FitOutcome,
+    scene::Capture,
+};
+use serde_json::{Map, Value, json};
+
+/// The schema of the document.
+const SCHEMA: &str = "lookalike.fit/1";
+
+/// Everything that goes into the document.
+#[derive(Debug)]
+pub(crate) struct FitRecord<'a> {
+    pub(crate) settings: &'a MethodSettings,
+    pub(crate) method: &'a Method,
+    pub(crate) capture: &'a Capture,
+    /// What the fit was made from.
+    pub(crate) inputs: &'a Value,
+    pub(crate) outcome: &'a FitOutcome,
+    pub(crate) display_exposure: f64,
+    /// Things a user should know about the result.
+    pub(crate) notes: &'a [String],
+}
+
+/// What depends on the run.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Timing {
+    /// Wall-clock seconds, by stage.
+    pub(crate) seconds: Vec<(&'static str, f64)>,
+    /// CPU seconds, by process.
+    pub(crate) cpu_seconds: Vec<(&'static str, f64)>,
+    pub(crate) workers: usize,
+    pub(crate) out: String,
+    pub(crate) attempts: u64,
+    pub(crate) requeued: u64,
+}
+
+impl FitRecord<'_> {
+    /// The document.
+    pub(crate) fn json(&self, timing: &Timing) -> Value {
+        let model = self.method.model;
+        let score = |cssim: f64, object: f64| json!({ "cssim": cssim, "cssim_object": object });
+        let candidate = |j: &Judged| {
+            let c = &j.candidate;
+            let mut entry = json!({ "gamma": c.gamma, "subset": c.subset, "cost": c.cost });
+            merge(&mut entry, score(j.cssim, j.cssim_object));
+            let rest = json!({ "evaluations": c.evaluations, "termination": c.termination.name() });
+            merge(&mut entry, rest);
+            merge(&mut entry, json!({ "parameters": parameters_json(model, &c.parameters) }));
+            entry
+        };
+        // In the order of gammas, then of subsets.
+        let mut order: Vec<&Judged> = self.outcome.judged.iter().collect();
+        order.sort_by(|a, b| a.candidate.gamma.total_cmp(&b.candidate.gamma));
+        let winner = &self.outcome.judged[self.outcome.winner];
+        let mut stage_two = json!({ "gamma": winner.candidate.gamma, "subset": winner.candidate.subset });
+        merge(&mut stage_two, score(winner.cssim, winner.cssim_object));
+        merge(&mut stage_two, json!({ "parameters": parameters_json(model, &winner.candidate.parameters) }));
+        let winner_parameters = &winner.candidate.parameters;
+        merge(
+            &mut stage_two,
+            json!({ "uncertainty": uncertainty_json(model, winner_parameters, &self.outcome.uncertainty) }),
+        );
+        let polished = self.outcome.polished.as_ref().map(|p| {
+            let mut entry = score(p.cssim, p.cssim_object);
+            merge(&mut entry, json!({ "parameters": parameters_json(model, &p.parameters) }));
+            let explored = self.outcome.explored;
+            let rest =
+                json!({ "evaluations": p.evaluations, "explored": explored, "termination": p.termination.name() });
+            merge(&mut entry, rest);
+            entry
+        });
+        let counts = self.capture.counts();
+        json!({
+            "schema": SCHEMA,
+            "software": { "name": "lookalike", "version": env!("CARGO_PKG_VERSION") },
+            "model": model.name(),
+            "samples": match self.settings.samples {
+                crate::settings::Samples::Count(n) => json!(n.get()),
+                crate::settings::Samples::Full => json!("full"),
+            },
+            "sampling": name_of(&self.settings.sampling),
+            "subsets": self.method.subsets,
+            "seed": self.method.seed,
+            "search": name_of(&self.settings.search),
+            "integrator": self.settings.integrator.to_string(),
+            "start": format!("{:?}", self.method.start).to_lowercase(),
+            "at_zero": format!("{:?}", self.method.compress).to_lowercase(),
+            "gammas": self.method.gammas,
+            "judge": name_of(&self.settings.judge),
+            "display_exposure": self.display_exposure,
+            "inputs": self.inputs,
+            "geometry": self.capture.geometry().spec(),
+            "pixels": {
+                "usable": counts.usable,
+                "outside": counts.outside,
+                "masked": counts.masked,
+                "silhouette": counts.silhouette,
+                "clipped": counts.clipped,
+                "not_finite": counts.not_finite,
+            },
+            "conventions": conventions(),
+            "exposure_gain": [1.0, 1.0, 1.0],
+            "candidates": order.into_iter().map(candidate).collect::<Vec<_>>(),
+            "stage_two": stage_two,
+            "polished": polished,
+            "notes": self.notes,
+            "timing": timing.json(),
+        })
+    }
+}
+
+impl Timing {
+    fn json(&self) -> Value {
+        let object = |pairs: &[(&'static str, f64)]| {
+            let rounded = |x: f64| (x * 1000.0).round() / 1000.0;
+            pairs.iter().map(|(name, x)| ((*name).to_owned(), json!(rounded(*x)))).collect::<Map<String, Value>>()
+        };
+        json!({
+            "seconds": object(&self.seconds),
+            "cpu_seconds": object(&self.cpu_seconds),
+            "workers": self.workers,
+            "attempts": self.attempts,
+            "requeued": self.requeued,
+            // Not `args()`, which panics on what is not UTF-8.
+            "command_line": std::env::args_os().map(|a| a.to_string_lossy().into_owned()).collect::<Vec<_>>(),
+            "out": self.out,
+            "os": std::env::consts::OS,
+            "architecture": std::env::consts::ARCH,
+        })
+    }
+}
+
+/// A flat parameter vector by name: colours as three numbers, scalars as one.
+pub(crate) fn parameters_json(model: &dyn Model, parameters: &[f64]) -> Value {
+    by_name(model, &parameters.iter().map(|value| json!(value)).collect::<Vec<_>>())
+}
+
+/// One value per entry of the flat parameter vector, by name.
+fn by_name(model: &dyn Model, entries: &[Value]) -> Value {
+    let mut object = Map::new();
+    let mut first = 0;
+    for parameter in model.parameters() {
+        let count = parameter.channels.count();
+        let values = &entries[first..first + count];
+        let value = match parameter.channels {
+            Channels::Scalar => values[0].clone(),
+            Channels::Rgb => json!(values),
+        };
+        object.insert(parameter.name.to_owned(), value);
+        first += count;
+    }
+    Value::Object(object)
+}
+
+/// What the photo says of each parameter: the standard error as a share of the value, `null` where there is none, and whether the
+/// value is `determined`, held `at-bound`, or `undetermined`.
+fn uncertainty_json(model: &dyn Model, parameters: &[f64], uncertainty: &[Uncertainty]) -> Value {
+    let relative = parameters.iter().zip(uncertainty).map(|(value, known)| match known {
+        Uncertainty::StandardError(error) => json!(error / value.abs()),
+        Uncertainty::AtBound | Uncertainty::Undetermined => Value::Null,
+    });
+    let state = uncertainty.iter().map(|known| match known {
+        Uncertainty::StandardError(_) => json!("determined"),
+        Uncertainty::AtBound => json!("at-bound"),
+        Uncertainty::Undetermined => json!("undetermined"),
+    });
+    let relative = by_name(model, &relative.collect::<Vec<_>>());
+    json!({ "relative": relative, "state": by_name(model, &state.collect::<Vec<_>>()) })
+}
+
+/// A choice as the command line calls it.
+pub(crate) fn name_of(choice: &impl clap::ValueEnum) -> String {
+    choice.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned())
+}
+
+fn merge(into: &mut Value, from: Value) {
+    if let (Value::Object(into), Value::Object(from)) = (into, from) {
+        into.extend(from);
+    }
+}

@@ -1,0 +1,150 @@
+//! How a run is shown while it goes: bars on a terminal, plain lines elsewhere, JSON lines for programs. All on stderr.
+
+mod bars;
+mod fits;
+mod json;
+mod lines;
+mod many_bars;
+mod many_lines;
+mod stage;
+
+pub(crate) use fits::{FitCount, FitEvent};
+
+use crate::settings::ProgressKind;
+use lookalike::fit::BestScore;
+use lookalike_coordinator::comm::RunEvent;
+use std::{
+    io::{self, IsTerminal, Write as _},
+    sync::Arc,
+};
+
+/// How a run ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Ending<'a> {
+    /// All has come to its end.
+    Finished,
+    /// It was ended early, as it was asked to be; why.
+    Stopped(&'a str),
+    /// It could not go on; why.
+    Failed(&'a str),
+}
+
+/// Something that watches a run.
+pub(crate) trait Display: Send {
+    /// Takes note of what happened.
+    fn event(&mut self, event: &RunEvent);
+
+    /// Takes note of what happened to a fit of a batch.
+    fn fit(&mut self, _event: &FitEvent, _count: FitCount) {}
+
+    /// A line of text for people, above any bars.
+    fn say(&mut self, text: &str);
+
+    /// The run is over, and all that it leaves is written; nothing may be left moving.
+    fn finish(&mut self, ending: Ending<'_>);
+}
+
+/// A line on stderr. When nobody reads it any more, the run goes on all the same.
+fn print_line(text: &str) {
+    let _ = writeln!(io::stderr(), "{text}");
+}
+
+/// The display that the user asked for. `best` holds the best score so far.
+pub(crate) fn display(kind: ProgressKind, best: Arc<BestScore>) -> Box<dyn Display> {
+    match kind {
+        ProgressKind::Auto if !io::stderr().is_terminal() => Box::new(lines::Lines::new(best)),
+        // Where bars cannot be drawn (a pipe, a dumb terminal) lines must do.
+        ProgressKind::Bar | ProgressKind::Auto => match bars::Bars::new(Arc::clone(&best)) {
+            Some(bars) => Box::new(bars),
+            None => Box::new(lines::Lines::new(best)),
+        },
+        ProgressKind::Json => Box::new(json::JsonLines::new(1)),
+        ProgressKind::None => Box::new(Silent),
+    }
+}
+
+/// The display of a batch of so many fits that the user asked for.
+pub(crate) fn display_of_many(kind: ProgressKind, fits: usize) -> Box<dyn Display> {
+    match kind {
+        ProgressKind::Auto if !io::stderr().is_terminal() => Box::new(many_lines::ManyLines::new()),
+        ProgressKind::Bar | ProgressKind::Auto => match many_bars::ManyBars::new(fits) {
+            Some(bars) => Box::new(bars),
+            None => Box::new(many_lines::ManyLines::new()),
+        },
+        ProgressKind::Json => Box::new(json::JsonLines::new(fits)),
+        ProgressKind::None => Box::new(SilentMany),
+    }
+}
+
+struct Silent;
+
+impl Display for Silent {
+    fn event(&mut self, _event: &RunEvent) {}
+
+    fn say(&mut self, text: &str) {
+        print_line(text);
+    }
+
+    fn finish(&mut self, _ending: Ending<'_>) {}
+}
+
+/// Nothing but what has to be told: fits that failed.
+struct SilentMany;
+
+impl Display for SilentMany {
+    fn event(&mut self, _event: &RunEvent) {}
+
+    fn fit(&mut self, event: &FitEvent, _count: FitCount) {
+        if let (FitEvent::Failed { .. }, Some(line)) = (event, event.line()) {
+            self.say(&line);
+        }
+    }
+
+    fn say(&mut self, text: &str) {
+        print_line(text);
+    }
+
+    fn finish(&mut self, _ending: Ending<'_>) {}
+}
+
+/// As [`remark`], for a batch: of a node that fails, its fit tells.
+fn remark_of_many(event: &RunEvent) -> Option<String> {
+    if matches!(event, RunEvent::NodeFailed { .. }) { None } else { remark(event) }
+}
+
+/// What people should be told about a run beyond the counts; `None` for everything that goes as planned.
+fn remark(event: &RunEvent) -> Option<String> {
+    match event {
+        RunEvent::Resumed { results, .. } => {
+            Some(format!("going on with the run that is there: {results} results need not be computed again"))
+        }
+        RunEvent::WaitingForWorkers { waited, limit } => Some(format!(
+            "waiting for workers: {} s of at most {} s; start one with `lookalike worker --access OUT/access.json`",
+            waited.as_secs(),
+            limit.as_secs()
+        )),
+        RunEvent::LocalWorkerEnded { process, status, restart_after } => {
+            let next = restart_after.map_or("it is not started again", |_| "another one takes its place");
+            Some(format!("warning: local worker {process} ended ({status}); {next}"))
+        }
+        RunEvent::WorkerDraining { worker } => {
+            Some(format!("{worker} was asked to end: it finishes what it computes and gets nothing more"))
+        }
+        RunEvent::NodeSuspected { name, deaths } => Some(format!(
+            "warning: {deaths} workers have died while they computed {}: from now on it runs alone",
+            name.label
+        )),
+        RunEvent::AnswersDiffer { name, first, second, error } => Some(format!(
+            "warning: {} has an output and an error ({error}), one from {first} and one from {second}: one of these machines is not to \
+             be trusted",
+            name.label
+        )),
+        RunEvent::NodeSpeculated { name, worker } => {
+            Some(format!("{} is slow: {worker} computes it too, and the first answer counts", name.label))
+        }
+        RunEvent::NodeRequeued { name, .. } => Some(format!("{} runs again on another worker", name.label)),
+        RunEvent::NodeFailed { reason, .. } if reason.is_cancellation() => None,
+        RunEvent::NodeFailed { name, reason } => Some(format!("error: {} failed: {reason}", name.label)),
+        _ => None,
+    }
+}

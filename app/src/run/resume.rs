@@ -1,0 +1,50 @@
+//! A run that is finished already, and is asked for again.
+
+use crate::outputs::OutFolder;
+use anyhow::bail;
+use lookalike_coordinator::journal::{self, JOURNAL_FILE, RunIdentity};
+
+/// Whether there is nothing left to do: the run in a folder is finished, and its results are as it wrote them.
+///
+/// # Errors
+/// If the run there is one of other inputs or settings, or a result was changed.
+pub(crate) fn is_finished(
+    out: &OutFolder,
+    out_name: &str,
+    identity: &RunIdentity,
+    mut say: impl FnMut(&str),
+) -> anyhow::Result<bool> {
+    let path = out.file(JOURNAL_FILE);
+    if !path.exists() {
+        return Ok(false);
+    }
+    let Some(finished) = journal::finished(&path, identity).map_err(super::failure::journal_failed)? else {
+        return Ok(false);
+    };
+    let missing = missing(out, out_name, &finished.outputs)?;
+    if missing.is_empty() {
+        say(&format!("the run in {out_name} is finished, and its results are as it wrote them"));
+        return Ok(true);
+    }
+    say(&format!("the run in {out_name} is finished, but {} is missing: fitting again", missing.join(", ")));
+    Ok(false)
+}
+
+/// Which of the files that the run in a folder wrote are not there any more.
+///
+/// # Errors
+/// If one was changed: it may be somebody's.
+pub(crate) fn missing(out: &OutFolder, out_name: &str, files: &[(String, String)]) -> anyhow::Result<Vec<String>> {
+    let mut missing = Vec::new();
+    for (name, hash) in files {
+        match out.hash(name)? {
+            None => missing.push(name.clone()),
+            Some(found) if found == *hash => {}
+            Some(_) => bail!(
+                "{name} is not what the run in {out_name} wrote; keep a changed file elsewhere and remove it here, then --resume makes \
+                 it again"
+            ),
+        }
+    }
+    Ok(missing)
+}

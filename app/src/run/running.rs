@@ -1,0 +1,55 @@
+//! A run from its settings to its end: what a fit and a batch have in common.
+
+use crate::{exit::Exit, outputs::OutFolder, settings::ClusterSettings};
+use anyhow::Context;
+use lookalike::{graph::Planner, nodes};
+use lookalike_coordinator::{
+    comm::RunEvent,
+    core::RunSummary,
+    metrics::Metrics,
+    runner::{self, RunnerOptions},
+};
+use std::sync::Arc;
+
+/// How a run with these settings treats its workers; its access file goes to `out`. The seed decides which outputs are verified.
+pub(crate) fn runner_options(cluster: &ClusterSettings, out: &OutFolder, seed: u64) -> RunnerOptions {
+    let mut options = RunnerOptions::new(cluster.workers.count(), out.file("access.json"));
+    options.listen = cluster.listen_for_others();
+    options.access = cluster.access.clone();
+    options.advertise = cluster.advertise.as_ref().map(ToString::to_string);
+    options.log.clone_from(&cluster.log);
+    options.policy = cluster.policy;
+    options.policy.verify_seed = seed;
+    options
+}
+
+/// Runs a planner to its end. Its errors carry their exit code.
+pub(crate) fn run_to_end<P: Planner>(
+    mut options: RunnerOptions,
+    planner: P,
+    metrics: Option<&Metrics>,
+    mut observer: impl FnMut(&RunEvent),
+) -> anyhow::Result<(P, RunSummary)> {
+    let runtime = tokio::runtime::Builder::new_multi_thread()
+        .worker_threads(2)
+        .enable_all()
+        .build()
+        .context("cannot start the network runtime")?;
+    if let Some(metrics) = metrics {
+        options.pulse = Some(metrics.pulse());
+        let _guard = runtime.enter();
+        runtime.spawn(metrics.serve().context("cannot serve metrics")?);
+    }
+    let run = runner::run(options, planner, Arc::new(nodes::registry()), |event| {
+        metrics.into_iter().for_each(|metrics| metrics.note(event));
+        observer(event);
+    });
+    runtime.block_on(run).map_err(|error| {
+        match error.exit_code() {
+            2 => anyhow::Error::new(error).context(Exit::BadInput),
+            // The heading says it all.
+            130 => Exit::Interrupted.into(),
+            _ => anyhow::Error::new(error).context(Exit::ClusterFailed),
+        }
+    })
+}

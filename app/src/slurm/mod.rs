@@ -1,0 +1,126 @@
+//! A batch or a study as a job of Slurm (design section 8, "Beyond one machine"): the job script with the command line in it, and its
+//! submission. Where the job runs, with how much and until when, is Slurm's to say, and its options are passed on as they are.
+
+mod command_line;
+mod script;
+
+pub use command_line::command_line;
+
+use crate::exit::Exit;
+use anyhow::{Context, bail};
+use std::{
+    fs, io,
+    path::{Path, PathBuf},
+    process::{Command, Output},
+};
+
+/// A run that is to be a job of Slurm.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct SlurmJob {
+    /// The program that coordinator and workers run, by a path that is the same on all nodes.
+    pub program: PathBuf,
+    /// The folder that relative paths in `command` start from.
+    pub folder: PathBuf,
+    /// The command and its flags, without the program's name and without those that say where workers are.
+    pub command: Vec<String>,
+    /// Options of `sbatch`, as its own command line takes them.
+    pub options: Vec<String>,
+    /// The folder of results.
+    pub out: PathBuf,
+}
+
+/// A job that Slurm took.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Submitted {
+    /// Its number.
+    pub job: String,
+    /// The script that was submitted; `sbatch` takes it again as it is.
+    pub script: PathBuf,
+    /// Where the job's messages go.
+    pub log: PathBuf,
+}
+
+impl Submitted {
+    /// What the user can do now, for stderr.
+    #[must_use]
+    pub fn advice(&self) -> String {
+        let (job, log) = (&self.job, self.log.display());
+        let out = self.script.parent().unwrap_or(&self.script).display();
+        format!(
+            "job {job} is submitted\n\
+             squeue --jobs={job} tells where it is, lookalike status {out} how far; it writes to {log}\n\
+             scancel {job} ends it; sbatch {} goes on with it",
+            self.script.display()
+        )
+    }
+}
+
+impl SlurmJob {
+    /// Writes the job script into the folder of results and submits it with `sbatch`, a name or a path.
+    ///
+    /// # Errors
+    /// When the script cannot be written, `sbatch` is not there, or it refuses the job; then its words are in the error.
+    pub fn submit(&self, sbatch: &str) -> anyhow::Result<Submitted> {
+        let script = self.write()?;
+        let output = Command::new(sbatch).arg("--parsable").arg(&script).current_dir(&self.folder).output();
+        let output = output.map_err(|error| not_started(&error, sbatch, &script))?;
+        refused(&output, sbatch).with_context(|| {
+            format!("the job was not submitted; its script is {}, to be mended and submitted by hand", script.display())
+        })?;
+        let job = job_number(&output, sbatch)?;
+        Ok(Submitted { log: self.out.join(format!("slurm-{job}.out")), job, script })
+    }
+
+    /// Writes the job script; returns its path.
+    fn write(&self) -> anyhow::Result<PathBuf> {
+        let text = self.script()?;
+        let path = self.out.join(SCRIPT_FILE);
+        let cannot = || format!("cannot write the job script {}", path.display());
+        fs::create_dir_all(&self.out).with_context(cannot)?;
+        fs::write(&path, text).with_context(cannot)?;
+        Ok(path)
+    }
+}
+
+/// What went wrong, where the job was not taken. Warnings of one that was taken are passed on.
+fn refused(output: &Output, sbatch: &str) -> anyhow::Result<()> {
+    let said = String::from_utf8_lossy(&output.stderr).trim().to_owned();
+    if !output.status.success() {
+        let words = if said.is_empty() { output.status.to_string() } else { said };
+        return Err(anyhow::anyhow!("{sbatch}: {words}").context(Exit::ClusterFailed));
+    }
+    if !said.is_empty() {
+        eprintln!("{said}");
+    }
+    Ok(())
+}
+
+/// What `sbatch --parsable` says: the number, and on clusters of clusters a semicolon and a name. Some sites greet before that.
+fn job_number(output: &Output, sbatch: &str) -> anyhow::Result<String> {
+    let answer = String::from_utf8_lossy(&output.stdout);
+    let last = answer.lines().map(str::trim).rfind(|line| !line.is_empty()).unwrap_or_default();
+    let number = last.split(';').next().unwrap_or_default();
+    if number.is_empty() || !number.bytes().all(|byte| byte.is_ascii_digit()) {
+        bail!("{sbatch} took the job, but its number is not in {:?}: see squeue", answer.trim());
+    }
+    Ok(number.to_owned())
+}
+
+fn not_started(error: &io::Error, sbatch: &str, script: &Path) -> anyhow::Error {
+    if error.kind() == io::ErrorKind::NotFound {
+        anyhow::anyhow!(
+            "cannot find {sbatch}, which submits jobs to Slurm; is this a machine of the cluster? The job script is written: \
+             submit {} where sbatch is",
+            script.display()
+        )
+    } else {
+        anyhow::anyhow!("cannot run {sbatch}: {error}")
+    }
+}
+
+/// The name of the job script in the folder of results.
+const SCRIPT_FILE: &str = "lookalike.sbatch";
+
+#[cfg(test)]
+#[cfg(unix)]
+mod tests;

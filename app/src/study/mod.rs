@@ -1,0 +1,249 @@
+//! `lookalike study`: the paper's experiments on measured materials under real light, beside rival methods, as one run on the job
+//! graph.
+//!
+//! ```text
+//!   STUDY.toml ──► cells (a photo, a fit, brute force, ..), each with those it needs
+//!                    ▼
+//!                  supply ──► Many planners on one graph ──► runner
+//!                    │ a cell ends
+//!                  OUT/cells/<cell>.json, .exr; OUT/pictures
+//!                    ▼ all have ended
+//!                  data (one flat table) ──► report: results.md, report.html, figures, CSV, JSON
+//! ```
+
+mod cells;
+mod data;
+mod effort;
+mod file;
+mod pictures;
+mod planner;
+mod progress;
+mod record;
+mod seconds;
+mod supply;
+mod variants;
+
+use crate::{
+    exit::Exit,
+    fit::version,
+    inputs::{load_environment, show_warnings},
+    outputs::{OutFolder, print_result},
+    progress::Ending,
+    run::{journal_failed, run_to_end, runner_options},
+    settings::{EnvironmentSettings, StudySettings},
+};
+use anyhow::{Context, bail};
+use effort::Effort;
+use file::Study;
+use lookalike::{
+    brdf::merl::MerlTable,
+    graph::{Blob, Many},
+    plan::encode_light,
+};
+use lookalike_coordinator::{
+    comm::RunEvent,
+    journal::{self, Finished, FitLedger, JOURNAL_FILE, JournalOptions, RunIdentity},
+    metrics::Metrics,
+};
+use lookalike_report::measured::{About, StudyData};
+use progress::Progress;
+use seconds::Seconds;
+use std::{
+    fs,
+    process::ExitCode,
+    sync::{Arc, Mutex, PoisonError},
+    time::Instant,
+};
+use supply::{Inputs, Light, Supply, Tally};
+
+/// Runs a study and writes its report.
+pub(crate) fn run(settings: StudySettings) -> anyhow::Result<ExitCode> {
+    let began = Instant::now();
+    let study = Study::read(&settings.study)?;
+    let cells = cells::plan(&study)?;
+    let out = OutFolder::create(&settings.out, settings.resume)?;
+    refuse_strangers(&out)?;
+    let metrics = settings.metrics.map(|address| address.listen()).transpose()?;
+    let inputs = Arc::new(load(study, cells, out, settings.cluster.workers.count())?);
+    let tally = Arc::new(Mutex::new(Tally::default()));
+    let mut seconds = Seconds::open(&inputs.out)?;
+    let supply = Supply::new(Arc::clone(&inputs), Arc::clone(&tally))?;
+    let mut effort = Effort::read(&inputs.out);
+    let journal = inputs.out.file(JOURNAL_FILE);
+    if journal.exists() {
+        // Refuses the run of another study, also where nothing is left to compute.
+        journal::finished(&journal, &identity(&inputs)?).map_err(journal_failed)?;
+    }
+    if !supply.is_complete() || !journal.exists() {
+        let workers = run_cells(&settings, &inputs, &tally, (supply, &mut seconds), metrics.as_ref())?;
+        effort.seconds += began.elapsed().as_secs_f64();
+        effort.workers = effort.workers.max(workers);
+        effort.write(&inputs.out)?;
+    }
+    write_report(&settings, &inputs, &seconds, &effort)?;
+    let failed = std::mem::take(&mut lock(&tally).failed);
+    end(&inputs.out, failed.len())?;
+    for cell in &failed {
+        eprintln!("failed: {cell}");
+    }
+    let page = inputs.out.file("report.html");
+    print_result(&format!("{}\n", page.display())).context("cannot write to stdout")?;
+    Ok(if failed.is_empty() { Exit::Done } else { Exit::SomeFitsFailed }.into())
+}
+
+/// Tells what is wrong with a study, without running it.
+pub(crate) fn check(settings: &StudySettings) -> anyhow::Result<()> {
+    let journal = settings.out.join(JOURNAL_FILE);
+    if !settings.resume && journal.exists() {
+        bail!(
+            "{} says that a run was begun there already: go on with it with --resume, choose another --out, or remove that folder first",
+            journal.display()
+        );
+    }
+    let study = Study::read(&settings.study)?;
+    cells::plan(&study)?;
+    read_materials(&study)?;
+    read_lights(&study).map(|_| ())
+}
+
+/// Computes the cells that are not complete; how many workers there were.
+fn run_cells(
+    settings: &StudySettings,
+    inputs: &Arc<Inputs>,
+    tally: &Arc<Mutex<Tally>>,
+    (supply, seconds): (Supply, &mut Seconds),
+    metrics: Option<&Metrics>,
+) -> anyhow::Result<u32> {
+    // Tables stay until the run ends.
+    let ending = inputs.cells.iter().filter(|cell| !matches!(cell.task, cells::Task::Table)).count();
+    let mut progress = Progress::new(settings.progress, ending);
+    progress.complete(lock(tally).complete);
+    let mut options = runner_options(&settings.cluster, &inputs.out, inputs.study.file.seed);
+    // Seconds of a node are those of one core.
+    options.threads_per_worker = std::num::NonZeroUsize::new(1);
+    options.journal = Some(JournalOptions {
+        path: inputs.out.file(JOURNAL_FILE),
+        identity: identity(inputs)?,
+        resume: settings.resume,
+        survivors: true,
+        best: None,
+        fits: FitLedger::default(),
+    });
+    let mut workers = 0;
+    let run = run_to_end(options, Many::new(supply), metrics, |event| {
+        seconds.note(event);
+        workers += u32::from(matches!(event, RunEvent::WorkerJoined { .. }));
+        progress.event(event);
+        progress.complete(lock(tally).complete);
+    });
+    let problem = run.as_ref().err().map(|error| format!("{error:#}"));
+    progress.finish(problem.as_deref().map_or(Ending::Finished, Ending::Failed));
+    drop(run?);
+    Ok(workers)
+}
+
+/// Refuses cells that no journal here knows of: another study may have left them.
+fn refuse_strangers(out: &OutFolder) -> anyhow::Result<()> {
+    if out.file("cells").exists() && !out.file(JOURNAL_FILE).exists() {
+        bail!(
+            "{} holds cells of a study but no journal ({JOURNAL_FILE}) that says of which: choose another --out, or remove it first",
+            out.file("cells").display()
+        );
+    }
+    Ok(())
+}
+
+/// Tells the journal that all has ended.
+fn end(out: &OutFolder, failed: usize) -> anyhow::Result<()> {
+    let path = out.file(JOURNAL_FILE);
+    if failed > 0 {
+        let ended = format!("{failed} cells of the study failed");
+        return journal::settle(&path, &FitLedger::default(), Some(&ended)).map_err(journal_failed);
+    }
+    let names = ["results.md", "results.json", "report.html"];
+    let outputs = names.into_iter().filter_map(|name| Some((name.to_owned(), out.hash(name).transpose()?)));
+    let outputs = outputs.map(|(name, hash)| Ok((name, hash?))).collect::<anyhow::Result<_>>()?;
+    journal::finish(&path, &Finished { outputs }).map_err(journal_failed)
+}
+
+fn lock(tally: &Mutex<Tally>) -> std::sync::MutexGuard<'_, Tally> {
+    tally.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Reads materials and lights, which is also their check.
+fn load(study: Study, cells: Vec<cells::Cell>, out: OutFolder, workers: usize) -> anyhow::Result<Inputs> {
+    let (materials, lights) = (read_materials(&study)?, read_lights(&study)?);
+    Ok(Inputs { study, cells, materials, lights, out, workers })
+}
+
+fn read_materials(study: &Study) -> anyhow::Result<Vec<Blob>> {
+    let mut materials = Vec::new();
+    for (_, path) in &study.materials {
+        let shown = path.display().to_string();
+        let bytes = fs::read(path).with_context(|| format!("cannot read the measured material {shown}"))?;
+        MerlTable::read(&shown, &bytes)?;
+        materials.push(Blob::new(bytes));
+    }
+    Ok(materials)
+}
+
+fn read_lights(study: &Study) -> anyhow::Result<Vec<Light>> {
+    let mut lights = Vec::new();
+    for (_, path) in &study.lights {
+        let settings = EnvironmentSettings { path: path.clone(), mapping: None, rotation_deg: 0.0 };
+        let loaded = load_environment(&settings)?;
+        show_warnings(&loaded.warnings);
+        let encoded = encode_light(&loaded.environment)?;
+        lights.push(Light { environment: loaded.environment, encoded });
+    }
+    Ok(lights)
+}
+
+/// What the run is a run of. What the file says counts, not how it is written.
+fn identity(inputs: &Inputs) -> anyhow::Result<RunIdentity> {
+    let study = &inputs.study;
+    let mut identity = version();
+    for (key, value) in toml::from_str::<toml::Table>(&study.text)? {
+        identity = identity.with(format!("the study: {key}"), value.to_string());
+    }
+    for ((name, _), blob) in study.materials.iter().zip(&inputs.materials) {
+        identity = identity.with(format!("material {name}"), blob.hash().to_string());
+    }
+    for ((name, _), light) in study.lights.iter().zip(&inputs.lights) {
+        identity = identity.with(format!("light {name}"), light.encoded.hash().to_string());
+    }
+    Ok(identity)
+}
+
+fn write_report(settings: &StudySettings, inputs: &Inputs, nodes: &Seconds, effort: &Effort) -> anyhow::Result<()> {
+    let data = data::collect(inputs, nodes)?;
+    let study = &inputs.study;
+    let names = |list: &[(String, std::path::PathBuf)]| list.iter().map(|(name, _)| name.clone()).collect::<Vec<_>>();
+    let about = About {
+        command: settings.command.clone(),
+        version: env!("CARGO_PKG_VERSION").to_owned(),
+        machine: machine(),
+        seconds: effort.seconds,
+        workers: effort.workers,
+        study: study.text.clone(),
+        materials: names(&study.materials),
+        six: study.file.six.clone(),
+        probes: names(&study.lights[..study.probes]),
+        held_out: names(&study.lights[study.probes..]),
+        size: study.file.size,
+        model: study.file.model.clone(),
+        seed: study.file.seed,
+    };
+    let data =
+        StudyData { about, photos: data.photos, rows: data.rows, direct: data.direct, agreements: data.agreements };
+    lookalike_report::write(&data, &settings.out)
+}
+
+/// The processor and how many cores of it this process may use.
+fn machine() -> String {
+    let text = fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
+    let model = text.lines().find_map(|line| line.strip_prefix("model name")).and_then(|rest| rest.split_once(':'));
+    let model = model.map_or("unknown processor", |(_, name)| name.trim());
+    let cores = std::thread::available_parallelism().map_or(1, std::num::NonZeroUsize::get);
+    format!("{model}, {cores} cores")
+}

@@ -1,0 +1,84 @@
+//! What plans a cell, whatever it computes, and remembers which nodes it was told of: they say what the cell cost.
+
+use lookalike::{
+    graph::{Blob, GraphEdit, NodeId, NodeSpec, PlanError, Planner},
+    image::Image,
+    plan::{FitOutcome, FitPlanner, PhotoPlanner, SurveyOutcome, SurveyPlanner},
+};
+use std::collections::BTreeSet;
+
+/// The planner of a cell.
+#[derive(Debug)]
+pub(super) struct CellPlanner {
+    inner: Inner,
+    labels: BTreeSet<String>,
+}
+
+#[derive(Debug)]
+enum Inner {
+    Photo(Box<PhotoPlanner>),
+    Fit(Box<FitPlanner>),
+    Survey(Box<SurveyPlanner>),
+}
+
+/// What a cell has computed.
+#[derive(Debug)]
+pub(super) enum Outcome {
+    /// The image, and the standard error of a typical pixel.
+    Photo(Image, Option<f64>),
+    Fit(Box<FitOutcome>),
+    Survey(Box<SurveyOutcome>),
+}
+
+impl CellPlanner {
+    pub(super) fn photo(planner: PhotoPlanner) -> Self {
+        Self { inner: Inner::Photo(Box::new(planner)), labels: BTreeSet::new() }
+    }
+
+    pub(super) fn fit(planner: FitPlanner) -> Self {
+        Self { inner: Inner::Fit(Box::new(planner)), labels: BTreeSet::new() }
+    }
+
+    pub(super) fn survey(planner: SurveyPlanner) -> Self {
+        Self { inner: Inner::Survey(Box::new(planner)), labels: BTreeSet::new() }
+    }
+
+    /// The labels of its nodes, and what it has computed, once its nodes are complete.
+    pub(super) fn into_outcome(self) -> (BTreeSet<String>, Option<Outcome>) {
+        let outcome = match self.inner {
+            Inner::Photo(planner) => planner.into_photo().map(|(image, noise)| Outcome::Photo(image, noise)),
+            Inner::Fit(planner) => planner.into_outcome().map(|outcome| Outcome::Fit(Box::new(outcome))),
+            Inner::Survey(planner) => planner.into_outcome().map(|outcome| Outcome::Survey(Box::new(outcome))),
+        };
+        (self.labels, outcome)
+    }
+
+    fn inner(&mut self) -> &mut dyn Planner {
+        match &mut self.inner {
+            Inner::Photo(planner) => &mut **planner,
+            Inner::Fit(planner) => &mut **planner,
+            Inner::Survey(planner) => &mut **planner,
+        }
+    }
+}
+
+impl Planner for CellPlanner {
+    fn start(&mut self, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
+        self.inner().start(graph)
+    }
+
+    fn completed(&mut self, node: NodeId, output: &Blob, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
+        if let Some(spec) = graph.spec(node) {
+            self.labels.insert(spec.label.clone());
+        }
+        self.inner().completed(node, output, graph)
+    }
+
+    fn is_verified_by_repetition(&self, spec: &NodeSpec) -> bool {
+        match &self.inner {
+            Inner::Photo(planner) => planner.is_verified_by_repetition(spec),
+            Inner::Fit(planner) => planner.is_verified_by_repetition(spec),
+            Inner::Survey(planner) => planner.is_verified_by_repetition(spec),
+        }
+    }
+}

@@ -1,0 +1,94 @@
+//! What nodes cost: seconds from their start to the arrival of their output, by label. Workers of one thread each, one per core, make
+//! them seconds of one core. Kept in a file, so that a run that is gone on with knows what was computed before.
+
+use crate::outputs::OutFolder;
+use anyhow::Context;
+use lookalike_coordinator::comm::RunEvent;
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    fs::{self, File, OpenOptions},
+    io::Write,
+};
+
+const FILE: &str = "seconds.tsv";
+
+/// What begins the lines of another process.
+const EPOCH: &str = "#";
+
+/// The seconds of all nodes.
+#[derive(Debug)]
+pub(super) struct Seconds {
+    /// Of earlier processes.
+    before: BTreeMap<String, f64>,
+    /// Of this one.
+    now: BTreeMap<String, f64>,
+    file: File,
+}
+
+impl Seconds {
+    /// Those of an earlier run in the folder, if there was one, and a file to add more to.
+    pub(super) fn open(out: &OutFolder) -> anyhow::Result<Self> {
+        let path = out.file(FILE);
+        let shown = path.display().to_string();
+        let text = if path.exists() {
+            fs::read_to_string(&path).with_context(|| format!("cannot read {shown}"))?
+        } else {
+            String::new()
+        };
+        let before = read(&text);
+        let file = OpenOptions::new().create(true).append(true).open(&path);
+        let mut file = file.with_context(|| format!("cannot write {shown}"))?;
+        // A line that was cut off ends here.
+        let end = if text.is_empty() || text.ends_with('\n') { "" } else { "\n" };
+        writeln!(file, "{end}{EPOCH}").with_context(|| format!("cannot write {shown}"))?;
+        Ok(Self { before, now: BTreeMap::new(), file })
+    }
+
+    /// Takes note of what an event says.
+    pub(super) fn note(&mut self, event: &RunEvent) {
+        let RunEvent::NodeFinished { name, elapsed, .. } = event else { return };
+        let seconds = elapsed.as_secs_f64();
+        *self.now.entry(name.label.clone()).or_default() += seconds;
+        if let Err(error) = writeln!(self.file, "{seconds}\t{}", name.label) {
+            tracing::warn!("cannot write {FILE}: {error}");
+        }
+    }
+
+    /// The sum over those of the labels that `counts`. A label is that of a node with the name of a cell before it.
+    pub(super) fn sum(&self, labels: &BTreeSet<String>, counts: impl Fn(&str) -> bool) -> f64 {
+        let own = |label: &str| counts(lookalike::graph::split_label(label).1);
+        let known = |label: &String| self.now.get(label).or_else(|| self.before.get(label));
+        labels.iter().filter(|label| own(label)).filter_map(known).sum()
+    }
+}
+
+/// The seconds by label: several nodes of one label in one process are added up; what a later process computed again counts alone.
+fn read(text: &str) -> BTreeMap<String, f64> {
+    let mut all = BTreeMap::new();
+    let mut of_process: BTreeMap<String, f64> = BTreeMap::new();
+    // The last line may have been cut off by the end of the process.
+    for line in text.split_inclusive('\n').filter_map(|line| line.strip_suffix('\n')) {
+        if line == EPOCH {
+            all.append(&mut of_process);
+        } else if let Some((seconds, label)) = line.split_once('\t')
+            && let Ok(seconds) = seconds.parse::<f64>()
+        {
+            *of_process.entry(label.to_owned()).or_default() += seconds;
+        }
+    }
+    all.append(&mut of_process);
+    all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_computed_again_counts_once_and_a_line_that_was_cut_off_not_at_all() {
+        let seconds =
+            read("#\n1.5\ta: polish\n0.5\ta: polish\n2\tb: select\n0.2\ta: sel\n#\n3\tb: select\n0.7\tc: pol");
+        let expected = [("a: polish", 2.0), ("a: sel", 0.2), ("b: select", 3.0)];
+        assert_eq!(seconds, expected.map(|(label, seconds)| (label.to_owned(), seconds)).into());
+    }
+}

@@ -1,0 +1,98 @@
+//! `brute-force`: the baseline of studies, pattern search on CSSIM at full resolution from one start.
+//!
+//! Inputs: the view; then the shards of the full-resolution table over the model's whole range of widths, or, for renderings by the direct
+//! integrator, the environment, and the normal map, if the surface has one.
+
+use super::{
+    search::{DirectScene, DirectWire},
+    view::{Scene, View},
+};
+use crate::{
+    brdf::Material,
+    fit::brute_force,
+    graph::{Blob, NodeFailure, NodeType, RunContext},
+    image::Image,
+    math::narrow,
+    nodes::wire::{PolishedWire, read, write},
+    render::integrator::Integrator,
+};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+use std::ops::ControlFlow;
+
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub(crate) struct BruteForceParameters {
+    pub(crate) start: Vec<f64>,
+    /// Most evaluations; 0 leaves the limit to the search.
+    pub(crate) max_evaluations: u32,
+    pub(crate) direct: Option<DirectWire>,
+}
+
+#[derive(Debug)]
+pub(super) struct BruteForce;
+
+impl NodeType for BruteForce {
+    fn kind(&self) -> &'static str {
+        super::BRUTE_FORCE
+    }
+
+    fn run(&self, parameters: &[u8], inputs: &[Blob], context: &RunContext) -> Result<Vec<u8>, NodeFailure> {
+        let parameters: BruteForceParameters = read("parameters of brute-force", parameters)?;
+        let outcome = match &parameters.direct {
+            None => {
+                let scene = Scene::read(inputs, context)?;
+                let full = scene.full();
+                search(&parameters, &scene.view, context, &|point| Some(full.render(point)))?
+            }
+            Some(direct) => {
+                let Some((view, of_scene)) = inputs.split_first() else {
+                    return Err(NodeFailure::new("brute-force takes a view and an environment, found no input"));
+                };
+                let view = context.decoded(view, View::decode)?;
+                let scene = DirectScene::read(direct, of_scene, context)?;
+                if (scene.geometry.width(), scene.geometry.height()) != (view.width, view.height) {
+                    return Err(NodeFailure::new("the direct integrator's scene has another size than the view"));
+                }
+                search(&parameters, &view, context, &|point| direct_image(&view, &scene, point))?
+            }
+        };
+        // A search that was told to stop is not a result.
+        context.check()?;
+        write("brute force", &outcome)
+    }
+}
+
+fn search(
+    parameters: &BruteForceParameters,
+    view: &View,
+    context: &RunContext,
+    render: &dyn Fn(&[f64]) -> Option<Image>,
+) -> Result<PolishedWire, NodeFailure> {
+    let limit = usize::try_from(parameters.max_evaluations).ok().filter(|&limit| limit > 0);
+    let total = limit.unwrap_or(2000 * parameters.start.len()) as u64;
+    let mut observe = |progress: &crate::search::Progress<'_>| {
+        context.report(progress.evaluations as u64, total);
+        if context.is_cancelled() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    };
+    let score = |point: &[f64]| view.judge.score(&render(point)?).ok();
+    let value = |point: &[f64]| score(point).map_or(f64::NAN, |s| view.by.pick(s.cssim, s.cssim_object));
+    let minimum = brute_force(view.model, value, &parameters.start, limit, &mut observe)
+        .map_err(|error| NodeFailure::new(format!("brute force: {error}")))?;
+    let score =
+        score(&minimum.point).ok_or_else(|| NodeFailure::new("brute force ended where nothing can be scored"))?;
+    Ok(PolishedWire::of_minimum(minimum, &score))
+}
+
+/// The image of a flat parameter vector over black by the direct integrator; `None` where there is no such material.
+fn direct_image(view: &View, scene: &DirectScene, parameters: &[f64]) -> Option<Image> {
+    let material = Material::new(view.model, parameters.to_vec()).ok()?;
+    let DirectScene { geometry, light, samples, seed } = scene;
+    let integrator = Integrator { geometry, light, samples: *samples, seed: *seed };
+    let radiance: Vec<_> = view.pixels.par_iter().map(|pixel| integrator.pixel(*pixel, &material)).collect();
+    let mut image = Image::new(view.width, view.height);
+    for ([column, row], radiance) in view.pixels.iter().zip(radiance) {
+        let place = *row as usize * view.width + *column as usize;
+        image.pixels_mut()[place] = narrow(radiance * f64::from(view.coverage[place]));
+    }
+    Some(image)
+}

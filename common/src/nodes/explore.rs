@@ -1,0 +1,42 @@
+//! `explore`: searches on CSSIM over a coarse picture from very different lobes; its parameters and its output are those of `polish`.
+
+use super::{PolishParameters, view::Scene};
+use crate::{
+    fit::explore::explore,
+    graph::{Blob, NodeFailure, NodeType, RunContext},
+    nodes::wire::{PolishedWire, check_parameters, read, write},
+};
+use std::ops::ControlFlow;
+
+#[derive(Debug)]
+pub(super) struct Explore;
+
+impl NodeType for Explore {
+    fn kind(&self) -> &'static str {
+        super::EXPLORE
+    }
+
+    fn run(&self, parameters: &[u8], inputs: &[Blob], context: &RunContext) -> Result<Vec<u8>, NodeFailure> {
+        let PolishParameters { starts, max_evaluations } = read("parameters of explore", parameters)?;
+        let scene = Scene::read(inputs, context)?;
+        starts.iter().try_for_each(|start| check_parameters("starts", scene.view.model, start))?;
+        let total = u64::from(max_evaluations) * starts.len() as u64;
+        // Evaluations of earlier starts, and of this one so far: a new start begins to count from 1.
+        let (mut before, mut last) = (0, 0);
+        let mut observe = |progress: &crate::search::Progress<'_>| {
+            let now = progress.evaluations as u64;
+            if now < last {
+                before += last;
+            }
+            last = now;
+            context.report((before + now).min(total), total);
+            if context.is_cancelled() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        };
+        let (view, limit) = (scene.full(), max_evaluations as usize);
+        let found = explore(&view, &scene.view.judge, scene.view.by, &starts, limit, &mut observe)
+            .map_err(|error| NodeFailure::new(format!("explore: {error}")))?;
+        // A search that was told to stop is not a result.
+        context.check()?;
+        write("explore", &PolishedWire::of(found))
+    }
+}

@@ -1,0 +1,54 @@
+//! The method's steps as nodes of the job graph: one file, one [`NodeType`](crate::graph::NodeType) each. Every node is a
+//! pure function of its parameters and input blobs.
+//!
+//! `transport` and `search` run on workers; `select`, `explore`, `polish` and `report` in the coordinator's process. `render`, `brute-force`
+//! and `appraise` belong to studies.
+
+mod appraise;
+mod brute_force;
+mod explore;
+mod polish;
+mod render;
+mod report;
+mod search;
+mod select;
+mod transport;
+mod view;
+pub(crate) mod wire;
+
+use crate::graph::Registry;
+
+pub(crate) use appraise::{AppraiseParameters, AppraisedWire};
+pub(crate) use brute_force::BruteForceParameters;
+pub(crate) use polish::PolishParameters;
+pub(crate) use render::{RenderParameters, RenderedWire};
+pub(crate) use report::{ReportParameters, ReportWire};
+pub(crate) use search::{CompressWire, DirectWire, SearchParameters};
+pub(crate) use select::SelectParameters;
+pub(crate) use transport::TransportParameters;
+pub(crate) use view::{ViewWire, joined};
+
+/// All node types of fits and studies. Coordinator and workers hold the same registry.
+#[must_use]
+pub fn registry() -> Registry {
+    Registry::default()
+        .with(transport::Transport)
+        .with(search::Search)
+        .with(select::Select)
+        .with(explore::Explore)
+        .with(polish::Polish)
+        .with(report::Report)
+        .with(render::Render)
+        .with(brute_force::BruteForce)
+        .with(appraise::Appraise)
+}
+
+pub(crate) const TRANSPORT: &str = "transport";
+pub(crate) const SEARCH: &str = "search";
+pub(crate) const SELECT: &str = "select";
+pub(crate) const EXPLORE: &str = "explore";
+pub(crate) const POLISH: &str = "polish";
+pub(crate) const REPORT: &str = "report";
+pub(crate) const RENDER: &str = "render";
+pub(crate) const BRUTE_FORCE: &str = "brute-force";
+pub(crate) const APPRAISE: &str = "appraise";

@@ -1,0 +1,42 @@
+//! `polish`: stage three, a short search on CSSIM from the winner, or from what `explore` has found.
+
+use super::view::Scene;
+use crate::{
+    fit::polish,
+    graph::{Blob, NodeFailure, NodeType, RunContext},
+    nodes::wire::{PolishedWire, check_parameters, read, write},
+};
+use serde::{Deserialize, Serialize};
+use std::ops::ControlFlow;
+
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub(crate) struct PolishParameters {
+    /// What polish may start from: the best of them on this node's table.
+    pub(crate) starts: Vec<Vec<f64>>,
+    pub(crate) max_evaluations: u32,
+}
+
+#[derive(Debug)]
+pub(super) struct Polish;
+
+impl NodeType for Polish {
+    fn kind(&self) -> &'static str {
+        super::POLISH
+    }
+
+    fn run(&self, parameters: &[u8], inputs: &[Blob], context: &RunContext) -> Result<Vec<u8>, NodeFailure> {
+        let PolishParameters { starts, max_evaluations } = read("parameters of polish", parameters)?;
+        let scene = Scene::read(inputs, context)?;
+        starts.iter().try_for_each(|start| check_parameters("starts", scene.view.model, start))?;
+        let mut observe = |progress: &crate::search::Progress<'_>| {
+            context.report(progress.evaluations as u64, u64::from(max_evaluations));
+            if context.is_cancelled() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        };
+        let (view, limit) = (scene.full(), max_evaluations as usize);
+        let polished = polish(&view, &scene.view.judge, scene.view.by, &starts, limit, &mut observe)
+            .map_err(|error| NodeFailure::new(format!("polish: {error}")))?;
+        // A search that was told to stop is not a result.
+        context.check()?;
+        write("polish", &PolishedWire::of(polished))
+    }
+}

@@ -1,0 +1,124 @@
+//! What the nodes share that render and score images (`select`, `explore`, `polish`, `report`, `brute-force`, `appraise`): the photo, the
+//! judge, and a table of its pixels.
+//!
+//! Inputs of all: the view; the shards of the table, in order.
+
+use crate::{
+    brdf::{self, Model, lobe_terms},
+    fit::{FullView, JudgedBy},
+    graph::{Blob, NodeFailure, RunContext},
+    image::Image,
+    metric::{Judge, JudgeOptions},
+    nodes::wire::{ImageWire, TableWire, read},
+    render::{table::TransportTable, transport::Pixel},
+};
+use serde::{Deserialize, Serialize};
+use std::sync::Arc;
+
+/// The photo and how it is scored.
+#[derive(Debug, Serialize, Deserialize)]
+pub(crate) struct ViewWire {
+    pub(crate) model: String,
+    pub(crate) photo: ImageWire,
+    /// One value in [0, 1] per pixel: renderings are multiplied by it, and pixels without it are not scored. A photo over black
+    /// holds its coverage already: to multiply it again would darken its edge against that of every rendering.
+    pub(crate) coverage: Vec<f32>,
+    pub(crate) exposure: f64,
+    pub(crate) judge_object: bool,
+    /// The photo shows one pixel, the middle, of every square of so many columns and rows of the scene's pixels; 1 for all of them.
+    pub(crate) stride: u32,
+    /// The pixels of the full-resolution table.
+    pub(crate) pixels: Vec<Pixel>,
+}
+
+/// A decoded view with its prepared judge.
+#[derive(Debug)]
+pub(super) struct View {
+    pub(super) model: &'static dyn Model,
+    pub(super) judge: Judge,
+    pub(super) by: JudgedBy,
+    pub(super) photo: Image,
+    pub(super) pixels: Vec<Pixel>,
+    pub(super) coverage: Vec<f32>,
+    stride: u32,
+    pub(super) width: usize,
+    pub(super) height: usize,
+}
+
+/// A view with the table that fills it.
+#[derive(Debug)]
+pub(super) struct Scene {
+    pub(super) view: Arc<View>,
+    table: TransportTable,
+}
+
+impl Scene {
+    pub(super) fn read(inputs: &[Blob], context: &RunContext) -> Result<Self, NodeFailure> {
+        let Some((view, shards)) = inputs.split_first() else {
+            return Err(NodeFailure::new("expected a view and a transport table, found no input"));
+        };
+        let view = context.decoded(view, View::decode)?;
+        let table = concatenated(view.model, shards, context)?;
+        if table.pixels != view.pixels.len() {
+            let (expected, found) = (view.pixels.len(), table.pixels);
+            return Err(NodeFailure::new(format!("expected a table of {expected} pixels, found {found}")));
+        }
+        Ok(Self { view, table })
+    }
+
+    pub(super) fn full(&self) -> FullView<'_> {
+        let View { model, pixels, coverage, stride, width, height, .. } = &*self.view;
+        let (stride, width, height) = (*stride, *width, *height);
+        FullView { model: *model, table: &self.table, pixels, coverage, stride, width, height }
+    }
+}
+
+impl View {
+    pub(super) fn decode(bytes: &[u8]) -> Result<Self, NodeFailure> {
+        let wire: ViewWire = read("view", bytes)?;
+        let photo: Image = wire.photo.image()?;
+        let model = brdf::model(&wire.model).map_err(|error| NodeFailure::new(error.to_string()))?;
+        let scored: Vec<f32> = wire.coverage.iter().map(|&c| if c > 0.0 { 1.0 } else { 0.0 }).collect();
+        let judge = Judge::new(&photo, &scored, wire.exposure, &JudgeOptions::default())
+            .map_err(|error| NodeFailure::new(format!("the photo cannot be judged: {error}")))?;
+        let (width, height) = (photo.width(), photo.height());
+        let stride = wire.stride.max(1);
+        let outside = |p: &&Pixel| (p[0] / stride) as usize >= width || (p[1] / stride) as usize >= height;
+        if let Some(p) = wire.pixels.iter().find(outside) {
+            return Err(NodeFailure::new(format!("pixel {p:?} lies outside the {width} x {height} photo")));
+        }
+        let by = if wire.judge_object { JudgedBy::Object } else { JudgedBy::Image };
+        Ok(Self { model, judge, by, photo, pixels: wire.pixels, coverage: wire.coverage, stride, width, height })
+    }
+}
+
+/// The table of consecutive shards, made for the lobes of `model`.
+pub(super) fn concatenated(
+    model: &dyn Model,
+    shards: &[Blob],
+    context: &RunContext,
+) -> Result<TransportTable, NodeFailure> {
+    let tables = shards
+        .iter()
+        .map(|shard| context.decoded(shard, |bytes| read::<TableWire>("transport table", bytes)?.table()))
+        .collect::<Result<Vec<_>, _>>()?;
+    let tables: Vec<&TransportTable> = tables.iter().map(|table| &**table).collect();
+    joined(model, &tables)
+}
+
+/// The table of consecutive shards that are decoded already.
+pub(crate) fn joined(model: &dyn Model, shards: &[&TransportTable]) -> Result<TransportTable, NodeFailure> {
+    let fits = |table: &TransportTable| {
+        let lobes = table.lobes.iter().zip(model.lobes());
+        table.lobes.len() == model.lobes().len()
+            && lobes
+                .into_iter()
+                .all(|(t, basis)| t.terms == lobe_terms(basis.lobe) && t.knots.is_some() == basis.width.is_some())
+    };
+    TransportTable::concatenate(shards).filter(fits).ok_or_else(|| {
+        NodeFailure::new(format!(
+            "the shards of a transport table do not belong together or to {}, or there are none",
+            model.name()
+        ))
+    })
+}

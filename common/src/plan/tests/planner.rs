@@ -1,0 +1,125 @@
+//! What the planner makes of outputs: the same in any order, and nothing of wrong ones.
+
+use crate::{
+    fit::{
+        Candidate,
+        tests::scene::{Bench, capture, method},
+    },
+    graph::{Blob, NodeSpec, PlanError},
+    math::{cell, sampling},
+    nodes::{
+        self,
+        wire::{CandidateWire, TableWire, read, write},
+    },
+    plan::FitPlanner,
+    render::{knots::Knots, table::TransportTable},
+    scene::Capture,
+};
+use std::sync::{Arc, OnceLock};
+
+/// A GGX material within the model's range.
+const MATERIAL: [f64; 7] = [0.3, 0.2, 0.1, 0.05, 0.05, 0.05, 0.2];
+
+/// A photo of the material, taken once for all tests.
+fn photo() -> Arc<Capture> {
+    static PHOTO: OnceLock<Arc<Capture>> = OnceLock::new();
+    Arc::clone(PHOTO.get_or_init(|| capture("ggx", &MATERIAL, 0.02)))
+}
+
+fn planner(subsets: u32) -> FitPlanner {
+    let method = crate::fit::Method { subsets, ..method("ggx") };
+    FitPlanner::new(photo(), method, 1.0).unwrap().also_render(&[1.0])
+}
+
+fn first(_: usize) -> usize {
+    0
+}
+
+fn unchanged(_: &NodeSpec, output: Blob) -> Blob {
+    output
+}
+
+/// Changes the candidate of gamma 2.
+fn with_candidate(change: impl Fn(&mut Candidate)) -> impl Fn(&NodeSpec, Blob) -> Blob {
+    move |spec, output| {
+        if spec.label != "search gamma 2" {
+            return output;
+        }
+        let model = method("ggx").model;
+        let mut candidate = read::<CandidateWire>("candidate", &output).unwrap().candidate(model).unwrap();
+        change(&mut candidate);
+        Blob::new(write("candidate", &CandidateWire::of(&candidate)).unwrap())
+    }
+}
+
+fn refusal(change: impl Fn(&mut Candidate)) -> Option<(String, f64, f64)> {
+    match Bench::default().run(planner(1), first, with_candidate(change)) {
+        Err(PlanError::NotVerified { what, claimed, recomputed }) => Some((what, claimed, recomputed)),
+        Err(other) => panic!("{other}"),
+        Ok(_) => None,
+    }
+}
+
+#[test]
+fn a_search_result_whose_cost_is_off_by_one_unit_in_the_last_place_is_refused() {
+    let (what, claimed, recomputed) = refusal(|c| c.cost = f64::from_bits(c.cost.to_bits() + 1)).unwrap();
+    assert_eq!(what, "the cost of gamma 2");
+    assert_eq!(claimed.to_bits(), recomputed.to_bits() + 1);
+}
+
+#[test]
+fn a_search_result_with_other_parameters_and_the_old_cost_is_refused() {
+    let (_, claimed, recomputed) = refusal(|c| c.parameters[0] += 1e-3).unwrap();
+    assert!(recomputed > claimed, "a minimum was claimed: {claimed} {recomputed}");
+    assert_eq!(refusal(|_| {}), None);
+}
+
+/// What the planner says when the first shard of the subset's table is changed.
+fn refused_shard(change: impl Fn(&mut TransportTable)) -> String {
+    let changed = |spec: &NodeSpec, output: Blob| {
+        if spec.kind != nodes::TRANSPORT {
+            return output;
+        }
+        let mut table = read::<TableWire>("transport table", &output).unwrap().table().unwrap();
+        change(&mut table);
+        Blob::new(write("transport table", &TableWire::of(table)).unwrap())
+    };
+    match Bench::default().run(planner(1), first, changed) {
+        Err(error @ PlanError::WrongOutput { .. }) => error.to_string(),
+        other => panic!("{:?}", other.map(|_| ())),
+    }
+}
+
+#[test]
+fn a_table_that_was_not_asked_for_is_refused() {
+    let said = refused_shard(|table| {
+        table.pixels -= 1;
+        for lobe in &mut table.lobes {
+            lobe.values.truncate(lobe.slices() * lobe.terms * 3 * table.pixels);
+        }
+    });
+    assert!(said.contains("pixels, found"), "{said}");
+    let said = refused_shard(|table| table.lobes[0].values[0] = f32::NAN);
+    assert!(said.contains("finite radiance, found NaN"), "{said}");
+    let said = refused_shard(|table| table.lobes[1].knots = Some(Knots::covering(0.01, 1.0, 6.9)));
+    assert!(said.contains("found"), "{said}");
+}
+
+#[test]
+fn the_outcome_does_not_depend_on_the_order_in_which_nodes_finish() {
+    let mut bench = Bench::default();
+    let mut outcome = |pick: &mut dyn FnMut(usize) -> usize| {
+        let outcome = bench.run(planner(2), pick, unchanged).unwrap().into_outcome().unwrap();
+        format!("{outcome:?}")
+    };
+    let in_order = outcome(&mut |_| 0);
+    assert_eq!(in_order, outcome(&mut |ready| ready - 1));
+    for seed in 0..6 {
+        let mut draw = 0;
+        let mut random = |ready: usize| {
+            draw += 1;
+            cell(sampling::uniform(sampling::key(&[seed, draw])) * ready as f64, ready)
+        };
+        assert_eq!(in_order, outcome(&mut random), "order {seed}");
+    }
+}

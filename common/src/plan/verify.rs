@@ -1,0 +1,151 @@
+//! Trust in what nodes return, which may have run on a worker. A shard of a transport table has to be of the shape that was asked
+//! for, with finite values (whether they are right, only another computation can tell). The cost of every candidate is computed again,
+//! here, on the table that its search read (design section 8). The cost is a pure function of the table and the parameters, so it has
+//! to be the same to the bit; one evaluation costs a thousandth of a search. Scores, parameters and pictures have to be possible ones.
+
+use super::other;
+use crate::{
+    brdf::Model,
+    fit::{Candidate, Objective, Polished},
+    graph::{Blob, GraphEdit, Input, NodeId, PlanError},
+    nodes::{
+        AppraisedWire, joined,
+        wire::{PolishedWire, ScoresWire, TableWire, read},
+    },
+    plan::Appraisal,
+    render::{
+        knots::{self, Knots},
+        table::TransportTable,
+    },
+};
+use std::{
+    collections::{BTreeMap, btree_map::Entry},
+    fmt::Display,
+};
+
+/// The decoded tables of pixel subsets, by the number of the subset.
+#[derive(Debug, Default)]
+pub(super) struct SubsetTables(BTreeMap<usize, TransportTable>);
+
+impl SubsetTables {
+    /// The table of subset `s`, which the node `search` reads: of its inputs, those that are outputs are the shards.
+    pub(super) fn get(
+        &mut self,
+        s: usize,
+        model: &dyn Model,
+        search: NodeId,
+        graph: &GraphEdit<'_>,
+    ) -> Result<&TransportTable, PlanError> {
+        Ok(match self.0.entry(s) {
+            Entry::Occupied(known) => known.into_mut(),
+            Entry::Vacant(unknown) => unknown.insert(table_of(model, search, graph)?),
+        })
+    }
+
+    /// Lets the table of subset `s` go.
+    pub(super) fn forget(&mut self, s: usize) {
+        self.0.remove(&s);
+    }
+}
+
+fn table_of(model: &dyn Model, search: NodeId, graph: &GraphEdit<'_>) -> Result<TransportTable, PlanError> {
+    let inputs = &graph.spec(search).ok_or_else(missing)?.inputs;
+    let shard = |shard: NodeId| {
+        let blob = graph.output(shard);
+        read::<TableWire>("transport table", blob.ok_or_else(missing)?).and_then(TableWire::table).map_err(other)
+    };
+    let shards = inputs.iter().filter_map(Input::node).map(shard).collect::<Result<Vec<_>, _>>()?;
+    joined(model, &shards.iter().collect::<Vec<_>>()).map_err(other)
+}
+
+/// A part of a transport table, as it was asked for.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Shard {
+    /// How many pixels.
+    pub(super) pixels: usize,
+    /// The grid of widths of the main lobe.
+    pub(super) knots: Knots,
+}
+
+/// Refuses a part of a transport table that is not the one that was asked for.
+pub(super) fn check_shard(model: &dyn Model, asked: Shard, output: &Blob) -> Result<(), PlanError> {
+    let of_model = || format!("a transport table of {}", model.name());
+    let table = read::<TableWire>("transport table", output)
+        .and_then(TableWire::table)
+        .and_then(|table| joined(model, &[&table]))
+        .map_err(|failure| wrong(of_model(), &failure))?;
+    if table.pixels != asked.pixels {
+        return Err(wrong(format!("{} pixels", asked.pixels), &table.pixels));
+    }
+    for (lobe, expected) in table.lobes.iter().zip(knots::of_lobes(model, asked.knots)) {
+        if lobe.knots != expected {
+            return Err(wrong(format!("widths on {expected:?}"), &format!("{:?}", lobe.knots)));
+        }
+    }
+    match table.lobes.iter().flat_map(|lobe| &lobe.values).find(|value| !value.is_finite()) {
+        Some(value) => Err(wrong("finite radiance", value)),
+        None => Ok(()),
+    }
+}
+
+/// The scores of `count` candidates, the whole image's and the object's.
+pub(super) fn scores(output: &Blob, count: usize) -> Result<Vec<(f64, f64)>, PlanError> {
+    let ScoresWire(scores) = read("scores", output).map_err(|failure| wrong("scores", &failure))?;
+    if scores.len() != count {
+        return Err(wrong(format!("{count} scores"), &scores.len()));
+    }
+    scores.iter().try_for_each(|(image, object)| check_score(*image).and_then(|()| check_score(*object)))?;
+    Ok(scores)
+}
+
+/// The outcome of a search on the score that may have evaluated it so often.
+pub(super) fn polished(model: &dyn Model, output: &Blob, most: usize) -> Result<Polished, PlanError> {
+    let polished = read::<PolishedWire>("polish", output).and_then(|wire| wire.polished(model));
+    let polished = polished.map_err(|failure| wrong("parameters with their scores", &failure))?;
+    check_score(polished.cssim)?;
+    check_score(polished.cssim_object)?;
+    if polished.evaluations > most {
+        return Err(wrong(format!("at most {most} evaluations"), &polished.evaluations));
+    }
+    Ok(polished)
+}
+
+/// The appraisals of so many points, for so many gammas.
+pub(super) fn appraisals(output: &Blob, points: usize, gammas: usize) -> Result<Vec<Appraisal>, PlanError> {
+    let AppraisedWire(appraised) = read("appraisals", output).map_err(|failure| wrong("appraisals", &failure))?;
+    if appraised.len() != points {
+        return Err(wrong(format!("{points} appraisals"), &appraised.len()));
+    }
+    let checked = |(cssim, cssim_object, costs): (f64, f64, Vec<f64>)| {
+        check_score(cssim)?;
+        check_score(cssim_object)?;
+        if costs.len() != gammas {
+            return Err(wrong(format!("{gammas} costs"), &costs.len()));
+        }
+        costs.iter().try_for_each(|cost| check_score(*cost))?;
+        Ok(Appraisal { cssim, cssim_object, costs })
+    };
+    appraised.into_iter().map(checked).collect()
+}
+
+fn check_score(score: f64) -> Result<(), PlanError> {
+    if score.is_finite() && score >= 0.0 { Ok(()) } else { Err(wrong("a score at or above 0", &score)) }
+}
+
+/// The output of a worker is not one of its node.
+pub(super) fn wrong(expected: impl Into<String>, found: &dyn Display) -> PlanError {
+    PlanError::WrongOutput { expected: expected.into(), found: found.to_string() }
+}
+
+fn missing() -> PlanError {
+    PlanError::new("a search has finished whose table is not there: a mistake in the plan, please report it")
+}
+
+/// Refuses a candidate whose cost is not the one that its parameters have.
+pub(super) fn check_cost(candidate: &Candidate, objective: &mut Objective<'_>) -> Result<(), PlanError> {
+    let (claimed, recomputed) = (candidate.cost, objective.cost(&candidate.parameters));
+    if claimed.to_bits() == recomputed.to_bits() {
+        return Ok(());
+    }
+    Err(PlanError::NotVerified { what: format!("the cost of gamma {}", candidate.gamma), claimed, recomputed })
+}

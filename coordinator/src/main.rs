@@ -1,7 +1,0 @@
-//! `lookalike`: everything is in the library.
-
-use std::process::ExitCode;
-
-fn main() -> ExitCode {
-    lookalike_coordinator::main()
-}

@@ -1,0 +1,100 @@
+//! The report of a study: from what was measured to pages, figures and files that a program reads.
+//!
+//! Every word that judges and every number is computed from the data. A section whose data the study does not hold says what
+//! its file would need; nothing is drawn from what is not there.
+
+mod chart;
+mod differences;
+mod document;
+mod html;
+mod markdown;
+pub mod measured;
+mod results;
+mod section;
+mod statistics;
+mod study;
+mod text;
+mod verdict;
+
+#[cfg(test)]
+mod tests;
+
+use crate::measured::StudyData;
+use anyhow::Context;
+use document::{Block, Section};
+use std::{collections::BTreeSet, fs, io::ErrorKind, path::Path};
+use study::Study;
+
+/// The heading of both pages.
+const TITLE: &str = "Lookalike against Bieron and Peers 2020";
+
+/// Writes the report into `out`: `results.md`, `report.html`, `results.json`, `data.json` and `figures/`; the pictures that
+/// it shows are in `out/pictures/` already, where it adds those of differences.
+///
+/// # Errors
+/// Where a file cannot be read or written.
+pub fn write(data: &StudyData, out: &Path) -> anyhow::Result<()> {
+    let pictures = out.join("pictures");
+    let mut names = names(&pictures)?;
+    differences::write(&pictures, &mut names)?;
+    let study = Study::new(data, names);
+    let sections = section::all(&study)?;
+    let lead = lead(&study);
+    let figures = out.join("figures");
+    fs::create_dir_all(&figures).with_context(|| format!("cannot make the folder {}", figures.display()))?;
+    for (name, text) in figure_files(&sections) {
+        file(&figures, &name, text)?;
+    }
+    file(out, "results.json", results::json(&study)?)?;
+    file(out, "data.json", results::data(data)?)?;
+    file(out, "results.md", markdown::page(TITLE, &lead, &sections))?;
+    file(out, "report.html", html::page(TITLE, &lead, &sections, &pictures)?)
+}
+
+/// What the study is of, in two sentences.
+fn lead(study: &Study<'_>) -> String {
+    let about = &study.data.about;
+    let probes: Vec<String> = about.probes.iter().map(|probe| text::light(probe).to_owned()).collect();
+    format!(
+        "The tables and figures of the paper, measured again by lookalike study {} on {} under {}, at {size} x {size} \
+         pixels. CSSIM is a difference: 0 is a perfect match, and lower is better.",
+        about.version,
+        text::count(about.materials.len(), "material"),
+        text::list(&probes),
+        size = about.size,
+    )
+}
+
+/// The drawings and the data of all sections, by file name.
+fn figure_files(sections: &[Section]) -> Vec<(String, &str)> {
+    let blocks = sections.iter().flat_map(|section| &section.blocks);
+    blocks
+        .flat_map(|block| match block {
+            Block::Figure(figure) => vec![
+                (format!("{}.svg", figure.csv.stem), figure.svg.as_str()),
+                (format!("{}.csv", figure.csv.stem), figure.csv.text.as_str()),
+            ],
+            Block::Data(csv) => vec![(format!("{}.csv", csv.stem), csv.text.as_str())],
+            _ => Vec::new(),
+        })
+        .collect()
+}
+
+/// Names of the files in a folder; none where there is no folder.
+fn names(folder: &Path) -> anyhow::Result<BTreeSet<String>> {
+    let cannot = || format!("cannot list the pictures in {}", folder.display());
+    match fs::read_dir(folder) {
+        Err(error) if error.kind() == ErrorKind::NotFound => Ok(BTreeSet::new()),
+        Err(error) => Err(error).with_context(cannot),
+        Ok(entries) => {
+            entries.map(|entry| Ok(entry.with_context(cannot)?.file_name().to_string_lossy().into_owned())).collect()
+        }
+    }
+}
+
+/// Writes beside the file and puts it in its place when it is whole: who reads meanwhile sees the old report or the new one.
+fn file(folder: &Path, name: &str, content: impl AsRef<[u8]>) -> anyhow::Result<()> {
+    let (path, part) = (folder.join(name), folder.join(format!("{name}.part")));
+    let written = fs::write(&part, content).and_then(|()| fs::rename(&part, &path));
+    written.with_context(|| format!("cannot write {}", path.display()))
+}
