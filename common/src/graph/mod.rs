@@ -22,6 +22,7 @@ mod blob;
 mod context;
 mod decoded;
 mod edit;
+mod error;
 mod in_process;
 mod key;
 mod many;
@@ -36,6 +37,7 @@ pub use blob::{Blob, BlobHash, HashMismatch, MAX_BLOB_BYTES};
 pub use context::RunContext;
 pub use decoded::DecodedCache;
 pub use edit::GraphEdit;
+pub use error::PlanError;
 pub use in_process::{Execution, run_in_process};
 pub use key::NodeKey;
 use many::part_label;
@@ -44,7 +46,7 @@ pub use node::{
     FailureReason, Input, MAX_INPUTS, MAX_NAME_BYTES, MAX_PARAMETER_BYTES, NodeFailure, NodeId, NodeSpec, Placement,
     WorkerId,
 };
-pub use planner::{PlanError, Planner};
+pub use planner::Planner;
 pub use registry::{NodeType, Registry};
 pub use state::{Change, Completion, Graph, NodeState};
 

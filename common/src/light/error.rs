@@ -1,7 +1,5 @@
 //! What can be wrong with an environment map.
 
-use super::Mapping;
-
 /// A fault in an environment map or its description.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -52,7 +50,7 @@ pub enum LightError {
     )]
     Shape {
         /// The layout asked for.
-        mapping: Mapping,
+        mapping: &'static str,
         /// The shape it asks for.
         expected: &'static str,
         /// Columns found.

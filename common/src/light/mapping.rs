@@ -70,7 +70,7 @@ impl Mapping {
             }
             Self::Angular | Self::MirrorBall => (width >= 2 && width == height, "square, cropped to the ball"),
         };
-        if fits { Ok(()) } else { Err(LightError::Shape { mapping: self, expected, width, height }) }
+        if fits { Ok(()) } else { Err(LightError::Shape { mapping: self.name(), expected, width, height }) }
     }
 
     /// Where a direction (unit) is seen in the image: x from 0 at the left edge to 1 at the right, y from 0 at the top.

@@ -1,6 +1,7 @@
 //! How the photo was taken.
 
 use super::SceneError;
+use super::limits::{LEAST_FOV_DEG, MOST_FOV_DEG};
 use crate::math::Vec3;
 use crate::math::elementary::tan;
 
@@ -87,11 +88,6 @@ impl Pinhole {
         Vec3::new(x - self.x, self.y - y, -self.focal_px).normalize()
     }
 }
-
-/// A telephoto lens of 0.1 degrees sees parallel rays to 1e-3 radians.
-pub(super) const LEAST_FOV_DEG: f64 = 0.1;
-/// Beyond this a flat image plane is no longer a camera anyone has.
-pub(super) const MOST_FOV_DEG: f64 = 170.0;
 
 #[cfg(test)]
 mod tests {

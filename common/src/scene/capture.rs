@@ -1,6 +1,6 @@
 //! The photo with everything known about it: which pixels show the object, which can be fitted to, and the light.
 
-use super::{Geometry, Mask, SceneError};
+use super::{Geometry, Mask, PixelCounts, PixelStatus, SceneError, limits::LEAST_SIDE};
 use crate::image::Image;
 use crate::light::Environment;
 use crate::math::{luminance, widen};
@@ -35,40 +35,6 @@ pub struct CaptureInput {
     pub environment: Arc<Environment>,
 }
 
-/// Whether a pixel can be fitted to, and if not, the first reason that applies, in this order.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum PixelStatus {
-    /// Shows nothing but the object, with a known value.
-    Usable,
-    /// The geometry leaves it free.
-    Outside,
-    /// The mask says background, or, inside the object, not wholly object.
-    Masked,
-    /// The photo's value is infinite or not a number.
-    NotFinite,
-    /// The object's edge runs through it.
-    Silhouette,
-    /// The photo's value is at the limit of what its file could hold.
-    Clipped,
-}
-
-/// How many pixels have each [`PixelStatus`].
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct PixelCounts {
-    /// [`PixelStatus::Usable`]
-    pub usable: usize,
-    /// [`PixelStatus::Outside`]
-    pub outside: usize,
-    /// [`PixelStatus::Masked`]
-    pub masked: usize,
-    /// [`PixelStatus::NotFinite`]
-    pub not_finite: usize,
-    /// [`PixelStatus::Silhouette`]
-    pub silhouette: usize,
-    /// [`PixelStatus::Clipped`]
-    pub clipped: usize,
-}
-
 impl Capture {
     /// Checks the parts against each other and classifies every pixel.
     ///
@@ -85,7 +51,7 @@ impl Capture {
     pub fn new(input: CaptureInput) -> Result<Self, SceneError> {
         let CaptureInput { mut photo, clipped, mask, geometry, environment } = input;
         let (width, height) = (photo.width(), photo.height());
-        if width < super::geometry::LEAST_SIDE || height < super::geometry::LEAST_SIDE {
+        if width < LEAST_SIDE || height < LEAST_SIDE {
             return Err(SceneError::TooSmall { width, height });
         }
         check_size("geometry", &photo, [geometry.width(), geometry.height()])?;
@@ -225,33 +191,6 @@ impl Capture {
     fn brighter_than_the_light(&self) -> usize {
         let limit = self.environment.max_radiance() * 1.01;
         self.usable().filter(|&index| widen(self.photo.pixels()[index]).cmpgt(limit).any()).count()
-    }
-}
-
-impl PixelCounts {
-    fn of(status: &[PixelStatus]) -> Self {
-        status.iter().fold(Self::default(), |mut counts, status| {
-            *match status {
-                PixelStatus::Usable => &mut counts.usable,
-                PixelStatus::Outside => &mut counts.outside,
-                PixelStatus::Masked => &mut counts.masked,
-                PixelStatus::NotFinite => &mut counts.not_finite,
-                PixelStatus::Silhouette => &mut counts.silhouette,
-                PixelStatus::Clipped => &mut counts.clipped,
-            } += 1;
-            counts
-        })
-    }
-}
-
-impl std::fmt::Display for PixelCounts {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let Self { usable, outside, masked, not_finite, silhouette, clipped } = self;
-        write!(
-            f,
-            "{usable} usable, {outside} outside the object, {masked} masked, {not_finite} not finite, {silhouette} on \
-             the silhouette, {clipped} clipped"
-        )
     }
 }
 

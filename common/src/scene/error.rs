@@ -7,7 +7,7 @@ use super::PixelCounts;
 #[non_exhaustive]
 pub enum SceneError {
     /// The photo is too small to show anything.
-    #[error("the photo is {width} x {height}: expected at least {least} x {least} pixels", least = super::geometry::LEAST_SIDE)]
+    #[error("the photo is {width} x {height}: expected at least {least} x {least} pixels", least = super::limits::LEAST_SIDE)]
     TooSmall {
         /// Columns found.
         width: usize,
@@ -39,7 +39,7 @@ pub enum SceneError {
     },
     /// A camera that cannot be one.
     #[error("`{found}` is not a camera: expected orthographic, or perspective:FOV_DEG with a vertical field of view between {least} and {most} degrees",
-        least = super::camera::LEAST_FOV_DEG, most = super::camera::MOST_FOV_DEG)]
+        least = super::limits::LEAST_FOV_DEG, most = super::limits::MOST_FOV_DEG)]
     Camera {
         /// What was given.
         found: String,
@@ -74,7 +74,7 @@ pub enum SceneError {
     /// The mask leaves nothing to fit a circle to.
     #[error(
         "the mask covers {covered:.1} pixels: expected at least {least}; white is the object and black the background",
-        least = super::fit::LEAST_AREA
+        least = super::limits::LEAST_AREA
     )]
     EmptyMask {
         /// Sum of the mask.

@@ -5,6 +5,7 @@
 //! one pixel. Only pixels on the edge have a gradient, so holes inside and specks outside do not move the circle, and a
 //! notch moves it little; parts of the disk outside the photo are simply not seen.
 
+use super::limits::LEAST_AREA;
 use super::{Circle, Mask, SceneError};
 use crate::math::{Mat3, Vec3};
 use std::f64::consts::PI;
@@ -89,9 +90,6 @@ fn mismatch(mask: &Mask, circle: Circle) -> f64 {
     }
     difference / sum
 }
-
-/// Pixels of coverage below which a circle means nothing.
-pub(super) const LEAST_AREA: f64 = 20.0;
 
 /// Steps per edge width; they converge quadratically within a few.
 const STEPS: usize = 30;

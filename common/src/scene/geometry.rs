@@ -1,19 +1,10 @@
 //! The surface in the photo, whatever its kind: what rendering asks for.
 
 use super::coverage::pixel_coverage;
-use super::{Camera, Circle, NormalMap, SceneError, Sphere};
+use super::limits::LEAST_SIDE;
+use super::{Camera, Circle, NormalMap, SceneError, Sphere, SurfacePoint};
 use crate::image::Image;
-use crate::math::Vec3;
 use crate::math::arctangent::angle;
-
-/// A point of the surface as the camera sees it. The normal faces the camera: `normal . view > 0`.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SurfacePoint {
-    /// Unit normal, world.
-    pub normal: Vec3,
-    /// Unit vector towards the camera, world.
-    pub view: Vec3,
-}
 
 /// An object as it lies in a photo of a given size.
 #[derive(Debug, Clone, PartialEq)]
@@ -144,9 +135,6 @@ impl Geometry {
 fn check_size(width: usize, height: usize) -> Result<(), SceneError> {
     if width < LEAST_SIDE || height < LEAST_SIDE { Err(SceneError::TooSmall { width, height }) } else { Ok(()) }
 }
-
-/// Pixels along the shorter side of the smallest photo.
-pub(super) const LEAST_SIDE: usize = 2;
 
 #[cfg(test)]
 mod tests;
