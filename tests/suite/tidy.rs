@@ -2,6 +2,7 @@
 //! touch, what keeps results the same on every machine, what a file looks like. Each reads the sources; each message
 //! says where and what to do instead. ARCHITECTURE.md states the same rules in prose.
 
+mod circles;
 mod contracts;
 mod documents;
 mod files;
@@ -205,22 +206,32 @@ fn state_machines_know_neither_sockets_nor_clocks() {
     none("state changes are plain functions of (state, event)", offences);
 }
 
+/// What each member may import of ours, its tests left aside. A name that ends with `::` stands for everything in it.
+const MEMBERS_MAY_IMPORT: [(&str, &[&str]); 3] = [
+    ("worker/src/", &["lookalike::graph::", "lookalike::protocol::"]),
+    ("coordinator/src/", &["lookalike::graph::", "lookalike::protocol::", "lookalike_worker::"]),
+    ("report/src/", &["lookalike::brdf::", "lookalike::image::", "lookalike::math::"]),
+];
+
 #[test]
-fn the_worker_knows_nothing_of_rendering() {
+fn members_import_what_their_role_allows() {
+    const OURS: [&str; 5] =
+        ["lookalike", "lookalike_app", "lookalike_coordinator", "lookalike_report", "lookalike_worker"];
     let mut offences = Vec::new();
-    let inside = |path: &str| path.starts_with("worker/src/") && path != "worker/src/main.rs";
-    for source in sources().iter().filter(|source| inside(&source.path)) {
-        for found in paths(&source.code, "lookalike") {
-            if !found.name.starts_with("lookalike::graph") && !found.name.starts_with("lookalike::protocol") {
-                offences.push(at(
-                    source,
-                    &found,
-                    "(a worker runs what its registry holds; only main.rs names node types)",
-                ));
+    for source in sources().iter().filter(|source| source.path != "worker/src/main.rs") {
+        let of = MEMBERS_MAY_IMPORT.iter().find(|(member, _)| source.path.starts_with(member));
+        let Some((_, allowed)) = of else { continue };
+        for found in OURS.iter().flat_map(|root| paths(&source.code, root)) {
+            let name = format!("{}::", found.name);
+            if !allowed.iter().any(|allowed| name.starts_with(allowed)) {
+                offences.push(at(source, &found, &format!("(its member may import {allowed:?})")));
             }
         }
     }
-    none("the worker's library imports graph and protocol only", offences);
+    none(
+        "worker and coordinator know no rendering, only worker/src/main.rs names node types, and the report reads rows",
+        offences,
+    );
 }
 
 #[test]
