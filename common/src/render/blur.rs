@@ -11,7 +11,7 @@
 //!
 //! Their means follow from three quadratic forms of `S`.
 
-use super::{cut::Point, pyramid::Node};
+use super::{point::Point, pyramid::Node};
 use crate::{
     brdf::{Angles, Spread},
     math::{Vec3, frame::Frame, widen},

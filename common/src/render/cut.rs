@@ -7,6 +7,7 @@
 
 use super::{
     blur::{LEAST_COS_D, seen_from},
+    point::Point,
     pyramid::{Cell, LightPyramid, Node, strongest},
 };
 use crate::{
@@ -32,26 +33,6 @@ impl Band {
             Self::Diffuse(_) => 1.0,
             Self::Glossy(lower, ..) => lower,
         }
-    }
-}
-
-/// A surface point: unit normal and direction to the viewer, world space.
-#[derive(Debug, Clone, Copy)]
-pub struct Point {
-    /// Surface normal.
-    pub normal: Vec3,
-    /// Towards the viewer.
-    pub view: Vec3,
-    /// Their cosine, positive.
-    pub cos_o: f64,
-}
-
-impl Point {
-    /// A point seen from above the surface; `None` when the view is not above the horizon.
-    #[must_use]
-    pub fn new(normal: Vec3, view: Vec3) -> Option<Self> {
-        let cos_o = normal.dot(view);
-        (cos_o > 0.0).then_some(Self { normal, view, cos_o })
     }
 }
 

@@ -12,6 +12,7 @@ pub mod footprint;
 pub mod image;
 pub mod integrator;
 pub mod knots;
+pub mod point;
 pub mod pyramid;
 pub mod subset;
 pub mod table;

@@ -2,9 +2,10 @@
 //! pyramid.
 
 use super::{
-    cut::{Band, Cut, Point},
+    cut::{Band, Cut},
     footprint::{self, Position},
     knots::{self, Knots},
+    point::Point,
     pyramid::LightPyramid,
     table::{LobeTable, TransportTable},
 };
