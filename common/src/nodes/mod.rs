@@ -7,6 +7,7 @@
 mod appraise;
 mod brute_force;
 mod explore;
+mod kinds;
 mod polish;
 mod render;
 mod report;
@@ -20,6 +21,7 @@ use crate::graph::Registry;
 
 pub(crate) use appraise::{AppraiseParameters, AppraisedWire};
 pub(crate) use brute_force::BruteForceParameters;
+pub(crate) use kinds::{APPRAISE, BRUTE_FORCE, EXPLORE, POLISH, RENDER, REPORT, SEARCH, SELECT, TRANSPORT};
 pub(crate) use polish::PolishParameters;
 pub(crate) use render::{RenderParameters, RenderedWire};
 pub(crate) use report::{ReportParameters, ReportWire};
@@ -42,13 +44,3 @@ pub fn registry() -> Registry {
         .with(brute_force::BruteForce)
         .with(appraise::Appraise)
 }
-
-pub(crate) const TRANSPORT: &str = "transport";
-pub(crate) const SEARCH: &str = "search";
-pub(crate) const SELECT: &str = "select";
-pub(crate) const EXPLORE: &str = "explore";
-pub(crate) const POLISH: &str = "polish";
-pub(crate) const REPORT: &str = "report";
-pub(crate) const RENDER: &str = "render";
-pub(crate) const BRUTE_FORCE: &str = "brute-force";
-pub(crate) const APPRAISE: &str = "appraise";
