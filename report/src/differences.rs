@@ -30,7 +30,7 @@ pub(super) fn write(folder: &Path, names: &mut BTreeSet<String>) -> anyhow::Resu
             let name = file(&format!("difference-{what}"));
             let image = difference(&photo, &read(folder, &file(what))?)
                 .with_context(|| format!("the pictures {} and {} differ in size", file("photo"), file(what)))?;
-            super::file(folder, &name, png::write(&image, &[])?)?;
+            crate::folder::file(folder, &name, png::write(&image, &[])?)?;
             names.insert(name);
         }
     }

@@ -6,6 +6,7 @@
 mod chart;
 mod differences;
 mod document;
+mod folder;
 mod html;
 mod markdown;
 pub mod measured;
@@ -22,7 +23,8 @@ mod tests;
 use crate::measured::StudyData;
 use anyhow::Context;
 use document::{Block, Section};
-use std::{collections::BTreeSet, fs, io::ErrorKind, path::Path};
+use folder::file;
+use std::{fs, path::Path};
 use study::Study;
 
 /// The heading of both pages.
@@ -35,7 +37,7 @@ const TITLE: &str = "Lookalike against Bieron and Peers 2020";
 /// Where a file cannot be read or written.
 pub fn write(data: &StudyData, out: &Path) -> anyhow::Result<()> {
     let pictures = out.join("pictures");
-    let mut names = names(&pictures)?;
+    let mut names = folder::names(&pictures)?;
     differences::write(&pictures, &mut names)?;
     let study = Study::new(data, names);
     let sections = section::all(&study)?;
@@ -78,23 +80,4 @@ fn figure_files(sections: &[Section]) -> Vec<(String, &str)> {
             _ => Vec::new(),
         })
         .collect()
-}
-
-/// Names of the files in a folder; none where there is no folder.
-fn names(folder: &Path) -> anyhow::Result<BTreeSet<String>> {
-    let cannot = || format!("cannot list the pictures in {}", folder.display());
-    match fs::read_dir(folder) {
-        Err(error) if error.kind() == ErrorKind::NotFound => Ok(BTreeSet::new()),
-        Err(error) => Err(error).with_context(cannot),
-        Ok(entries) => {
-            entries.map(|entry| Ok(entry.with_context(cannot)?.file_name().to_string_lossy().into_owned())).collect()
-        }
-    }
-}
-
-/// Writes beside the file and puts it in its place when it is whole: who reads meanwhile sees the old report or the new one.
-fn file(folder: &Path, name: &str, content: impl AsRef<[u8]>) -> anyhow::Result<()> {
-    let (path, part) = (folder.join(name), folder.join(format!("{name}.part")));
-    let written = fs::write(&part, content).and_then(|()| fs::rename(&part, &path));
-    written.with_context(|| format!("cannot write {}", path.display()))
 }
