@@ -15,6 +15,7 @@ use thiserror::Error;
 
 use super::{
     Blob, FailureReason, GraphEdit, NodeId, NodeSpec, PlanError, Planner,
+    part_label::split_label,
     sharing::{PartId, Sharing},
 };
 
@@ -23,7 +24,7 @@ use super::{
 pub struct Part<P> {
     /// Its number, which no other part has: parts of lower numbers go first.
     pub number: u32,
-    /// Its name, which goes before the labels of its nodes. Without ": "; at most [`MAX_PART_NAME_BYTES`].
+    /// Its name, which goes before the labels of its nodes. Without ": "; at most [`MAX_PART_NAME_BYTES`](super::MAX_PART_NAME_BYTES).
     pub name: String,
     /// What plans its nodes.
     pub planner: P,
@@ -229,24 +230,6 @@ impl<S: Parts> Planner for Many<S> {
     fn is_verified_by_repetition(&self, spec: &NodeSpec) -> bool {
         self.active.get(&spec.priority).is_none_or(|part| part.planner.is_verified_by_repetition(spec))
     }
-}
-
-/// The longest name of a part, in bytes: with the label of a node behind it, it stays within
-/// [`MAX_NAME_BYTES`](super::MAX_NAME_BYTES).
-pub const MAX_PART_NAME_BYTES: usize = 160;
-
-/// What lies between the name of a part and the label of one of its nodes.
-const SEPARATOR: &str = ": ";
-
-/// The label of a node of a part.
-pub(super) fn part_label(part: &str, label: &str) -> String {
-    format!("{part}{SEPARATOR}{label}")
-}
-
-/// The name of the part in a label, if there is one, and the rest.
-#[must_use]
-pub fn split_label(label: &str) -> (Option<&str>, &str) {
-    label.split_once(SEPARATOR).map_or((None, label), |(part, rest)| (Some(part), rest))
 }
 
 #[cfg(test)]
