@@ -1,6 +1,6 @@
 //! What a fit can take: photos, maps and subsets that fit into blobs and into memory.
 
-use super::FULL_SHARD;
+use super::tables::FULL_SHARD;
 use crate::{
     brdf::{Model, flat_bounds},
     fit::{Integration, Method, MethodError},

@@ -1,6 +1,6 @@
 //! What a plan asks of the photo: which pixels there are, with which values.
 
-use super::index;
+use super::encode::index;
 use crate::{
     image::Image,
     math::{luminance, widen},

@@ -3,16 +3,15 @@
 //! here, on the table that its search read (design section 8). The cost is a pure function of the table and the parameters, so it has
 //! to be the same to the bit; one evaluation costs a thousandth of a search. Scores, parameters and pictures have to be possible ones.
 
-use super::other;
+use super::encode::other;
 use crate::{
     brdf::Model,
     fit::{Candidate, Objective, Polished},
     graph::{Blob, GraphEdit, Input, NodeId, PlanError},
     nodes::{
-        AppraisedWire, joined,
+        joined,
         wire::{PolishedWire, ScoresWire, TableWire, read},
     },
-    plan::Appraisal,
     render::{
         knots::{self, Knots},
         table::TransportTable,
@@ -110,25 +109,8 @@ pub(super) fn polished(model: &dyn Model, output: &Blob, most: usize) -> Result<
     Ok(polished)
 }
 
-/// The appraisals of so many points, for so many gammas.
-pub(super) fn appraisals(output: &Blob, points: usize, gammas: usize) -> Result<Vec<Appraisal>, PlanError> {
-    let AppraisedWire(appraised) = read("appraisals", output).map_err(|failure| wrong("appraisals", &failure))?;
-    if appraised.len() != points {
-        return Err(wrong(format!("{points} appraisals"), &appraised.len()));
-    }
-    let checked = |(cssim, cssim_object, costs): (f64, f64, Vec<f64>)| {
-        check_score(cssim)?;
-        check_score(cssim_object)?;
-        if costs.len() != gammas {
-            return Err(wrong(format!("{gammas} costs"), &costs.len()));
-        }
-        costs.iter().try_for_each(|cost| check_score(*cost))?;
-        Ok(Appraisal { cssim, cssim_object, costs })
-    };
-    appraised.into_iter().map(checked).collect()
-}
-
-fn check_score(score: f64) -> Result<(), PlanError> {
+/// Refuses a score or a cost that is negative or not finite.
+pub(super) fn check_score(score: f64) -> Result<(), PlanError> {
     if score.is_finite() && score >= 0.0 { Ok(()) } else { Err(wrong("a score at or above 0", &score)) }
 }
 

@@ -1,0 +1,26 @@
+//! Which nodes a fit, a photo and a survey need, and what follows from the outputs of these nodes (design section 7).
+
+mod appraisal;
+mod direct;
+mod encode;
+mod fit;
+mod limits;
+mod photo;
+mod pictures;
+mod pixels;
+mod polishing;
+mod scene_tables;
+mod step;
+mod survey;
+mod tables;
+mod verify;
+
+pub use appraisal::Appraisal;
+pub use encode::encode_light;
+pub use fit::{FitOutcome, FitPlanner};
+pub use limits::FitError;
+pub use photo::{PhotoPlanner, Subject};
+pub use survey::{SurveyOutcome, SurveyPlanner, SurveyRequest};
+
+#[cfg(test)]
+mod tests;
