@@ -1,4 +1,4 @@
-//! What a survey finds out about a given point, as the output of a worker that is checked.
+//! The scores of a given parameter vector in a survey, and the check of a worker's output that holds them.
 
 use super::verify::{check_score, wrong};
 use crate::{
@@ -6,18 +6,18 @@ use crate::{
     nodes::{AppraisedWire, wire::read},
 };
 
-/// What is known of a point.
+/// The scores of a parameter vector.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Appraisal {
     /// CSSIM over the whole image.
     pub cssim: f64,
     /// CSSIM over windows centred on the object.
     pub cssim_object: f64,
-    /// Eq. 1 over all pixels that the object covers wholly, for each gamma.
+    /// Eq. 1 over all pixels that the object covers completely, for each gamma.
     pub costs: Vec<f64>,
 }
 
-/// The appraisals of so many points, for so many gammas.
+/// The appraisals in an output, one per point, each with one cost per gamma.
 pub(super) fn appraisals(output: &Blob, points: usize, gammas: usize) -> Result<Vec<Appraisal>, PlanError> {
     let AppraisedWire(appraised) = read("appraisals", output).map_err(|failure| wrong("appraisals", &failure))?;
     if appraised.len() != points {

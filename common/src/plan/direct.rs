@@ -1,4 +1,4 @@
-//! The direct integrator in a fit: what its searches read, and how their claims are checked.
+//! The direct integrator in a fit: the inputs of its searches, and the means to check their results.
 
 use super::scene_tables::SceneTables;
 use crate::{
@@ -32,7 +32,7 @@ impl SceneTables {
         Ok((DirectWire { geometry, has_normals, samples, seed: self.method.seed }, inputs))
     }
 
-    /// The light as the direct integrator samples it, made once; `None` with tables.
+    /// The light with its sampling density for the direct integrator, computed once; `None` with tables.
     pub(super) fn distribution(&mut self) -> Option<Arc<LightDistribution>> {
         if self.method.integration == Integration::Tables {
             return None;
@@ -43,7 +43,7 @@ impl SceneTables {
         ))
     }
 
-    /// These pixels of the capture by the direct integrator; `None` with tables.
+    /// The renderer of these pixels by the direct integrator; `None` with tables.
     pub(super) fn direct_pixels<'a>(
         &'a self,
         light: Option<&'a LightDistribution>,

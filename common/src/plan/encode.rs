@@ -1,4 +1,4 @@
-//! Values of a plan as the bytes that nodes read.
+//! Encodes values of a plan into the bytes that nodes read.
 
 use crate::{
     graph::{Blob, BlobHash, GraphEdit, NodeFailure, PlanError},
@@ -7,7 +7,7 @@ use crate::{
 };
 use serde::Serialize;
 
-/// A map as the nodes of a fit read it, for [`FitPlanner::with_encoded_light`](super::FitPlanner::with_encoded_light).
+/// Encodes a map for the nodes of a fit, for [`FitPlanner::with_encoded_light`](super::FitPlanner::with_encoded_light).
 ///
 /// # Errors
 /// When it does not fit into a blob.

@@ -55,7 +55,7 @@ pub struct FitOutcome {
     pub matched: Image,
     /// The error of the match, per window.
     pub error_map: ErrorMap,
-    /// Renderings asked for by [`FitPlanner::also_render`]: gamma and image (of the first subset).
+    /// Renderings requested by [`FitPlanner::also_render`]: gamma and image (of the first subset).
     pub extra: Vec<(f64, Image)>,
 }
 
@@ -112,14 +112,14 @@ impl FitPlanner {
         })
     }
 
-    /// Also renders the candidates of these gammas, for pictures; gammas that are not searched are left out.
+    /// Also renders the candidates of these gammas; gammas that are not searched are left out.
     #[must_use]
     pub fn also_render(mut self, gammas: &[f64]) -> Self {
         self.extra_gammas = gammas.to_vec();
         self
     }
 
-    /// Runs what follows stage one there: in the coordinator's own process, as it does unless told otherwise, or on workers.
+    /// Runs everything after stage one in the coordinator's own process (the default) or on workers.
     #[must_use]
     pub fn judging_on(mut self, placement: Placement) -> Self {
         self.scene.stage_two = placement;
@@ -145,13 +145,14 @@ impl FitPlanner {
         self.outcome
     }
 
-    /// Where the best score so far can be watched while the graph runs.
+    /// The best score so far, which can be read while the graph runs.
     #[must_use]
     pub fn best(&self) -> Arc<BestScore> {
         Arc::clone(&self.best)
     }
 
-    /// Judges on the table over the model's whole range of widths instead of the candidates': studies, whose many fits share it.
+    /// Judges on the table over the model's whole range of widths instead of the candidates' range. For studies, whose many fits
+    /// share that table.
     #[must_use]
     pub fn judging_on_whole_range(mut self) -> Self {
         self.is_judged_on_whole_range = true;
@@ -201,7 +202,7 @@ impl FitPlanner {
         Ok(())
     }
 
-    /// The candidate that a search on a worker claims to have found, once its cost is what this process finds for it.
+    /// The candidate in the output of a search. Its cost is computed again here and must be the same.
     fn checked_candidate(
         &mut self,
         place: usize,
@@ -219,7 +220,7 @@ impl FitPlanner {
         }
         let (s, gammas) = (place / gammas.len(), gammas.len());
         self.with_objective(&candidate, graph, |objective| verify::check_cost(&candidate, objective))??;
-        // The table has done its duty when no search of its subset is left.
+        // The table is not needed once no search of its subset is open.
         if !self.searches.values().any(|other| other / gammas == s) {
             self.tables_of_subsets.forget(s);
         }
@@ -307,15 +308,16 @@ impl FitPlanner {
         if self.step == Step::Reporting { self.add_report(graph) } else { Ok(()) }
     }
 
-    /// Stage one is over: nothing reads the tables of the pixel subsets any more.
-    pub(super) fn release_subset_tables(&mut self, graph: &mut GraphEdit<'_>) {
+    /// Releases the tables of the pixel subsets, which only stage one reads.
+    fn release_subset_tables(&mut self, graph: &mut GraphEdit<'_>) {
         for search in std::mem::take(&mut self.search_of_subset) {
             let inputs = graph.spec(search).map(|spec| spec.inputs.clone()).unwrap_or_default();
             inputs.iter().filter_map(Input::node).for_each(|shard| graph.release(shard));
         }
     }
 
-    /// The pictures: of the candidates on the table that they were judged on, of the match on the table that it was polished on.
+    /// Adds the nodes that make the pictures: of the candidates on the table that they were judged on, and of the match on the table
+    /// that it was polished on.
     fn add_report(&mut self, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
         let won = self.winner_of_stage_two()?.candidate.parameters.clone();
         let last = self.polishing.outcome.as_ref().map_or(&won, |p| &p.parameters).clone();
@@ -337,7 +339,7 @@ impl FitPlanner {
         Ok(())
     }
 
-    /// The candidates to be rendered beside the match: those of the first subset.
+    /// The candidates to be rendered in addition to the match: those of the first subset.
     fn extra_candidates(&self) -> Vec<&Judged> {
         let wanted = |j: &&Judged| j.candidate.subset == 0 && self.extra_gammas.contains(&j.candidate.gamma);
         self.judged.iter().filter(wanted).collect()
@@ -372,7 +374,7 @@ impl Planner for FitPlanner {
     fn start(&mut self, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
         self.scene.keep_light(graph)?;
         self.add_searches(graph)?;
-        // Nothing but the scene decides this table: workers that are idle can begin with it.
+        // This table depends on the scene alone, so idle workers can start it now.
         if self.scene.method.polish { self.polishing.add_coarse_table(&mut self.scene, graph) } else { Ok(()) }
     }
 
@@ -394,7 +396,8 @@ impl Planner for FitPlanner {
         }
     }
 
-    /// What a search claims is computed again here; of everything else only the shape can be seen.
+    /// The result of a search is verified here by computing its cost again. Of every other output only the shape is checked here, so
+    /// those are worth a second run.
     fn is_verified_by_repetition(&self, spec: &NodeSpec) -> bool {
         spec.kind != nodes::SEARCH
     }

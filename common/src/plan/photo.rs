@@ -8,7 +8,7 @@ use crate::{
     scene::GeometrySpec,
 };
 
-/// What a photo of a study shows.
+/// The material in a photo of a study.
 #[derive(Debug, Clone)]
 pub enum Subject {
     /// A measured material: its file in MERL's format.
@@ -29,7 +29,7 @@ pub struct PhotoPlanner {
 }
 
 impl PhotoPlanner {
-    /// Plans a rendering of a sphere under an [encoded light](super::encode_light), with so many samples per pixel.
+    /// Plans a rendering of a sphere under an [encoded light](super::encode_light), with this number of samples per pixel.
     #[must_use]
     pub fn new(light: Blob, subject: Subject, geometry: GeometrySpec, samples: u32, seed: u64) -> Self {
         Self { light, subject, geometry, samples, seed, photo: None }

@@ -1,6 +1,6 @@
-//! Stage three as a plan: look on a coarse picture for the lobe to start from, polish on the full-resolution table there, on wider
-//! tables where the width runs into an edge. Where that ends worse than the winner, it is done again from the winner, on the table that
-//! it was judged on: the outcome never scores worse than the winner.
+//! The plan of stage three: explore on a coarse picture to find the lobe to start from, then polish from there on a full-resolution
+//! table, and on wider tables while the width ends at the edge of its table. If the end is worse than the winner of stage two, polish
+//! runs again from the winner, on the table that the winner was judged on. So the outcome never scores worse than the winner.
 
 use super::{
     encode::{add, index},
@@ -26,19 +26,19 @@ use crate::{
     },
 };
 
-/// How often polish may run on towards a width beyond its table.
+/// Most rounds of polish, each on a wider table.
 const MAX_ROUNDS: usize = 4;
 
-/// Reach of the next table around a width that polish took to the edge of this one.
+/// Factor by which the next table extends to either side of the width at which the last round ended.
 const AROUND: f64 = 1.6;
 
-/// Columns or rows of the object on the coarse picture, the fewer of the two.
+/// Columns or rows of the object on the coarse picture, whichever are fewer.
 const COARSE_SIZE: u32 = 96;
 
 /// Most pixels of the coarse picture's table.
 const MOST_COARSE: usize = 40_000;
 
-/// Fewer pixels of an object show no lobe.
+/// Fewest pixels of the object on the coarse picture: fewer do not show a lobe.
 const FEWEST_COARSE: usize = 150;
 
 /// Pixels from the centre of one of the metric's windows to its edge.
@@ -47,10 +47,10 @@ const REACH: usize = 5;
 /// Knots per factor of two of width in the coarse table.
 const COARSE_PER_OCTAVE: f64 = 4.0;
 
-/// A table that would have to span more than this factor of widths, margins included, is not made for both winner and find.
+/// Largest ratio of widths, margins included, that one table may span to hold both the winner and the lobe that `explore` found.
 const FAR: f64 = 4.0;
 
-/// Most starts that a round of polish compares: winner, find, and the ends of earlier rounds.
+/// Most starts that a round of polish compares: the winner, the result of `explore`, and the ends of earlier rounds.
 const MAX_STARTS: usize = MAX_ROUNDS + 2;
 
 /// The state of stage three.
@@ -168,7 +168,7 @@ impl Polishing {
         self.rounds += 1;
         self.evaluations += polished.evaluations;
         polished.evaluations = self.spent + self.evaluations;
-        // Another table pays only with evaluations left for a gradient and a few steps.
+        // Another table is worth it only if enough evaluations are left for a gradient and a few steps.
         let enough_left = self.evaluations + 3 * polished.parameters.len() < MAX_EVALUATIONS;
         let continues = polished.at_table_edge && self.rounds < MAX_ROUNDS && enough_left && !self.has_retreated;
         self.starts.push(polished.parameters.clone());

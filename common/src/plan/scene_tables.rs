@@ -40,7 +40,7 @@ pub(super) struct SceneTables {
     /// The encoded light, if the caller has encoded it.
     pub(super) light: Option<Blob>,
     pub(super) environment: Option<BlobHash>,
-    /// The light for the direct integrator, once something was checked by it.
+    /// The light with its sampling density, once a direct rendering has needed it.
     pub(super) distribution: Option<Arc<LightDistribution>>,
     view: Option<BlobHash>,
     /// Shards of tables whose output has not arrived.
@@ -99,7 +99,7 @@ impl SceneTables {
         Ok(inputs)
     }
 
-    /// Adds the shards of a table of `count` pixels of the list `pixels`.
+    /// Adds the shards of a table. `pixels` is the blob with the list of pixels, their number, and the pixels per shard.
     pub(super) fn add_transport(
         &mut self,
         graph: &mut GraphEdit<'_>,
@@ -155,7 +155,7 @@ impl SceneTables {
         Ok(shards)
     }
 
-    /// A node of `kind` on the full-resolution table over a span.
+    /// Adds a node of `kind` that reads the full-resolution table over a span.
     pub(super) fn add_judging<T: Serialize>(
         &mut self,
         graph: &mut GraphEdit<'_>,
@@ -188,7 +188,7 @@ impl SceneTables {
         Ok(Input::Blob(view))
     }
 
-    /// A node of a kind, with a label, on a view and its table.
+    /// Adds a node of a kind, with a label, that reads a view and its table.
     pub(super) fn add_on_view<T: Serialize>(
         &self,
         graph: &mut GraphEdit<'_>,
@@ -206,7 +206,7 @@ impl SceneTables {
         })
     }
 
-    /// The photo as a grid of its pixels shows it; `pixels` are those of the table.
+    /// The photo on a grid of its pixels; `pixels` are those of the table.
     pub(super) fn view_wire(&self, grid: Grid, pixels: Vec<Pixel>) -> ViewWire {
         let photo = self.capture.photo();
         ViewWire {

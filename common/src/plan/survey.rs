@@ -1,10 +1,10 @@
-//! Studies of one photo on the full-resolution table over the model's whole range of widths: brute force from several starts, and the
-//! scores of given parameter vectors.
+//! The plan of a survey: brute force from several starts, and the scores of given parameter vectors, for one photo, on the
+//! full-resolution table over the model's whole range of widths.
 //!
 //! ```text
 //! transport(full, all widths) shards -> brute-force x starts, appraise -> report
 //! ```
-//! The table depends on the scene and the model alone, so that all surveys under one light share it.
+//! The table depends on the scene and the model alone, so all surveys under one light share it.
 
 use super::{
     appraisal::{Appraisal, appraisals},
@@ -24,31 +24,31 @@ use crate::{
 };
 use std::{collections::BTreeMap, sync::Arc};
 
-/// What a survey is to find out. Empty, it integrates the table and nothing else.
+/// The request of a survey. An empty request integrates the table and nothing else.
 #[derive(Debug, Clone, Default)]
 pub struct SurveyRequest {
     /// Brute force starts from each of these flat parameter vectors.
     pub starts: Vec<Vec<f64>>,
     /// Most evaluations from each start; `None` leaves the limit to the search.
     pub max_evaluations: Option<u32>,
-    /// Brute force renders by the direct integrator, with so many samples per pixel, and there is no table.
+    /// With a number of samples per pixel, brute force renders by the direct integrator and there is no table.
     pub direct: Option<u32>,
-    /// Flat parameter vectors to be appraised.
+    /// Flat parameter vectors to be scored.
     pub points: Vec<Vec<f64>>,
-    /// The gammas of Eq. 1 for which they are.
+    /// Gammas at which Eq. 1 is evaluated at every point.
     pub gammas: Vec<f64>,
-    /// How many of them, from the first, are to be rendered.
+    /// The first so many points are rendered too.
     pub pictures: usize,
 }
 
-/// What a survey has found out.
+/// The outcome of a survey.
 #[derive(Debug, Clone, Default)]
 pub struct SurveyOutcome {
     /// Where brute force ended, from each start.
     pub minima: Vec<Polished>,
     /// One per point.
     pub appraisals: Vec<Appraisal>,
-    /// Renderings of the first points, then of the best minimum, if there is one: linear Rec. 709, over black.
+    /// Renderings of the first points, then of the best minimum if there is one; linear Rec. 709, over black.
     pub images: Vec<Image>,
 }
 
@@ -66,7 +66,8 @@ pub struct SurveyPlanner {
 }
 
 impl SurveyPlanner {
-    /// Plans a survey of a captured photo. Of the method, model, judge and seed count; `exposure` is that of the display transform.
+    /// Plans a survey of a captured photo. Only model, judge and seed of the method are used; `exposure` is that of the display
+    /// transform.
     ///
     /// # Errors
     /// As [`FitPlanner::new`].
@@ -94,7 +95,7 @@ impl SurveyPlanner {
         self
     }
 
-    /// What was found out, once the graph has run.
+    /// The outcome, once the graph has run.
     #[must_use]
     pub fn into_outcome(self) -> Option<SurveyOutcome> {
         self.outcome
@@ -118,7 +119,7 @@ impl SurveyPlanner {
         Ok(())
     }
 
-    /// The view and what the direct integrator needs.
+    /// How brute force renders by the direct integrator, and its inputs: the view, the environment, the normal map if there is one.
     fn direct_scene(&mut self, samples: u32, graph: &mut GraphEdit<'_>) -> Result<(DirectWire, Vec<Input>), PlanError> {
         let mut inputs = vec![self.scene.full_view(graph)?];
         let (direct, of_scene) = self.scene.direct_scene(samples, graph)?;
@@ -126,7 +127,7 @@ impl SurveyPlanner {
         Ok((direct, inputs))
     }
 
-    /// All searches and appraisals have come: the pictures, if any.
+    /// Adds the pictures once all searches and appraisals are done.
     fn finish(&mut self, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
         if !self.searches.is_empty() || self.appraise.is_some() {
             return Ok(());
@@ -174,7 +175,7 @@ impl Planner for SurveyPlanner {
             return if is_all { self.end(Vec::new()) } else { Ok(()) };
         }
         if let Some(start) = self.searches.remove(&node) {
-            // MATLAB's limit; a request may have set a lower one.
+            // MATLAB's limit; the request may have a lower one.
             let most = 2000 * flat_len(self.scene.method.model.parameters());
             self.minima.insert(start, verify::polished(self.scene.method.model, output, most)?);
             return self.finish(graph);

@@ -1,4 +1,4 @@
-//! The transport tables of a fit: how they are cut into shards, and the widths that they span.
+//! Transport tables of a fit: the size of their shards, and the widths that they span.
 
 use crate::{
     brdf::Model,
@@ -27,7 +27,7 @@ pub(super) fn stage_one_knots(method: &Method) -> Knots {
     Knots::covering(low, high, PER_OCTAVE)
 }
 
-/// The span of all widths that the model has.
+/// The model's whole range of widths; `None` for a model without widths.
 pub(super) fn whole_span(model: &dyn Model) -> Span {
     let width = model.lobes().iter().find_map(|b| b.width)?;
     Some(width.span(model.parameters()))
