@@ -1,8 +1,8 @@
-//! The method's steps as nodes of the job graph: one file, one [`NodeType`](crate::graph::NodeType) each. Every node is a
-//! pure function of its parameters and input blobs.
+//! The steps of the method as nodes of the job graph, one file per [`NodeType`](crate::graph::NodeType). Every node is a pure function
+//! of its parameters and input blobs.
 //!
-//! `transport` and `search` run on workers; `select`, `explore`, `polish` and `report` in the coordinator's process. `render`, `brute-force`
-//! and `appraise` belong to studies.
+//! `transport` and `search` run on workers; `select`, `explore`, `polish` and `report` in the coordinator's process, or on workers if a
+//! batch asks for it. `render`, `brute-force` and `appraise` belong to studies.
 
 mod appraise;
 mod brute_force;
