@@ -1,4 +1,4 @@
-//! A point of the object's surface, as the camera sees it.
+//! A point of the object's surface and the direction from which the camera sees it.
 
 use crate::math::Vec3;
 
@@ -9,7 +9,7 @@ pub struct Point {
     pub normal: Vec3,
     /// Towards the viewer.
     pub view: Vec3,
-    /// Their cosine, positive.
+    /// Cosine of the angle between them, positive.
     pub cos_o: f64,
 }
 

@@ -7,7 +7,7 @@
 use super::transport::{Pixel, tile_order};
 use crate::math::sampling::{key, uniform};
 
-/// How many pixels stage one looks at.
+/// How many pixels stage one uses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum SampleCount {
     /// This many draws.
@@ -23,7 +23,7 @@ pub enum Sampling {
     Importance,
     /// One draw from each of N equal parts of the pixels, in Morton order; density uniform.
     Stratified,
-    /// Every pixel alike.
+    /// Equal probability for every pixel.
     Uniform,
 }
 
@@ -36,7 +36,7 @@ pub struct Candidate {
     pub intensity: f64,
 }
 
-/// The chosen pixels, tile by tile ([`tile_order`]), each once: neighbours share cuts of the light.
+/// The chosen pixels, each once, in [`tile_order`], so that neighbours share cuts of the light pyramid.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct PixelSubset {
     /// Column and row.
@@ -45,13 +45,13 @@ pub struct PixelSubset {
     pub weights: Vec<f64>,
 }
 
-/// The stage number that keeps this module's random numbers apart from others'.
+/// Part of the key of the random numbers, so that they differ from those of other modules.
 const STAGE: u64 = 1;
 
 impl PixelSubset {
-    /// Draws a subset; a pure function of its arguments. `index` tells the subsets of one run apart.
+    /// Draws a subset; a pure function of its arguments. `index` is the number of the subset in its run.
     ///
-    /// Returns `None` when there is no candidate, or importance sampling finds no light at all.
+    /// Returns `None` if there is no candidate, or if all intensities are 0 with importance sampling.
     #[must_use]
     pub fn draw(
         candidates: &[Candidate],
