@@ -9,7 +9,7 @@ use thiserror::Error;
 /// How Eq. 1 is minimised.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum SearchKind {
-    /// Generalised pattern search, the paper's.
+    /// Generalised pattern search, as in the paper.
     Pattern,
     /// Levenberg-Marquardt with bounds on analytic derivatives.
     LeastSquares,
@@ -18,7 +18,7 @@ pub enum SearchKind {
 /// How stage one renders its pixels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Integration {
-    /// By a transport table, which is integrated once.
+    /// From a transport table, which is integrated once.
     Tables,
     /// By the direct integrator, for every evaluation, as in the paper.
     Direct {
@@ -32,55 +32,56 @@ pub enum Integration {
 pub enum Start {
     /// The best points of a scan over widths (design section 2).
     Scan,
-    /// The paper's one point, [`Parameter::start`](crate::brdf::Parameter::start).
+    /// The single start of the paper, [`Parameter::start`](crate::brdf::Parameter::start).
     Paper,
 }
 
-/// What Eq. 1 compares: the power `1/gamma`, how it continues at and below zero, and what studies put in its place.
+/// The function that Eq. 1 applies to radiance: the power `1/gamma` with a rule for values at and below zero, or an alternative for
+/// studies.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Compress {
-    /// Continues as its tangent line.
+    /// The power; below its knee, its tangent line.
     Tangent,
-    /// Of `max(x, 0)`, the paper's.
+    /// The power of `max(x, 0)`, as in the paper.
     Clamp,
-    /// Of the radiance clamped to what a display shows, between 0 and this radiance.
+    /// The power of the radiance clamped to the range of a display, from 0 to `white`.
     ClampTo {
         /// The radiance of white, above 0.
         white: f64,
     },
-    /// Instead of a power, the logarithm [`Compression::logarithm`](crate::metric::cost::Compression::logarithm); gamma says nothing.
+    /// The logarithm [`Compression::logarithm`](crate::metric::cost::Compression::logarithm); gamma has no effect.
     Logarithm,
 }
 
 /// Which score selects and polishes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum JudgedBy {
-    /// CSSIM over the whole image, the paper's.
+    /// CSSIM over the whole image, as in the paper.
     Image,
     /// CSSIM over windows centred on the object.
     Object,
 }
 
-/// How to fit.
+/// The settings of a fit.
 #[derive(Debug, Clone)]
 pub struct Method {
     /// The BRDF model.
     pub model: &'static dyn Model,
-    /// Exponents of stage one, ascending.
+    /// Gammas of stage one, ascending.
     pub gammas: Vec<f64>,
     /// Pixels of stage one.
     pub samples: SampleCount,
-    /// How they are drawn.
+    /// How these pixels are drawn.
     pub sampling: Sampling,
     /// Independent subsets, at least 1.
     pub subsets: u32,
     /// How Eq. 1 is minimised.
     pub search: SearchKind,
-    /// How its pixels are rendered.
+    /// How stage one renders its pixels.
     pub integration: Integration,
     /// Where searches start.
     pub start: Start,
-    /// What Eq. 1 compares.
+    /// The function that Eq. 1 applies to radiance.
     pub compress: Compress,
     /// Whether stage three runs.
     pub polish: bool,
@@ -109,7 +110,7 @@ impl Default for Method {
     }
 }
 
-/// Most searches of one fit: their candidates travel to stage two in one message.
+/// Most searches of one fit: their candidates are sent to stage two in one message.
 pub const MOST_SEARCHES: usize = 5000;
 
 /// What is wrong with a method.
@@ -122,27 +123,27 @@ pub enum MethodError {
         /// The values given.
         found: Vec<f64>,
     },
-    /// Nothing to draw.
+    /// No pixels.
     #[error("the number of samples must be at least 1, found 0; the paper uses 256")]
     NoSamples,
-    /// Nothing to search.
+    /// No subsets.
     #[error("the number of subsets must be at least 1, found 0")]
     NoSubsets,
     /// All subsets would be the same.
-    #[error(
-        "all pixels taken {subsets} times are {subsets} times the same: leave out the subsets, or give a number of samples"
-    )]
+    #[error("{subsets} subsets of all pixels would be equal: use 1 subset, or give a number of samples")]
     SameSubsets {
         /// The number of subsets.
         subsets: u32,
     },
-    /// The direct integrator gives no derivatives.
+    /// The direct integrator has no derivatives.
     #[error(
         "the direct integrator (--integrator direct) has no derivatives, which least squares needs: use --search pattern"
     )]
     NoDerivatives,
-    /// Gammas times subsets.
-    #[error("{found} searches (gammas times subsets) are more than the {MOST_SEARCHES} that one fit may have")]
+    /// Too many gammas times subsets.
+    #[error(
+        "{found} searches (gammas times subsets) are more than the limit of {MOST_SEARCHES}: use fewer gammas or subsets"
+    )]
     TooManySearches {
         /// Gammas times subsets.
         found: usize,
@@ -150,7 +151,7 @@ pub enum MethodError {
 }
 
 impl Method {
-    /// Checks what types cannot.
+    /// Checks the settings that their types do not.
     ///
     /// # Errors
     /// Names the setting that is out of range.

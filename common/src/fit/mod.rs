@@ -1,9 +1,9 @@
-//! The method of \[BP20b\], as pure functions that read like its section 3:
+//! The method of \[BP20b\], as pure functions in the order of its section 3:
 //!
 //! 1. a pixel subset ([`crate::render::subset`]) and its transport table,
 //! 2. stage one, [`search_gamma`]: for each gamma, minimise Eq. 1 over the parameters,
 //! 3. stage two, [`judge_candidates`]: render the candidates in full, keep the one of lowest CSSIM,
-//! 4. stage three, [`polish`]: a short search on CSSIM itself, from the winner or from another lobe that looks better on a coarse picture.
+//! 4. stage three, [`polish`]: a short search on CSSIM itself, from the winner or from a lobe of lower CSSIM on a coarse picture.
 //!
 //! [`crate::nodes`] wraps these steps as nodes of the job graph, and [`crate::plan`] joins them.
 
