@@ -470,7 +470,7 @@ fn wrong_result_ends_the_run_and_names_gamma_numbers_and_worker() {
     bench.start(A, 0, 1);
     let error = bench.try_handle(finished(Site::Worker(A), 0, 1, 7)).unwrap_err();
     let text = error.to_string();
-    for part in ["\"n0\"", "from worker 1", "the cost of gamma 2 is said to be 0.5, but is 0.25"] {
+    for part in ["\"n0\"", "from worker 1", "the cost of gamma 2: the output says 0.5, recomputation gives 0.25"] {
         assert!(text.contains(part), "{text}");
     }
     assert_eq!(error.exit_code(), 3);
@@ -498,7 +498,7 @@ fn cancelled_nodes_leave_queue_and_workers_and_are_no_failures() {
     bench.join(A, 1);
     bench.start(A, 1, 1);
     let said = bench.finish(A, 0, 1, 0);
-    let cancelled = "failed: cancelled: its output is not wanted any more";
+    let cancelled = "failed: cancelled: its output is no longer needed";
     let expected = [
         "worker 1 is thanked for 0.1".to_owned(),
         "worker 1 drops 1.1".to_owned(),
