@@ -1,4 +1,4 @@
-//! Pictures of where a match differs from its photo, for the figure that compares samples with all pixels.
+//! Pictures of the difference between a match and its photo, for the figure that compares samples with all pixels.
 
 use anyhow::Context;
 use lookalike::{
@@ -7,16 +7,16 @@ use lookalike::{
 };
 use std::{collections::BTreeSet, fs, path::Path};
 
-/// Differences of displayed values are shown this many times as bright.
+/// Factor on the shown differences of displayed values.
 pub(super) const GAIN: f64 = 4.0;
-/// The matches that are compared so.
+/// The matches for which these pictures are made.
 const SHOWN: [&str; 2] = ["ours", "full"];
 
 /// Writes `X-difference-ours.png` and `X-difference-full.png` for every `X` that has its photo and both matches, and adds
 /// their names.
 ///
 /// # Errors
-/// Where a picture cannot be read, has another size than its photo, or cannot be written.
+/// If a picture cannot be read, has another size than its photo, or cannot be written.
 pub(super) fn write(folder: &Path, names: &mut BTreeSet<String>) -> anyhow::Result<()> {
     let scenes: Vec<String> =
         names.iter().filter_map(|name| name.strip_suffix("-full.png")).map(str::to_owned).collect();
@@ -44,7 +44,7 @@ fn read(folder: &Path, name: &str) -> anyhow::Result<Image> {
     Ok(decode(&shown, &bytes)?.image)
 }
 
-/// [`GAIN`] times the absolute difference of displayed values; none of pictures of two sizes.
+/// [`GAIN`] times the absolute difference of displayed values; `None` if the pictures differ in size.
 fn difference(photo: &Image, image: &Image) -> Option<Image> {
     let size = (photo.width(), photo.height());
     if (image.width(), image.height()) != size {

@@ -1,9 +1,9 @@
-//! The folder of the report: the files in it, and how they are written.
+//! Lists and writes files in the folder of the report.
 
 use anyhow::Context;
 use std::{collections::BTreeSet, fs, io::ErrorKind, path::Path};
 
-/// Names of the files in a folder; none where there is no folder.
+/// Names of the files in a folder; empty if there is no folder.
 pub(crate) fn names(folder: &Path) -> anyhow::Result<BTreeSet<String>> {
     let cannot = || format!("cannot list the pictures in {}", folder.display());
     match fs::read_dir(folder) {
@@ -15,7 +15,7 @@ pub(crate) fn names(folder: &Path) -> anyhow::Result<BTreeSet<String>> {
     }
 }
 
-/// Writes beside the file and puts it in its place when it is whole: who reads meanwhile sees the old report or the new one.
+/// Writes a temporary file and renames it, so that a reader finds either the old file or the new one, both complete.
 pub(crate) fn file(folder: &Path, name: &str, content: impl AsRef<[u8]>) -> anyhow::Result<()> {
     let (path, part) = (folder.join(name), folder.join(format!("{name}.part")));
     let written = fs::write(&part, content).and_then(|()| fs::rename(&part, &path));

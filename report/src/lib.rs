@@ -1,7 +1,7 @@
-//! The report of a study: from what was measured to pages, figures and files that a program reads.
+//! The report of a study: turns its measurements into pages, figures and files for programs.
 //!
-//! Every word that judges and every number is computed from the data. A section whose data the study does not hold says what
-//! its file would need; nothing is drawn from what is not there.
+//! Every verdict and every number is computed from the data. A section whose data the study does not have says what the study file
+//! needs for it.
 
 mod chart;
 mod differences;
@@ -30,11 +30,11 @@ use study::Study;
 /// The heading of both pages.
 const TITLE: &str = "Lookalike against Bieron and Peers 2020";
 
-/// Writes the report into `out`: `results.md`, `report.html`, `results.json`, `data.json` and `figures/`; the pictures that
-/// it shows are in `out/pictures/` already, where it adds those of differences.
+/// Writes the report into `out`: `results.md`, `report.html`, `results.json`, `data.json` and `figures/`. The pictures that it shows must be
+/// in `out/pictures/`; the pictures of differences are added there.
 ///
 /// # Errors
-/// Where a file cannot be read or written.
+/// If a file cannot be read or written.
 pub fn write(data: &StudyData, out: &Path) -> anyhow::Result<()> {
     let pictures = out.join("pictures");
     let mut names = folder::names(&pictures)?;
@@ -43,7 +43,7 @@ pub fn write(data: &StudyData, out: &Path) -> anyhow::Result<()> {
     let sections = section::all(&study)?;
     let lead = lead(&study);
     let figures = out.join("figures");
-    fs::create_dir_all(&figures).with_context(|| format!("cannot make the folder {}", figures.display()))?;
+    fs::create_dir_all(&figures).with_context(|| format!("cannot create the folder {}", figures.display()))?;
     for (name, text) in figure_files(&sections) {
         file(&figures, &name, text)?;
     }
@@ -53,7 +53,7 @@ pub fn write(data: &StudyData, out: &Path) -> anyhow::Result<()> {
     file(out, "report.html", html::page(TITLE, &lead, &sections, &pictures)?)
 }
 
-/// What the study is of, in two sentences.
+/// The subject of the study, in two sentences.
 fn lead(study: &Study<'_>) -> String {
     let about = &study.data.about;
     let probes: Vec<String> = about.probes.iter().map(|probe| text::light(probe).to_owned()).collect();
