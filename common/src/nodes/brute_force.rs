@@ -79,7 +79,7 @@ fn search(
     let minimum = brute_force(view.model, value, &parameters.start, limit, &mut observe)
         .map_err(|error| NodeFailure::new(format!("brute force: {error}")))?;
     let score =
-        score(&minimum.point).ok_or_else(|| NodeFailure::new("brute force ended where nothing can be scored"))?;
+        score(&minimum.point).ok_or_else(|| NodeFailure::new("brute force ended at a point that cannot be scored"))?;
     Ok(PolishedWire::of_minimum(minimum, &score))
 }
 

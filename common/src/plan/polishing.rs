@@ -26,7 +26,7 @@ use crate::{
     },
 };
 
-/// Most rounds of polish, each on a wider table.
+/// Most rounds of polish; each round after the first is on a wider table.
 const MAX_ROUNDS: usize = 4;
 
 /// Factor by which the next table extends to either side of the width at which the last round ended.
