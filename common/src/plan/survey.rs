@@ -17,7 +17,7 @@ use super::{
 use crate::{
     brdf::flat_len,
     fit::{Integration, Method, Polished},
-    graph::{Blob, GraphEdit, Input, NodeId, NodeSpec, Placement, PlanError, Planner},
+    graph::{Blob, GraphEdit, Input, NodeId, Placement, PlanError, Planner},
     image::Image,
     nodes::{self, AppraiseParameters, BruteForceParameters, DirectWire, ReportParameters},
     scene::Capture,
