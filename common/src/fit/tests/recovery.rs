@@ -3,7 +3,7 @@
 use super::scene::{StageOne, method};
 use crate::fit::{Candidate, Method, SearchKind, Start, search_gamma};
 
-/// Materials inside the models' boxes.
+/// Materials in the inside of the models' boxes.
 const KNOWN: [(&str, &[f64]); 13] = [
     ("ggx", &[0.3, 0.2, 0.1, 0.05, 0.05, 0.05, 0.15]),
     ("ggx", &[0.05, 0.1, 0.2, 0.6, 0.5, 0.3, 0.35]),

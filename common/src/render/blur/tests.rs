@@ -45,11 +45,10 @@ fn points() -> Vec<Point> {
     [0.95, 0.7, 0.4].map(|cos: f64| Point::new(Vec3::new((1.0 - cos * cos).sqrt(), 0.0, cos), view).unwrap()).to_vec()
 }
 
-/// Lobes that are divided by the larger of `n.l` and `n.v`, which has a kink where the two are equal, as in the mirror direction.
+/// Lobes that are divided by the larger of `n.l` and `n.v`: it has a kink where these are equal, which is in the mirror direction.
 const KINKED: [&str; 2] = ["blinn-phong", "ashikhmin-shirley"];
 
-/// The largest error for light around directions near the mirror direction and away from it, as a share of the lobe's value there;
-/// over the lobes with a kink, or over those without.
+/// The largest error over lobes, with a kink or without, of light around directions near and off the mirror direction, as a share of the lobe's value there.
 fn error(size: f64, width: f64, second_order: bool, kinked: bool) -> f64 {
     let mut worst: f64 = 0.0;
     for (point, away) in points().iter().flat_map(|p| [0.0, 0.7, 1.4].map(|away| (*p, away))) {
