@@ -136,7 +136,7 @@ pub enum FailureReason {
     Node(NodeFailure),
     /// Worker processes died while they executed it.
     #[error(
-        "{crashes} worker processes died while this was the only node that they executed; see their last lines on stderr, \
+        "{crashes} worker processes died while they executed it alone; see their last lines on stderr, \
          and check whether memory ran out"
     )]
     Crashed {
