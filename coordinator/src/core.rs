@@ -88,8 +88,6 @@ pub struct Core {
     /// How the last local worker ended, once none will be started again and no other can join.
     pub(crate) given_up: Option<String>,
     pub(crate) summary: RunSummary,
-    /// Which workers that are about to join execute which nodes for an earlier coordinator of this run.
-    pub(crate) continued: Vec<(WorkerId, NodeId)>,
     /// What earlier coordinators of this run have left.
     pub(crate) recall: Option<Box<dyn Recall>>,
 }
@@ -183,7 +181,6 @@ impl Core {
             starving: None,
             given_up: None,
             summary: RunSummary::default(),
-            continued: Vec::new(),
             recall: None,
         }
     }

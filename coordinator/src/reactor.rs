@@ -75,23 +75,6 @@ pub enum Event {
         /// The output.
         output: Blob,
     },
-    /// A worker executes a node already: an earlier coordinator of this run gave it. Unless it has joined already, this has to be
-    /// followed by its [`WorkerJoined`](Self::WorkerJoined).
-    Continues {
-        /// The worker.
-        worker: WorkerId,
-        /// The node, by its number of today.
-        node: NodeId,
-    },
-    /// A worker has the output of a node that an earlier coordinator of this run gave it; its hash was verified.
-    Recovered {
-        /// The worker.
-        worker: WorkerId,
-        /// The node, by its number of today.
-        node: NodeId,
-        /// The output.
-        output: Blob,
-    },
     /// A node has no output and never will: its own error.
     Failed {
         /// Where it ran.
@@ -190,8 +173,6 @@ pub fn handle_arrived(
         Event::Finished { site, node, attempt, output } => {
             answers::finished(core, (site, node, attempt), output, (arrived, now), outbox)?;
         }
-        Event::Continues { worker, node } => membership::go_on(core, worker, node, now, outbox),
-        Event::Recovered { worker, node, output } => answers::recovered(core, worker, node, output, now, outbox)?,
         Event::Failed { site, node, attempt, failure } => {
             answers::failed(core, (site, node, attempt), failure, now, outbox)?;
         }

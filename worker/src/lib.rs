@@ -44,7 +44,7 @@ pub fn run(options: &WorkerOptions, registry: Registry) -> Result<(), WorkerErro
     // One thread is enough to talk; the cores belong to the pool.
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(WorkerError::Runtime)?;
     runtime.block_on(async {
-        let wishes = watch_for_the_end(options.leash).map_err(WorkerError::Runtime)?;
+        let wishes = watch_for_the_end(options.is_leashed).map_err(WorkerError::Runtime)?;
         run_in(Real, options, registry, wishes).await
     })
 }

@@ -16,7 +16,7 @@ use tokio_rustls::client::TlsStream;
 use tracing::{debug, info, warn};
 
 use crate::cache::BlobCache;
-use crate::ending::{Leash, Wishes};
+use crate::ending::Wishes;
 use crate::error::WorkerError;
 use crate::execute::{Completed, Executor};
 use crate::options::WorkerOptions;
@@ -61,7 +61,7 @@ pub(crate) async fn run<W: World>(
         address,
         access,
         name: ProcessName(name),
-        is_local: options.leash != Leash::None,
+        is_local: options.is_leashed,
         threads: threads.get(),
         wishes,
         own_drain_time: options.drain_time,
@@ -184,7 +184,7 @@ impl<W: World> Session<W> {
             // Nothing of what follows from it has a connection to go to: `welcomed` says what counts.
             drop(self.tasks.completed(completed, || self.executor.context()));
         }
-        let actions = self.tasks.welcomed(welcome.run);
+        let actions = self.tasks.welcomed(welcome.run, welcome.epoch);
         self.act(&connection, actions);
         let ended = tokio::select! {
             biased;

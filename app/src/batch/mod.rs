@@ -92,7 +92,6 @@ pub(crate) fn run(settings: BatchSettings) -> anyhow::Result<ExitCode> {
         path: out.file(JOURNAL_FILE),
         identity,
         resume: settings.resume,
-        survivors: true,
         best: None,
         fits: ledger.clone(),
     });

@@ -120,7 +120,6 @@ fn run_shown(
         path: job.out.file(JOURNAL_FILE),
         identity,
         resume: job.resume,
-        survivors: job.is_resumable,
         best: Some(planner.best()),
         fits: FitLedger::default(),
     });

@@ -125,7 +125,6 @@ fn run_cells(
         path: inputs.out.file(JOURNAL_FILE),
         identity: identity(inputs)?,
         resume: settings.resume,
-        survivors: true,
         best: None,
         fits: FitLedger::default(),
     });

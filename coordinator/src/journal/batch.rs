@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use lookalike::graph::{Blob, FailureReason, NodeId, NodeKey, NodeState, WorkerId};
 
-use crate::comm::{Action, RunEvent, Site, WorkerProcess};
+use crate::comm::{Action, RunEvent, Site};
 use crate::core::{Core, Deaths, Record};
 
 /// The worker's number of what runs in the coordinator itself. Workers count from 1.
@@ -56,7 +56,8 @@ pub(super) enum AttemptChange {
 #[derive(Debug)]
 pub(super) struct WorkerRow {
     pub(super) worker: u64,
-    pub(super) process: WorkerProcess,
+    /// Its process id on its own machine.
+    pub(super) process: u32,
     pub(super) threads: usize,
     pub(super) at: Duration,
 }
@@ -84,7 +85,6 @@ pub(crate) struct Batch {
     pub(super) attempts: Vec<AttemptChange>,
     pub(super) workers: Vec<WorkerRow>,
     pub(super) left: Vec<LeftRow>,
-    pub(super) local_workers: Vec<u32>,
     pub(super) results: Vec<(NodeKey, Blob)>,
     /// Results that turned out to be wrong.
     pub(super) forgotten: Vec<NodeKey>,
@@ -147,14 +147,13 @@ impl Batch {
                 self.released.extend(core.look(name.node).and_then(|record| record.key));
             }
             RunEvent::WorkerJoined { worker, threads, .. } => {
-                if let Some(process) = core.members.get(*worker).map(|member| member.process) {
+                if let Some(process) = core.members.get(*worker).map(|member| member.process.id) {
                     self.workers.push(WorkerRow { worker: worker.0, process, threads: *threads, at: now });
                 }
             }
             RunEvent::WorkerLeft { worker, departure } => {
                 self.left.push(LeftRow { worker: worker.0, why: departure.to_string(), at: now });
             }
-            RunEvent::LocalWorkerStarted { process } => self.local_workers.push(*process),
             _ => {}
         }
     }
@@ -176,15 +175,10 @@ impl Batch {
         self.listen = Some(address);
     }
 
-    /// The nodes that were touched and whose key is known.
-    pub(crate) fn keys(&self) -> impl Iterator<Item = (NodeKey, NodeId)> {
-        self.nodes.iter().filter_map(|(node, row)| Some((row.key?, NodeId(*node))))
-    }
-
     /// Whether nobody may be told of the group before this is written: there is more in it than what people see.
     pub(crate) fn is_urgent(&self) -> bool {
-        let Self { nodes, workers, left, local_workers, results, forgotten, released, listen, .. } = self;
-        let rows = nodes.len() + workers.len() + left.len() + local_workers.len();
+        let Self { nodes, workers, left, results, forgotten, released, listen, .. } = self;
+        let rows = nodes.len() + workers.len() + left.len();
         rows + results.len() + forgotten.len() + released.len() > 0 || listen.is_some()
     }
 

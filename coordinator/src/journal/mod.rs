@@ -16,7 +16,7 @@
 //! | `epochs` | coordinator process: host, when it began and was last seen, how it ended, where it listened |
 //! | `nodes` | node of an epoch: kind, label, state, attempts, deaths of workers, key, error |
 //! | `attempts` | lease that was given out: worker, when, how it ended |
-//! | `workers`, `local_workers` | connection of a worker; process of this machine that was started as one |
+//! | `workers` | connection of a worker |
 //! | `results` | node key: the hash and the bytes of its output |
 //! | `fits` | fit of a run of many: how it is doing, what it wrote |
 //!
@@ -43,8 +43,8 @@ mod writer;
 
 use std::collections::{HashMap, HashSet};
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::sync::mpsc::{Sender, channel, sync_channel};
-use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant, SystemTime};
 
@@ -80,8 +80,6 @@ pub struct JournalOptions {
     pub identity: RunIdentity,
     /// Whether to go on with a run that is there. Without one, a new run begins either way.
     pub resume: bool,
-    /// Whether local workers live on for a while when this process dies, for the next one to take them over.
-    pub survivors: bool,
     /// The best score so far, for people who look at the run.
     pub best: Option<Arc<BestScore>>,
     /// What becomes of the fits, in a run of many.
@@ -89,10 +87,10 @@ pub struct JournalOptions {
 }
 
 impl JournalOptions {
-    /// A new run, which cannot be gone on with by surviving workers.
+    /// A new run.
     #[must_use]
     pub fn new(path: PathBuf, identity: RunIdentity) -> Self {
-        Self { path, identity, resume: false, survivors: false, best: None, fits: FitLedger::default() }
+        Self { path, identity, resume: false, best: None, fits: FitLedger::default() }
     }
 }
 
@@ -106,15 +104,13 @@ pub(crate) struct Journal {
     pub(crate) epoch: u64,
     /// What earlier epochs have left.
     pub(crate) past: Past,
-    known: Known,
+    /// The keys that have a result of an earlier epoch.
+    known: HashSet<NodeKey>,
     commands: Sender<Command>,
     committed: UnboundedReceiver<Result<(), JournalError>>,
     disk: Option<Disk>,
     thread: Option<JoinHandle<Result<(), JournalError>>>,
 }
-
-/// The keys that have a result in the journal, but for those of this epoch.
-type Known = Arc<Mutex<HashSet<NodeKey>>>;
 
 impl Journal {
     /// Begin a run, or go on with the one that is there. `disk_time` is that of the [world](lookalike_worker::world::World).
@@ -134,7 +130,7 @@ impl Journal {
         };
         let (commands, asked) = channel();
         let (sender, committed) = unbounded_channel();
-        let known: Known = Arc::new(Mutex::new(loaded.results.keys().copied().collect()));
+        let known = loaded.results.keys().copied().collect();
         let writer = Writer {
             connection,
             options: options.clone(),
@@ -156,7 +152,7 @@ impl Journal {
     /// What the reactor asks for the outputs of earlier epochs.
     pub(crate) fn recall(&self) -> Box<dyn Recall> {
         let deaths = self.past.deaths.clone();
-        Box::new(Recollection { known: Arc::clone(&self.known), deaths, commands: self.commands.clone() })
+        Box::new(Recollection { known: self.known.clone(), deaths, commands: self.commands.clone() })
     }
 
     /// Write a batch, after those before. [`Self::committed`] tells when it is written.
@@ -179,11 +175,6 @@ impl Journal {
     pub(crate) fn note(&mut self, batch: Batch) {
         // A thread that has ended is noticed by `committed`.
         let _ = self.commands.send(Command::Note(Box::new(batch)));
-    }
-
-    /// A result was kept whose node is not there today: should it become ready, it is completed from here.
-    pub(crate) fn learn(&self, key: NodeKey) {
-        self.known.lock().unwrap_or_else(PoisonError::into_inner).insert(key);
     }
 
     /// Write how this epoch ended, after all batches; `None` when every node is closed as the planner wants it.
@@ -219,7 +210,7 @@ impl Drop for Journal {
 /// Answers the reactor from the journal.
 #[derive(Debug)]
 struct Recollection {
-    known: Known,
+    known: HashSet<NodeKey>,
     deaths: HashMap<NodeKey, Deaths>,
     commands: Sender<Command>,
 }
@@ -227,7 +218,7 @@ struct Recollection {
 impl Recall for Recollection {
     fn recall(&mut self, key: NodeKey) -> Memory {
         let deaths = self.deaths.get(&key).copied().unwrap_or_default();
-        let is_known = self.known.lock().unwrap_or_else(PoisonError::into_inner).contains(&key);
+        let is_known = self.known.contains(&key);
         let read = || {
             let (sender, answer) = sync_channel(1);
             self.commands.send(Command::Read(key, sender)).ok()?;

@@ -5,35 +5,25 @@ use std::net::SocketAddr;
 use std::path::Path;
 
 use lookalike::graph::NodeKey;
-use lookalike::protocol::{ProcessName, RunName};
-use rusqlite::{Connection, OptionalExtension, Row, params};
+use lookalike::protocol::RunName;
+use rusqlite::{Connection, OptionalExtension, params};
 
 use super::error::JournalError;
 use super::identity::RunIdentity;
 use super::lock::host;
 use super::{Loaded, schema, unix_ms};
-use crate::comm::WorkerProcess;
 use crate::core::Deaths;
 
 /// What earlier epochs have left.
 #[derive(Debug, Default)]
 pub(crate) struct Past {
-    /// The key of each node that may have been given out, by epoch and number.
-    pub(crate) keys: HashMap<(u64, u64), NodeKey>,
     /// The workers that died while they executed a node, where any did.
     pub(crate) deaths: HashMap<NodeKey, Deaths>,
     /// Where the last one listened.
     pub(crate) listen: Option<SocketAddr>,
-    /// The process ids of those that were started as local workers of this machine; most of them are gone.
-    pub(crate) local_workers: Vec<u32>,
-    /// The workers that were connected when their coordinator died, and may still be there.
-    pub(crate) workers: Vec<WorkerProcess>,
     /// How many nodes have a result.
     pub(crate) results: usize,
 }
-
-/// How long a worker tries to reach its coordinator by default; the longest of them is remote.
-const LONGEST_WAIT_MS: i64 = 10 * 60 * 1000;
 
 /// Begin a new journal.
 pub(super) fn begin(path: &Path, identity: &RunIdentity, run: RunName) -> Result<(Connection, Loaded), JournalError> {
@@ -93,13 +83,13 @@ fn results(connection: &Connection) -> rusqlite::Result<HashMap<NodeKey, i64>> {
 fn past(connection: &Connection, results: usize) -> rusqlite::Result<Past> {
     let mut past = Past { results, ..Past::default() };
     let mut statement = connection.prepare(
-        "SELECT id >> 32, id & 0xffffffff, key, deaths, deaths_alone, deaths_excused FROM nodes WHERE key IS NOT NULL",
+        "SELECT key, deaths, deaths_alone, deaths_excused FROM nodes
+         WHERE key IS NOT NULL AND deaths + deaths_alone + deaths_excused > 0",
     )?;
     let mut rows = statement.query([])?;
     while let Some(row) = rows.next()? {
-        let (epoch, node, key): (u64, u64, _) = (row.get(0)?, row.get(1)?, NodeKey(row.get(2)?));
-        let deaths = Deaths { in_company: row.get(3)?, alone: row.get(4)?, excused: row.get(5)? };
-        past.keys.insert((epoch, node), key);
+        let key = NodeKey(row.get(0)?);
+        let deaths = Deaths { in_company: row.get(1)?, alone: row.get(2)?, excused: row.get(3)? };
         // Each epoch counts on from the one before.
         if deaths.total() > past.deaths.get(&key).map_or(0, |most| most.total()) {
             past.deaths.insert(key, deaths);
@@ -111,19 +101,5 @@ fn past(connection: &Connection, results: usize) -> rusqlite::Result<Past> {
         |row| row.get::<_, String>(0),
     );
     past.listen = listen.optional()?.and_then(|listen| listen.parse().ok());
-    // Elsewhere the same numbers are those of other processes.
-    let mut statement = connection.prepare(
-        "SELECT DISTINCT local_workers.process FROM local_workers JOIN epochs USING (epoch) WHERE host = ?1 ORDER BY 1",
-    )?;
-    past.local_workers = statement.query_map([host()], |row| row.get(0))?.collect::<rusqlite::Result<_>>()?;
-    // An epoch that ended in order has told its workers to end.
-    let mut statement = connection.prepare(
-        "SELECT DISTINCT workers.process, name, local FROM workers JOIN epochs USING (epoch)
-         WHERE ended_ms IS NULL AND left_ms IS NULL AND seen_ms > ?1 ORDER BY 1",
-    )?;
-    let since = unix_ms() - LONGEST_WAIT_MS;
-    let worker =
-        |row: &Row<'_>| Ok(WorkerProcess { id: row.get(0)?, name: ProcessName(row.get(1)?), is_local: row.get(2)? });
-    past.workers = statement.query_map([since], worker)?.collect::<rusqlite::Result<_>>()?;
     Ok(past)
 }

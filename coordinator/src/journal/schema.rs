@@ -11,7 +11,7 @@ use super::error::JournalError;
 use super::place;
 
 /// The format of the tables: `PRAGMA user_version`. A change of any kind is a new number.
-pub(super) const FORMAT: i64 = 2;
+pub(super) const FORMAT: i64 = 3;
 
 /// Marks the file as a journal of this program: `PRAGMA application_id`, the letters `Look`.
 pub(super) const APPLICATION: i64 = 0x4c6f_6f6b;
@@ -63,18 +63,11 @@ CREATE TABLE workers (
     epoch       INTEGER NOT NULL,
     worker      INTEGER NOT NULL,
     process     INTEGER NOT NULL,
-    name        BLOB NOT NULL,
-    local       INTEGER NOT NULL,
     threads     INTEGER NOT NULL,
     joined_ms   INTEGER NOT NULL,
     left_ms     INTEGER,
     why         TEXT,
     PRIMARY KEY (epoch, worker)
-) WITHOUT ROWID;
-CREATE TABLE local_workers (
-    epoch       INTEGER NOT NULL,
-    process     INTEGER NOT NULL,
-    PRIMARY KEY (epoch, process)
 ) WITHOUT ROWID;
 CREATE TABLE results (
     id          INTEGER PRIMARY KEY,

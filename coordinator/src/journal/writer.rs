@@ -17,7 +17,6 @@ use super::fits;
 use super::schema::node_id;
 use super::status;
 use super::unix_ms;
-use crate::comm::WorkerProcess;
 use crate::core::Deaths;
 
 /// How often `status.json` is written at most.
@@ -263,23 +262,16 @@ fn write_node(transaction: &Transaction<'_>, id: u64, row: &NodeRow) -> rusqlite
 
 fn write_workers(transaction: &Transaction<'_>, epoch: u64, batch: &Batch) -> rusqlite::Result<()> {
     for row in &batch.workers {
-        let WorkerProcess { id, name, is_local } = row.process;
         transaction
             .prepare_cached(
-                "INSERT INTO workers (epoch, worker, process, name, local, threads, joined_ms)
-                 VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7)",
+                "INSERT INTO workers (epoch, worker, process, threads, joined_ms) VALUES (?1, ?2, ?3, ?4, ?5)",
             )?
-            .execute(params![epoch, row.worker, id, name.0, is_local, row.threads, ms(row.at)])?;
+            .execute(params![epoch, row.worker, row.process, row.threads, ms(row.at)])?;
     }
     for row in &batch.left {
         transaction
             .prepare_cached("UPDATE workers SET left_ms = ?3, why = ?4 WHERE epoch = ?1 AND worker = ?2")?
             .execute(params![epoch, row.worker, ms(row.at), row.why])?;
-    }
-    for process in &batch.local_workers {
-        transaction
-            .prepare_cached("INSERT OR IGNORE INTO local_workers (epoch, process) VALUES (?1, ?2)")?
-            .execute(params![epoch, process])?;
     }
     if let Some(listen) = &batch.listen {
         transaction.execute("UPDATE epochs SET listen = ?2 WHERE epoch = ?1", params![epoch, listen])?;

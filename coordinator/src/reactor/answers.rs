@@ -61,23 +61,6 @@ fn take(core: &mut Core, node: NodeId, result: Candidate, now: Duration, outbox:
     accept(core, node, result, now, outbox)
 }
 
-/// An output has come that an earlier coordinator of this run had asked for.
-pub(super) fn recovered(
-    core: &mut Core,
-    worker: WorkerId,
-    node: NodeId,
-    output: Blob,
-    now: Duration,
-    outbox: &mut Outbox,
-) -> Result<(), RunError> {
-    membership::renew(core, worker, now);
-    core.summary.output_bytes_received += output.len() as u64;
-    // No attempt of today has this number: a second computation is another one.
-    let site = Site::Worker(worker);
-    let result = Candidate { site, process: process_of(core, site), attempt: 0, output, took: None };
-    take(core, node, result, now, outbox)
-}
-
 pub(super) fn failed(
     core: &mut Core,
     answer: Answer,

@@ -14,19 +14,6 @@ const FIRST_DELAY: Duration = Duration::from_millis(100);
 /// The longest of these pauses.
 const LONGEST_DELAY: Duration = Duration::from_secs(5);
 
-/// A worker executes a node for an earlier coordinator: keep it for that one if it is about to join. Whoever has to run alone
-/// begins anew.
-pub(super) fn go_on(core: &mut Core, worker: WorkerId, node: NodeId, now: Duration, outbox: &mut Outbox) {
-    if core.members.get(worker).is_some() {
-        if may_go_on(core, worker, node) {
-            adopt(core, worker, node, now, outbox);
-        }
-    } else if core.look(node).is_some_and(|record| matches!(record.place, Place::Queue(_))) {
-        core.put(node, Place::Nowhere);
-        core.continued.push((worker, node));
-    }
-}
-
 pub(super) fn join(
     core: &mut Core,
     worker: WorkerId,
@@ -44,15 +31,6 @@ pub(super) fn join(
     if let Some(mut lost) = core.departed.remove(process.name) {
         quarantine::take_back_death(core, process.name, &std::mem::take(&mut lost.deaths), now, outbox);
         core.members.change(worker, |member| member.resume(lost));
-    }
-    for (_, node) in core.continued.extract_if(.., |(continuing, _)| *continuing == worker).collect::<Vec<_>>() {
-        // Its output may have come meanwhile.
-        if core.graph.is_open(node) {
-            schedule::assign(core, worker, node, now, outbox);
-            // It has begun: nobody else shall get it for having idle threads.
-            let attempt = core.look(node).map_or(0, |record| record.attempts);
-            answers::started(core, worker, (node, attempt), (now, now), outbox);
-        }
     }
 }
 

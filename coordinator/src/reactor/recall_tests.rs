@@ -1,4 +1,4 @@
-//! A run that is gone on with: what is remembered does not run, and what survivors hold is not run twice.
+//! A resumed run: a node whose output the journal has does not run again.
 
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -13,7 +13,6 @@ use crate::core::{Core, Deaths, Policy};
 use crate::runner::RunError;
 
 const A: WorkerId = WorkerId(1);
-const B: WorkerId = WorkerId(2);
 
 #[derive(Debug, Default)]
 struct Notebook(BTreeMap<NodeKey, Memory>);
@@ -73,7 +72,6 @@ impl Bench {
     fn said(&mut self) -> Vec<String> {
         let line = |action: &Action| match action {
             Action::Assign { worker, lease } => Some(format!("{worker} gets {}.{}", lease.node.0, lease.attempt)),
-            Action::Cancel { worker, lease } => Some(format!("{worker} drops {}.{}", lease.node.0, lease.attempt)),
             Action::RunHere { node, .. } => Some(format!("run {} here", node.0)),
             Action::Tell(RunEvent::NodeRecalled { name, .. }) => Some(format!("{} recalled", name.label)),
             Action::Tell(RunEvent::NodeRequeued { name, crashes, .. }) => {
@@ -119,44 +117,6 @@ fn deaths_are_remembered() {
     bench.handle(Event::Started { worker: A, node: NodeId(0), attempt: 1 }).unwrap();
     let said = bench.handle(Event::WorkerLeft { worker: A, departure: Departure::Lost }).unwrap();
     assert!(said.contains(&"x requeued, 2".to_owned()), "{said:?}");
-}
-
-#[test]
-fn what_a_survivor_had_finished_is_taken_from_it_and_nobody_else_runs_it() {
-    let mut bench = Bench::new(&[]);
-    assert_eq!(bench.said(), ["run 2 here"]);
-    // The one that has the output is not even a member yet.
-    let recovered = |byte| Event::Recovered { worker: B, node: NodeId(0), output: Blob::new(vec![byte]) };
-    assert_eq!(bench.handle(recovered(7)).unwrap(), [""; 0]);
-    assert_eq!(bench.planner.completed, [NodeId(0)]);
-    assert_eq!(bench.join(A), ["worker 1 gets 1.1"]);
-    // Once more is fine, another output is not.
-    assert_eq!(bench.handle(recovered(7)).unwrap(), [""; 0]);
-    assert!(matches!(bench.handle(recovered(8)), Err(RunError::ResultsDiffer { .. })));
-}
-
-#[test]
-fn output_of_a_survivor_ends_the_lease_of_another_worker() {
-    let mut bench = Bench::new(&[]);
-    bench.join(A);
-    let recovered = Event::Recovered { worker: B, node: NodeId(1), output: Blob::new(vec![7]) };
-    let said = bench.handle(recovered).unwrap();
-    assert!(said.contains(&"worker 1 drops 1.1".to_owned()), "{said:?}");
-}
-
-#[test]
-fn survivor_gets_what_it_has_in_hand_before_others_get_anything() {
-    let mut bench = Bench::new(&[]);
-    bench.said();
-    bench.handle(Event::Continues { worker: B, node: NodeId(0) }).unwrap();
-    // A node that is done, or of another time, is nobody's.
-    bench.handle(Event::Continues { worker: B, node: NodeId(77) }).unwrap();
-    // Whoever joins first.
-    assert_eq!(bench.join(A), ["worker 1 gets 1.1"]);
-    assert_eq!(bench.join(B), ["worker 2 gets 0.1"]);
-    // An idle worker is given what merely waits somewhere, and not what was begun.
-    let third = bench.join(WorkerId(3));
-    assert!(third.iter().all(|said| !said.contains(" gets 0.")), "{third:?}");
 }
 
 #[test]

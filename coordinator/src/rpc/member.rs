@@ -42,7 +42,6 @@ pub(super) async fn serve<W: World>(greeted: Greeted<W::Stream>, worker: WorkerI
     let mut reader = Reader {
         worker,
         epoch: gate.epoch,
-        has_reported: gate.epoch == 1,
         output: None,
         unasked_bytes: 0,
         pending_blobs: Arc::clone(&pending_blobs),
@@ -124,10 +123,8 @@ fn departure_of(error: &WireError) -> Departure {
 /// The reading end of one worker's connection.
 struct Reader<R> {
     worker: WorkerId,
-    /// That of this coordinator.
+    /// That of this coordinator, and of every lease that it gives out.
     epoch: u64,
-    /// Whether it has told what it does for earlier ones.
-    has_reported: bool,
     incoming: Incoming<R>,
     /// The output that is being received.
     output: Option<(LeaseName, IncomingBlob)>,
@@ -194,18 +191,15 @@ impl<R: AsyncRead + Unpin> Reader<R> {
             }
         };
         Ok(Some(Inbound::Event(match message {
-            ToCoordinator::Heartbeat { executing } if !self.has_reported => {
-                self.has_reported = true;
-                let earlier = executing.iter().map(|node| node.lease).filter(|lease| lease.epoch < self.epoch);
-                let (executing, ours) = (earlier.collect(), self.ours(&executing));
-                return Ok(Some(Inbound::Reported { worker, executing, ours }));
+            ToCoordinator::Heartbeat { executing } => {
+                let executing = executing.iter().map(|node| self.executing(node)).collect::<Result<_, _>>()?;
+                Event::Heartbeat { worker, executing }
             }
-            ToCoordinator::Heartbeat { executing } => Event::Heartbeat { worker, executing: self.ours(&executing) },
-            ToCoordinator::Started(lease) if self.is_ours(lease)? => {
+            ToCoordinator::Started(lease) => {
+                self.check_epoch(lease)?;
                 let event = Event::Started { worker, node: NodeId(lease.node), attempt: lease.attempt };
                 return Ok(Some(Inbound::Timed { arrived: self.incoming.heard(), event }));
             }
-            ToCoordinator::Started(_) => self.life(),
             ToCoordinator::Fetch { hash } => {
                 if self.pending_blobs.fetch_add(1, Ordering::Relaxed) >= self.max_pending_blobs {
                     return Err(unexpected("a worker that reads what it asked for", "still more requests for blobs"));
@@ -216,14 +210,13 @@ impl<R: AsyncRead + Unpin> Reader<R> {
                 if self.output.is_some() {
                     return Err(unexpected("the rest of an output", "another output"));
                 }
+                self.check_epoch(lease)?;
                 self.output = Some((lease, IncomingBlob::begin(BlobHash(hash), length)?));
                 self.ask_before(lease, length).await?;
                 return self.output();
             }
             ToCoordinator::Failed { lease, kind, message } => {
-                if !self.is_ours(lease)? {
-                    return Ok(Some(Inbound::Late { worker, lease, output: None }));
-                }
+                self.check_epoch(lease)?;
                 let failure = failure(kind, bounded_text(&message));
                 Event::Failed { site: Site::Worker(worker), node: NodeId(lease.node), attempt: lease.attempt, failure }
             }
@@ -232,23 +225,21 @@ impl<R: AsyncRead + Unpin> Reader<R> {
         })))
     }
 
-    /// Whether this coordinator gave out a lease; else an earlier one of the run did.
-    fn is_ours(&self, lease: LeaseName) -> Result<bool, WireError> {
-        if lease.epoch == 0 || lease.epoch > self.epoch {
-            return Err(unexpected("a lease of this run", &format!("one of epoch {}", lease.epoch)));
+    /// That this coordinator gave out a lease: a worker drops those of earlier ones when it joins.
+    fn check_epoch(&self, lease: LeaseName) -> Result<(), WireError> {
+        if lease.epoch == self.epoch {
+            return Ok(());
         }
-        Ok(lease.epoch == self.epoch)
+        Err(WireError::Unexpected {
+            expected: "a lease of this coordinator",
+            found: format!("one of epoch {} in epoch {}", lease.epoch, self.epoch),
+        })
     }
 
-    /// What a worker executes for this coordinator. What was begun for an earlier one has another number there.
-    fn ours(&self, executing: &[protocol::Executing]) -> Vec<Executing> {
-        let ours = executing.iter().filter(|node| node.lease.epoch == self.epoch);
-        let known = ours.map(|protocol::Executing { lease, permille }| Executing {
-            node: NodeId(lease.node),
-            attempt: lease.attempt,
-            permille: (*permille).min(1000),
-        });
-        known.collect()
+    fn executing(&self, node: &protocol::Executing) -> Result<Executing, WireError> {
+        let protocol::Executing { lease, permille } = *node;
+        self.check_epoch(lease)?;
+        Ok(Executing { node: NodeId(lease.node), attempt: lease.attempt, permille: permille.min(1000) })
     }
 
     fn life(&self) -> Event {
@@ -263,10 +254,6 @@ impl<R: AsyncRead + Unpin> Reader<R> {
             return Ok(());
         }
         self.unasked_bytes = length;
-        // Of an earlier coordinator's leases nobody knows all.
-        if !self.is_ours(lease)? {
-            return Ok(());
-        }
         let (answer, answered) = oneshot::channel();
         let _ = self.inbound.send(Inbound::Ask { lease, answer }).await;
         match answered.await {
@@ -285,9 +272,6 @@ impl<R: AsyncRead + Unpin> Reader<R> {
             return Ok(None);
         };
         let (worker, output) = (self.worker, output.finish()?);
-        if !self.is_ours(lease)? {
-            return Ok(Some(Inbound::Late { worker, lease, output: Some(output) }));
-        }
         let (site, node, attempt) = (Site::Worker(worker), NodeId(lease.node), lease.attempt);
         let event = Event::Finished { site, node, attempt, output };
         Ok(Some(Inbound::Timed { arrived: self.incoming.heard(), event }))
@@ -321,7 +305,6 @@ mod tests {
         Reader {
             worker: WorkerId(1),
             epoch: 1,
-            has_reported: true,
             output: None,
             unasked_bytes: 0,
             pending_blobs: Arc::default(),

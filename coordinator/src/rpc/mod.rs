@@ -35,7 +35,7 @@ use self::strangers::{Place, Strangers};
 use crate::comm::RunEvent;
 use crate::limits::Limits;
 use crate::policy::Policy;
-use crate::reactor::{Event, Executing};
+use crate::reactor::Event;
 use crate::tls::accept;
 
 /// The pause after the system refuses to accept a connection, such as for want of file descriptors.
@@ -52,11 +52,6 @@ pub(crate) enum Inbound {
     Event(Event),
     /// Something happened at this time, which matters, though it may be looked at later.
     Timed { arrived: Instant, event: Event },
-    /// A worker's first sign of life to a coordinator that has gone on with a run: it executes these for an earlier one, and `ours` for
-    /// this one. What it had finished has come before.
-    Reported { worker: WorkerId, executing: Vec<LeaseName>, ours: Vec<Executing> },
-    /// An answer to a lease of an earlier coordinator of this run: the output, whose hash was verified, or none.
-    Late { worker: WorkerId, lease: LeaseName, output: Option<Blob> },
     /// Something to tell the user that the reactor does not care about.
     Tell(RunEvent),
 }

@@ -18,7 +18,6 @@ mod interrupt;
 mod memory;
 mod options;
 mod pulse;
-mod survivors;
 
 use std::error::Error as _;
 use std::sync::Arc;
@@ -33,14 +32,13 @@ use tokio::time::{Instant, MissedTickBehavior, interval, sleep_until};
 use tokio_util::sync::CancellationToken;
 use tracing::{info, trace};
 
-use self::cluster::{Cluster, Takeover};
+use self::cluster::{Cluster, Resumed};
 pub use self::error::{NodeAnswer, RunError};
 use self::here::Here;
 use self::interrupt::Interrupt;
 use self::memory::{Group, Memory};
 pub use self::options::RunnerOptions;
 pub use self::pulse::Pulse;
-use self::survivors::{Arrival, Survivors};
 use crate::comm::{Action, Lease, Outbox, RunEvent, Site, WorkerProcess};
 use crate::core::{Core, RunSummary};
 use crate::journal::Journal;
@@ -97,7 +95,7 @@ pub async fn run_in<W: World, P: Planner>(
     let journal = options.journal.as_ref().map(open).transpose()?;
     let (run, epoch) = journal.as_ref().map_or((RunName(name), FIRST_EPOCH), |journal| (journal.run, journal.epoch));
     let earlier = journal.as_ref().filter(|_| epoch > FIRST_EPOCH);
-    let takeover = earlier.map(|journal| Takeover::of(&journal.past, &options));
+    let resumed = earlier.map(|journal| Resumed { listen: journal.past.listen, results: journal.past.results });
     let core = Core::new(options.policy, epoch);
     let core = match &journal {
         Some(journal) => core.with_recall(journal.recall()),
@@ -111,12 +109,11 @@ pub async fn run_in<W: World, P: Planner>(
         cluster: None,
         observer,
         here: Here::new(world.common_pool(), registry, results_sender),
-        memory: Memory::new(journal, &options.policy),
-        survivors: None,
+        memory: Memory::new(journal),
         began: Instant::now(),
         world,
     };
-    let begin = Begin { options, run, takeover };
+    let begin = Begin { options, run, resumed };
     let outcome = driver.drive(begin, results, interrupted).await;
     info!(summary = ?driver.core.summary(), "the run is over");
     driver.here.cancel();
@@ -133,7 +130,7 @@ pub async fn run_in<W: World, P: Planner>(
 struct Begin {
     options: RunnerOptions,
     run: RunName,
-    takeover: Option<Takeover>,
+    resumed: Option<Resumed>,
 }
 
 struct Driver<W: World, P, O> {
@@ -146,8 +143,6 @@ struct Driver<W: World, P, O> {
     observer: O,
     here: Here<W::Pool>,
     memory: Memory,
-    /// The workers of an earlier coordinator, as long as they are waited for.
-    survivors: Option<Survivors>,
     began: Instant,
 }
 
@@ -175,7 +170,6 @@ impl<W: World, P: Planner, O: FnMut(&RunEvent)> Driver<W, P, O> {
             }
             let may_act = !is_over && self.memory.has_room();
             let deadline = self.core.next_deadline().map(|deadline| self.began + deadline);
-            let return_time = self.survivors.as_ref().map(|survivors| survivors.until);
             tokio::select! {
                 // What has come is looked at before the time is: a late look must not make a worker late.
                 biased;
@@ -193,7 +187,6 @@ impl<W: World, P: Planner, O: FnMut(&RunEvent)> Driver<W, P, O> {
                 }
                 () = told(wake.as_deref()), if may_act => events.push(Inbound::Event(Event::LookAgain)),
                 _ = beat.tick(), if pulse.is_some() => continue,
-                () = sleep_or_wait(return_time), if may_act => {}
                 () = sleep_or_wait(deadline), if may_act => {}
             }
             more(&mut inbound, &mut events);
@@ -209,27 +202,25 @@ impl<W: World, P: Planner, O: FnMut(&RunEvent)> Driver<W, P, O> {
     /// workers. What the planner cannot do is not an error of this function: what was said before shall be heard.
     async fn begin(
         &mut self,
-        Begin { options, run, takeover }: Begin,
+        Begin { options, run, resumed }: Begin,
         inbound: tokio::sync::mpsc::Sender<Inbound>,
     ) -> Result<Option<RunError>, RunError> {
         let (mut group, now) = (Group::default(), self.now());
-        if let Some(takeover) = &takeover {
-            let (epoch, results) = (self.core.epoch, takeover.results);
+        if let Some(resumed) = &resumed {
+            let (epoch, results) = (self.core.epoch, resumed.results);
             self.outbox.tell(RunEvent::Resumed { epoch, results });
         }
         let started = reactor::start(&mut self.core, &mut self.planner, now, &mut self.outbox);
         self.forget_if_wrong(started.as_ref().err(), &mut group);
         self.collect(&mut group, now);
         if started.is_ok() && !self.core.is_finished() {
-            let is_new = takeover.is_none();
-            let survivors = takeover.as_ref().map(|takeover| takeover.survivors.clone()).unwrap_or_default();
+            let is_new = resumed.is_none();
             let world = self.world.clone();
-            match Cluster::start(world, &options, (run, self.core.epoch), takeover, inbound).await {
+            match Cluster::start(world, &options, (run, self.core.epoch), resumed, inbound).await {
                 Ok(cluster) => {
                     (self.observer)(&RunEvent::Listening { address: cluster.address.clone() });
                     group.batch.listens(cluster.bound.to_string());
                     self.cluster = Some(cluster);
-                    self.survivors = Survivors::expect(survivors, Instant::now());
                 }
                 Err(error) => {
                     if is_new {
@@ -256,36 +247,16 @@ impl<W: World, P: Planner, O: FnMut(&RunEvent)> Driver<W, P, O> {
                     Inbound::Timed { arrived, .. } => Some(*arrived),
                     _ => None,
                 };
-                if let Some(event) = self.event(inbound, &mut group)? {
+                if let Some(event) = self.event(inbound, &mut group) {
                     self.handle_arrived(event, arrived, &mut group)?;
                 }
             }
-            let back = self.survivors.take_if(|survivors| survivors.are_complete(Instant::now()));
-            let arrivals = back.map(Survivors::into_arrivals).unwrap_or_default();
-            self.welcome(arrivals, &mut group)
+            Ok(())
         };
         let outcome = handle_all();
         // Also after an error: what was said before it shall be heard.
         self.submit(group);
         outcome
-    }
-
-    /// Let the workers in that had to wait for each other. First each gets what it has in hand.
-    fn welcome(&mut self, arrivals: Vec<Arrival>, group: &mut Group) -> Result<(), RunError> {
-        for Arrival { worker, executing, .. } in &arrivals {
-            for lease in executing.iter().flatten() {
-                if let Some(node) = self.memory.today(*lease) {
-                    self.handle(Event::Continues { worker: *worker, node }, group)?;
-                }
-            }
-        }
-        arrivals.into_iter().try_for_each(|Arrival { worker, threads, process, .. }| {
-            self.handle(Event::WorkerJoined { worker, threads, process }, group)
-        })
-    }
-
-    fn handle(&mut self, event: Event, group: &mut Group) -> Result<(), RunError> {
-        self.handle_arrived(event, None, group)
     }
 
     fn handle_arrived(&mut self, event: Event, arrived: Option<Instant>, group: &mut Group) -> Result<(), RunError> {
@@ -324,38 +295,21 @@ impl<W: World, P: Planner, O: FnMut(&RunEvent)> Driver<W, P, O> {
         }
     }
 
-    fn event(&mut self, inbound: Inbound, group: &mut Group) -> Result<Option<Event>, RunError> {
-        Ok(match inbound {
+    fn event(&mut self, inbound: Inbound, group: &mut Group) -> Option<Event> {
+        match inbound {
             Inbound::Event(event) | Inbound::Timed { event, .. } => {
                 if let Event::WorkerLeft { worker, .. } = &event {
                     self.cluster.iter_mut().for_each(|cluster| cluster.dismiss(*worker));
                 }
-                // Who is asked to end while others are waited for need not join any more.
-                if let Event::WorkerLeft { worker, .. } | Event::WorkerDrains { worker } = &event {
-                    self.survivors.iter_mut().for_each(|survivors| survivors.left(*worker));
-                }
                 Some(event)
             }
             Inbound::Joined { worker, hello, mailbox } => {
-                let Some(cluster) = self.cluster.as_mut() else { return Ok(None) };
+                let cluster = self.cluster.as_mut()?;
                 let process = WorkerProcess { id: hello.process, name: hello.name, is_local: hello.is_local };
                 let threads = usize::try_from(hello.threads).unwrap_or(usize::MAX).clamp(1, MAX_THREADS);
-                let is_wanted = cluster.admit(worker, process, mailbox);
-                match &mut self.survivors {
-                    Some(survivors) if is_wanted => survivors.joined(worker, threads, process),
-                    Some(survivors) => survivors.dismissed(process.name),
-                    None => return Ok(is_wanted.then_some(Event::WorkerJoined { worker, threads, process })),
-                }
-                None
+                cluster.admit(worker, process, mailbox);
+                Some(Event::WorkerJoined { worker, threads, process })
             }
-            Inbound::Reported { worker, executing, ours } => {
-                match &mut self.survivors {
-                    Some(survivors) => survivors.reported(worker, executing),
-                    None => self.go_on(worker, &executing, group)?,
-                }
-                Some(Event::Heartbeat { worker, executing: ours })
-            }
-            Inbound::Late { worker, lease, output } => Some(self.memory.late_answer(worker, lease, output, group)),
             Inbound::Ask { lease, answer } => {
                 // Whoever asked may be gone.
                 let _ = answer.send(self.core.was_given_out(NodeId(lease.node), lease.attempt));
@@ -366,20 +320,11 @@ impl<W: World, P: Planner, O: FnMut(&RunEvent)> Driver<W, P, O> {
                 group.actions.push(Action::Tell(event));
                 None
             }
-        })
-    }
-
-    /// A worker that nobody waited for any more goes on with what an earlier coordinator gave it.
-    fn go_on(&mut self, worker: WorkerId, executing: &[LeaseName], group: &mut Group) -> Result<(), RunError> {
-        let today: Vec<_> = executing.iter().filter_map(|lease| self.memory.today(*lease)).collect();
-        today.into_iter().try_for_each(|node| self.handle(Event::Continues { worker, node }, group))
+        }
     }
 
     /// Do what a group asks for.
     fn perform(&mut self, group: Group) {
-        for (worker, lease) in group.late {
-            self.send(worker, ToWorker::Acknowledge(lease));
-        }
         for action in group.actions {
             match action {
                 Action::Assign { worker, lease } => self.assign(worker, lease),

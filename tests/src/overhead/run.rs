@@ -87,7 +87,7 @@ pub(super) fn options(folder: &Path, resume: bool) -> Result<RunnerOptions> {
         worker_command: Some(command),
         threads_per_worker: Some(std::num::NonZeroUsize::MIN),
         handle_signals: false,
-        journal: Some(JournalOptions { resume, survivors: resume, ..journal }),
+        journal: Some(JournalOptions { resume, ..journal }),
         ..RunnerOptions::new(WORKERS, folder.join("access.json"))
     })
 }

@@ -5,6 +5,7 @@ mod fits;
 mod network;
 mod phases;
 mod random;
+mod resume;
 mod storms;
 
 use std::path::Path;

@@ -6,7 +6,7 @@ use super::deeds::{Deed, Fault, Link};
 use super::run::Run;
 use super::stage::Place;
 
-/// How many coordinators are killed at most: after each, workers are waited for.
+/// How many coordinators are killed at most.
 const MOST_COORDINATORS: u32 = 4;
 
 impl Run {
@@ -52,24 +52,27 @@ impl Run {
     /// Do harm to a worker, or to the coordinator. Whether that was possible.
     fn hurt(&mut self, fault: Fault, index: usize) -> bool {
         let time = fault.time(&mut self.chance);
-        let place = if fault == Fault::KillCoordinator { Place::Coordinator } else { Place::Worker(index) };
+        let is_coordinator = matches!(fault, Fault::KillCoordinator | Fault::KillAll);
+        let place = if is_coordinator { Place::Coordinator } else { Place::Worker(index) };
         let needs_link = matches!(fault, Fault::Link(_) | Fault::PowerOff);
         if self.absent.contains(&place) || needs_link && self.broken.contains_key(&index) {
             return false;
         }
-        if fault == Fault::KillCoordinator && self.faults.get(fault.name()) == Some(&MOST_COORDINATORS) {
+        let kills = [Fault::KillCoordinator, Fault::KillAll].map(|fault| self.faults.get(fault.name()).copied());
+        if is_coordinator && kills.into_iter().flatten().sum::<u32>() >= MOST_COORDINATORS {
             return false;
         }
         let wishes = self.stage.state().wishes.get(&place).cloned();
         self.stage.note(self.sim.elapsed(), place, &format!("* {} for {time:?}", fault.name()));
         match fault {
-            Fault::Link(Link::Slow) | Fault::SlowDown | Fault::KillCoordinator => {}
+            Fault::Link(Link::Slow) | Fault::SlowDown | Fault::KillCoordinator | Fault::KillAll => {}
             _ => self.harm(place),
         }
         match fault {
             Fault::Link(link) => self.break_link(index, link, time),
             Fault::ResetConnections => self.reset_ends(index, time),
             Fault::KillWorker | Fault::KillCoordinator => self.kill(place, time),
+            Fault::KillAll => self.kill_all(time),
             Fault::PowerOff => {
                 self.break_link(index, Link::Cut, time);
                 self.kill(place, time);
@@ -98,6 +101,19 @@ impl Run {
     fn harm(&mut self, place: Place) {
         let process = self.stage.process(place);
         self.stage.state().harmed.insert(process);
+    }
+
+    /// Kill the coordinator and about half of the workers, which come back later than it, most of them one after the other.
+    fn kill_all(&mut self, time: Duration) {
+        self.kill(Place::Coordinator, time);
+        for index in 0..self.workers {
+            let place = Place::Worker(index);
+            if self.chance.happens(0.5) && !self.absent.contains(&place) {
+                self.harm(place);
+                let after = time + self.chance.time(0, 15_000);
+                self.kill(place, after);
+            }
+        }
     }
 
     fn kill(&mut self, place: Place, time: Duration) {
