@@ -42,7 +42,7 @@ use lookalike::{
 };
 use lookalike_coordinator::{
     comm::RunEvent,
-    journal::{self, Finished, FitLedger, JOURNAL_FILE, JournalOptions, RunIdentity},
+    journal::{self, Finished, JOURNAL_FILE, JournalOptions, PartLedger, RunIdentity},
     metrics::Metrics,
 };
 use lookalike_report::measured::{About, StudyData};
@@ -125,8 +125,8 @@ fn run_cells(
         path: inputs.out.file(JOURNAL_FILE),
         identity: identity(inputs)?,
         resume: settings.resume,
-        best: None,
-        fits: FitLedger::default(),
+        score: None,
+        parts: PartLedger::default(),
     });
     let mut workers = 0;
     let run = run_to_end(options, Many::new(supply), metrics, |event| {
@@ -157,7 +157,7 @@ fn end(out: &OutFolder, failed: usize) -> anyhow::Result<()> {
     let path = out.file(JOURNAL_FILE);
     if failed > 0 {
         let ended = format!("{failed} cells of the study failed");
-        return journal::settle(&path, &FitLedger::default(), Some(&ended)).map_err(journal_failed);
+        return journal::settle(&path, &PartLedger::default(), Some(&ended)).map_err(journal_failed);
     }
     let names = ["results.md", "results.json", "report.html"];
     let outputs = names.into_iter().filter_map(|name| Some((name.to_owned(), out.hash(name).transpose()?)));

@@ -18,7 +18,7 @@
 //! | `attempts` | lease that was given out: worker, when, how it ended |
 //! | `workers` | connection of a worker |
 //! | `results` | node key: the hash and the bytes of its output |
-//! | `fits` | fit of a run of many: how it is doing, what it wrote |
+//! | `parts` | part of a run of many, such as a fit of a batch: its state, what it wrote |
 //!
 //! What nothing depends on is written about once a second: `deferred.rs`.
 //!
@@ -32,9 +32,9 @@ mod deferred;
 mod disk;
 mod error;
 mod finish;
-mod fits;
 mod identity;
 mod lock;
+mod parts;
 mod past;
 mod place;
 mod schema;
@@ -42,13 +42,13 @@ pub mod status;
 mod writer;
 
 use std::collections::{HashMap, HashSet};
+use std::fmt;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::mpsc::{Sender, channel, sync_channel};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant, SystemTime};
 
-use lookalike::fit::BestScore;
 use lookalike::graph::NodeKey;
 use lookalike::protocol::RunName;
 use tokio::sync::mpsc::{UnboundedReceiver, unbounded_channel};
@@ -58,10 +58,10 @@ use self::deferred::Deferred;
 use self::disk::Disk;
 pub use self::error::JournalError;
 pub use self::finish::{Finished, finish, finished, settle};
-pub use self::fits::{FitLedger, FitStatus};
-pub use self::fits::{FitRow, written};
 pub use self::identity::{Difference, RunIdentity};
 pub use self::lock::{LOCK_FILE, LockError, RunLock};
+pub use self::parts::{PartLedger, PartStatus};
+pub use self::parts::{PartRow, written};
 pub(crate) use self::past::Past;
 pub use self::schema::remove;
 use self::writer::{Command, Writer};
@@ -71,8 +71,11 @@ use crate::core::recall::{Memory, Recall};
 /// The journal's file in a folder of results.
 pub const JOURNAL_FILE: &str = "run.sqlite";
 
+/// Says the best score of a run so far, once there is one; the lowest is the best.
+pub type Score = Arc<dyn Fn() -> Option<f64> + Send + Sync>;
+
 /// Where a run is written down, and what it is a run of.
-#[derive(Clone, Debug)]
+#[derive(Clone)]
 pub struct JournalOptions {
     /// The file; its folder has to exist. Only one process may use it at a time: see [`RunLock`].
     pub path: PathBuf,
@@ -81,16 +84,26 @@ pub struct JournalOptions {
     /// Whether to go on with a run that is there. Without one, a new run begins either way.
     pub resume: bool,
     /// The best score so far, for people who look at the run.
-    pub best: Option<Arc<BestScore>>,
-    /// What becomes of the fits, in a run of many.
-    pub fits: FitLedger,
+    pub score: Option<Score>,
+    /// What becomes of the parts, in a run of many.
+    pub parts: PartLedger,
 }
 
 impl JournalOptions {
     /// A new run.
     #[must_use]
     pub fn new(path: PathBuf, identity: RunIdentity) -> Self {
-        Self { path, identity, resume: false, best: None, fits: FitLedger::default() }
+        Self { path, identity, resume: false, score: None, parts: PartLedger::default() }
+    }
+}
+
+/// Without the score, which is a function.
+impl fmt::Debug for JournalOptions {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { path, identity, resume, parts, .. } = self;
+        let mut text = formatter.debug_struct("JournalOptions");
+        text.field("path", path).field("identity", identity).field("resume", resume).field("parts", parts);
+        text.finish_non_exhaustive()
     }
 }
 

@@ -36,7 +36,7 @@ CREATE TABLE epochs (
     ended_ms    INTEGER,
     ended       TEXT,
     listen      TEXT,
-    best_cssim  REAL
+    best_score  REAL
 );
 CREATE TABLE nodes (
     id          INTEGER PRIMARY KEY,
@@ -76,15 +76,17 @@ CREATE TABLE results (
     hash        BLOB NOT NULL,
     bytes       BLOB
 );
-CREATE TABLE fits (
+CREATE TABLE parts (
     name        TEXT PRIMARY KEY,
     number      INTEGER NOT NULL,
     state       TEXT NOT NULL,
-    cssim       REAL,
+    score       REAL,
     seconds     REAL,
     error       TEXT,
     outputs     TEXT
 ) WITHOUT ROWID;
+CREATE VIEW fits AS
+    SELECT name, number, state, score AS cssim, seconds, error, outputs FROM parts;
 CREATE VIEW node_list AS
     SELECT id >> 32 AS epoch, id & 0xffffffff AS node, kind, label,
            CASE state WHEN 0 THEN 'waiting' WHEN 1 THEN 'ready' WHEN 2 THEN 'running' WHEN 3 THEN 'completed'

@@ -13,7 +13,7 @@ use super::batch::{NodeRow, State, WorkerRow};
 use super::status::{RunState, Status};
 use super::*;
 
-mod fits;
+mod parts;
 
 const NAME: RunName = RunName([7; 16]);
 const DEATHS: Deaths = Deaths { in_company: 2, alone: 1, excused: 3 };

@@ -13,7 +13,7 @@ use super::JournalOptions;
 use super::batch::{Batch, NodeRow};
 use super::deferred::{Deferred, ms};
 use super::error::JournalError;
-use super::fits;
+use super::parts;
 use super::schema::node_id;
 use super::status;
 use super::unix_ms;
@@ -98,9 +98,9 @@ impl Writer {
             return Ok(());
         }
         let mut new = Vec::new();
-        let fits = self.options.fits.take();
+        let parts = self.options.parts.take();
         let outcome = self.connection.transaction().and_then(|transaction| {
-            fits::write(&transaction, &fits)?;
+            parts::write(&transaction, &parts)?;
             new = write(&transaction, self.epoch, batch, &self.results)?;
             let rows = if is_much { Some(self.deferred.write(&transaction)?) } else { None };
             transaction.commit()?;
@@ -112,7 +112,7 @@ impl Writer {
             None => outcome,
         };
         if let Err(source) = outcome {
-            self.options.fits.put_back(fits);
+            self.options.parts.put_back(parts);
             return Err(JournalError::writing(&self.options.path, source));
         }
         self.results.extend(new);
@@ -171,9 +171,9 @@ impl Writer {
 
     /// Write what could wait.
     fn write_deferred(&mut self) {
-        let fits = self.options.fits.take();
+        let parts = self.options.parts.take();
         let outcome = self.connection.transaction().and_then(|transaction| {
-            fits::write(&transaction, &fits)?;
+            parts::write(&transaction, &parts)?;
             let rows = self.deferred.write(&transaction)?;
             transaction.commit()?;
             Ok(rows)
@@ -181,7 +181,7 @@ impl Writer {
         match outcome {
             Ok(rows) => self.deferred.written(rows),
             Err(error) => {
-                self.options.fits.put_back(fits);
+                self.options.parts.put_back(parts);
                 warn!(%error, "cannot note in the journal what is under way");
             }
         }
@@ -191,9 +191,9 @@ impl Writer {
     fn tell_status(&mut self) {
         let began = Instant::now();
         self.write_deferred();
-        let best = self.options.best.as_ref().and_then(|best| best.get());
+        let best = self.options.score.as_ref().and_then(|score| score());
         let seen = self.connection.execute(
-            "UPDATE epochs SET seen_ms = ?2, best_cssim = ?3 WHERE epoch = ?1",
+            "UPDATE epochs SET seen_ms = ?2, best_score = ?3 WHERE epoch = ?1",
             params![self.epoch, unix_ms(), best],
         );
         if let Err(error) = seen {
