@@ -17,6 +17,7 @@ mod certificate;
 mod codec;
 mod frame;
 mod handshake;
+mod hex;
 mod message;
 mod transfer;
 mod version;
