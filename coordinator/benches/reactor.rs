@@ -9,7 +9,7 @@ use criterion::{BatchSize, Criterion, criterion_group, criterion_main};
 use lookalike::graph::{Blob, GraphEdit, NodeId, NodeSpec, Placement, PlanError, Planner, WorkerId};
 use lookalike::protocol::ProcessName;
 use lookalike_coordinator::comm::{Action, Outbox, Site, WorkerProcess};
-use lookalike_coordinator::core::{Core, Policy};
+use lookalike_coordinator::state::{Core, Policy};
 use lookalike_coordinator::reactor::{Event, handle, start};
 
 const NODES: usize = 100_000;

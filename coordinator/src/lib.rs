@@ -3,7 +3,6 @@
 
 pub mod access;
 pub mod comm;
-pub mod core;
 pub mod journal;
 pub mod limits;
 pub mod metrics;
@@ -12,4 +11,5 @@ pub mod reactor;
 mod rpc;
 pub mod runner;
 pub mod spawn;
+pub mod state;
 pub mod tls;

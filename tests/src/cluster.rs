@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 use lookalike::protocol::Access;
 use lookalike_coordinator::comm::RunEvent;
-use lookalike_coordinator::core::RunSummary;
+use lookalike_coordinator::state::RunSummary;
 use lookalike_coordinator::runner::{RunError, RunnerOptions, run};
 use lookalike_coordinator::spawn::WorkerCommand;
 use tempfile::TempDir;

@@ -5,7 +5,7 @@ use std::time::{Duration, SystemTime};
 
 use lookalike_coordinator::access::Credentials;
 use lookalike_coordinator::comm::RunEvent;
-use lookalike_coordinator::core::Policy;
+use lookalike_coordinator::state::Policy;
 use lookalike_coordinator::runner::{RunError, RunnerOptions};
 use lookalike_coordinator::spawn::WorkerCommand;
 use lookalike_tests::cluster::{Cluster, options};

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use lookalike::graph::FailureReason;
 use lookalike_coordinator::comm::{Departure, RunEvent};
-use lookalike_coordinator::core::Policy;
+use lookalike_coordinator::state::Policy;
 use lookalike_coordinator::runner::{RunError, RunnerOptions};
 use lookalike_tests::cluster::{Cluster, options};
 use lookalike_tests::gate::Gate;

@@ -5,7 +5,7 @@ use anyhow::Context;
 use lookalike::{graph::Planner, nodes};
 use lookalike_coordinator::{
     comm::RunEvent,
-    core::RunSummary,
+    state::RunSummary,
     metrics::Metrics,
     runner::{self, RunnerOptions},
 };

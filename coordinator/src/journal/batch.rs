@@ -6,7 +6,7 @@ use std::time::Duration;
 use lookalike::graph::{Blob, FailureReason, NodeId, NodeKey, NodeState, WorkerId};
 
 use crate::comm::{Action, RunEvent, Site};
-use crate::core::{Core, Deaths, Record};
+use crate::state::{Core, Deaths, Record};
 
 /// The worker's number of what runs in the coordinator itself. Workers count from 1.
 const HERE: u64 = 0;

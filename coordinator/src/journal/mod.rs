@@ -65,8 +65,8 @@ pub use self::parts::{PartRow, written};
 pub(crate) use self::past::Past;
 pub use self::schema::remove;
 use self::writer::{Command, Writer};
-use crate::core::Deaths;
-use crate::core::recall::{Memory, Recall};
+use crate::state::Deaths;
+use crate::state::recall::{Memory, Recall};
 
 /// The journal's file in a folder of results.
 pub const JOURNAL_FILE: &str = "run.sqlite";

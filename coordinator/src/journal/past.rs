@@ -12,7 +12,7 @@ use super::error::JournalError;
 use super::identity::RunIdentity;
 use super::lock::host;
 use super::{Loaded, schema, unix_ms};
-use crate::core::Deaths;
+use crate::state::Deaths;
 
 /// What earlier epochs have left.
 #[derive(Debug, Default)]

@@ -17,7 +17,7 @@ use super::parts;
 use super::schema::node_id;
 use super::status;
 use super::unix_ms;
-use crate::core::Deaths;
+use crate::state::Deaths;
 
 /// How often `status.json` is written at most.
 const STATUS_INTERVAL: Duration = Duration::from_secs(1);

@@ -7,7 +7,7 @@ use lookalike::protocol::ProcessName;
 
 use super::{membership, schedule};
 use crate::comm::{Action, Departure, Outbox, RunEvent, Site};
-use crate::core::{Candidate, Core, Place};
+use crate::state::{Candidate, Core, Place};
 use crate::runner::{NodeAnswer, RunError};
 
 /// An answer: (where from, for which node, for which attempt).

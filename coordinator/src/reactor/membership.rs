@@ -6,7 +6,7 @@ use lookalike::graph::{BlobHash, FailureReason, NodeId, NodeState, WorkerId};
 
 use super::{answers, quarantine, schedule};
 use crate::comm::{Action, Departure, Lease, Outbox, RunEvent, WorkerProcess};
-use crate::core::{Core, Lost, Place};
+use crate::state::{Core, Lost, Place};
 
 /// The pause after a node in execution has lost its worker for the second time; each further one is twice as long.
 const FIRST_DELAY: Duration = Duration::from_millis(100);

@@ -10,7 +10,7 @@ use proptest::prelude::*;
 use super::tests::{Script, node, process};
 use super::{Event, Executing, handle, start};
 use crate::comm::{Action, Departure, Outbox, Site};
-use crate::core::{Core, Policy};
+use crate::state::{Core, Policy};
 use crate::policy::Speculation;
 use lookalike::graph::FailureReason;
 

@@ -1,9 +1,9 @@
 //! Nodes that may kill their workers: whom to suspect of a death, and when to believe it.
 //!
 //! Only what a worker was executing can have killed it. After a few deaths in which a node took part
-//! ([`Policy::suspect_after`](crate::core::Policy::suspect_after)) it is a *suspect*: it runs alone, on a worker that has
+//! ([`Policy::suspect_after`](crate::state::Policy::suspect_after)) it is a *suspect*: it runs alone, on a worker that has
 //! executed nothing before or at least nothing else at the same time. Only deaths there count against it, and so many of
-//! them ([`Policy::node_crashes`](crate::core::Policy::node_crashes)) fail it by name.
+//! them ([`Policy::node_crashes`](crate::state::Policy::node_crashes)) fail it by name.
 //!
 //! Somebody who kills workers from outside may hit a suspect's worker as well. What tells the two apart is whom else they
 //! hit: as long as workers die whose deaths no suspect explains, a suspect is excused, though not for ever.
@@ -17,7 +17,7 @@ use lookalike::protocol::ProcessName;
 
 use super::schedule;
 use crate::comm::{Outbox, RunEvent};
-use crate::core::{Core, Death, Deaths, Member, Place, Unexplained};
+use crate::state::{Core, Death, Deaths, Member, Place, Unexplained};
 
 /// How many deaths of a suspect's workers are excused for one that would count: where a machine fails all the time, a node that
 /// kills its workers has to fail in the end.

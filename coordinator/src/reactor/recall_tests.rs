@@ -8,8 +8,8 @@ use lookalike::graph::{Blob, Graph, Input, NodeId, NodeKey, NodeSpec, Placement,
 use super::tests::{Script, node, process};
 use super::{Event, handle, start};
 use crate::comm::{Action, Departure, Outbox, RunEvent, Site};
-use crate::core::recall::{Memory, Recall};
-use crate::core::{Core, Deaths, Policy};
+use crate::state::recall::{Memory, Recall};
+use crate::state::{Core, Deaths, Policy};
 use crate::runner::RunError;
 
 const A: WorkerId = WorkerId(1);

@@ -7,7 +7,7 @@ use lookalike::graph::{NodeId, WorkerId};
 
 use super::speculation;
 use crate::comm::{Action, Lease, Outbox, RunEvent, Site};
-use crate::core::{Core, Place};
+use crate::state::{Core, Place};
 
 /// How many nodes are looked at to find one that a worker may check. More are only more of the same: outputs of this very
 /// worker, which another one will check.

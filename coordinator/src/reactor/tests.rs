@@ -10,7 +10,7 @@ use lookalike::protocol::ProcessName;
 
 use super::{Event, Executing, handle, handle_arrived, start};
 use crate::comm::{Action, Departure, Outbox, RunEvent, Site, WorkerProcess};
-use crate::core::{Core, Policy};
+use crate::state::{Core, Policy};
 use crate::policy::Speculation;
 use crate::runner::RunError;
 

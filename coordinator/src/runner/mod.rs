@@ -40,7 +40,7 @@ use self::memory::{Group, Memory};
 pub use self::options::RunnerOptions;
 pub use self::pulse::Pulse;
 use crate::comm::{Action, Lease, Outbox, RunEvent, Site, WorkerProcess};
-use crate::core::{Core, RunSummary};
+use crate::state::{Core, RunSummary};
 use crate::journal::Journal;
 use crate::reactor::{self, Event};
 use crate::rpc::{Inbound, Outgoing};

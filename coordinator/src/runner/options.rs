@@ -8,7 +8,7 @@ use std::sync::Arc;
 use tokio::sync::Notify;
 
 use super::{Pulse, RunError};
-use crate::core::Policy;
+use crate::state::Policy;
 use crate::journal::JournalOptions;
 use crate::limits::Limits;
 use crate::spawn::WorkerCommand;

@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use lookalike::graph::Planner;
 use lookalike_coordinator::comm::RunEvent;
-use lookalike_coordinator::core::RunSummary;
+use lookalike_coordinator::state::RunSummary;
 use lookalike_coordinator::journal::{JOURNAL_FILE, JournalOptions, RunIdentity};
 use lookalike_coordinator::runner::{RunnerOptions, run};
 use lookalike_coordinator::spawn::WorkerCommand;

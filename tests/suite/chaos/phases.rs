@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use lookalike_coordinator::comm::{Departure, RunEvent};
-use lookalike_coordinator::core::Policy;
+use lookalike_coordinator::state::Policy;
 use lookalike_coordinator::runner::RunnerOptions;
 use lookalike_tests::cluster::Cluster;
 use lookalike_tests::gate::{Gate, Waiting};

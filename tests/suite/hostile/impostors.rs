@@ -7,7 +7,7 @@ use std::time::Duration;
 use lookalike::graph::BlobHash;
 use lookalike::protocol::{Executing, FailureKind, FrameTag, Hello, LeaseName, ToCoordinator, ToWorker};
 use lookalike_coordinator::comm::{Departure, RunEvent};
-use lookalike_coordinator::core::Policy;
+use lookalike_coordinator::state::Policy;
 use lookalike_coordinator::limits::Limits;
 use lookalike_coordinator::runner::{RunError, RunnerOptions};
 use lookalike_tests::cluster::{Cluster, options, read_access};

@@ -6,7 +6,7 @@ use lookalike::protocol::{
     FailureKind, FrameTag, LeaseName, PART_BYTES, ToCoordinator, ToWorker, encode_message, frame_header,
 };
 use lookalike_coordinator::comm::{Departure, RunEvent};
-use lookalike_coordinator::core::Policy;
+use lookalike_coordinator::state::Policy;
 use lookalike_coordinator::limits::Limits;
 use lookalike_coordinator::runner::{RunError, RunnerOptions};
 use lookalike_tests::cluster::{Cluster, options};

@@ -9,7 +9,7 @@ use std::time::{Duration, SystemTime};
 
 use lookalike::graph::{Execution, run_in_process};
 use lookalike_coordinator::access::Credentials;
-use lookalike_coordinator::core::RunSummary;
+use lookalike_coordinator::state::RunSummary;
 use lookalike_tests::journal::JournalView;
 use tempfile::TempDir;
 use turmoil::{Builder, Sim};

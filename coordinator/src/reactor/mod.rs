@@ -5,7 +5,7 @@
 //! end without a result (its worker left) or be overtaken by the result of another attempt; any attempt's result is as
 //! good as another's, because nodes are pure functions. Results that differ show that one was not, and end the run.
 //!
-//! No event looks at all nodes or all workers: what has to be found among them is indexed in [`core`](crate::core).
+//! No event looks at all nodes or all workers: what has to be found among them is indexed in [`state`](crate::state).
 
 mod answers;
 mod membership;
@@ -21,7 +21,7 @@ use lookalike::graph::{
 };
 
 use crate::comm::{Action, Departure, Outbox, RunEvent, Site, WorkerProcess};
-use crate::core::{Core, Record, Starving};
+use crate::state::{Core, Record, Starving};
 use crate::runner::RunError;
 
 /// Something that happened.

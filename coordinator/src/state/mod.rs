@@ -19,7 +19,7 @@ use self::members::{Size, weight};
 use self::pace::Pace;
 pub(crate) use self::waiting::{Place, Waiting};
 use crate::comm::{NodeName, Site};
-use crate::core::recall::Recall;
+use crate::state::recall::Recall;
 pub use crate::policy::Policy;
 
 /// What a run has cost, for people: nothing of it may reach a result.
