@@ -2,7 +2,8 @@
 //! run. It knows neither rendering nor a command line: it imports `lookalike`'s graph and protocol only.
 
 pub mod access;
-pub mod comm;
+pub mod actions;
+pub mod events;
 pub mod journal;
 pub mod limits;
 pub mod metrics;

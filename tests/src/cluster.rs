@@ -7,10 +7,10 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use lookalike::protocol::Access;
-use lookalike_coordinator::comm::RunEvent;
-use lookalike_coordinator::state::RunSummary;
+use lookalike_coordinator::events::RunEvent;
 use lookalike_coordinator::runner::{RunError, RunnerOptions, run};
 use lookalike_coordinator::spawn::WorkerCommand;
+use lookalike_coordinator::state::RunSummary;
 use tempfile::TempDir;
 
 use crate::nodes::registry;

@@ -4,10 +4,10 @@ use std::process::Command;
 use std::time::{Duration, SystemTime};
 
 use lookalike_coordinator::access::Credentials;
-use lookalike_coordinator::comm::RunEvent;
-use lookalike_coordinator::state::Policy;
+use lookalike_coordinator::events::RunEvent;
 use lookalike_coordinator::runner::{RunError, RunnerOptions};
 use lookalike_coordinator::spawn::WorkerCommand;
+use lookalike_coordinator::state::Policy;
 use lookalike_tests::cluster::{Cluster, options};
 use lookalike_tests::gate::{Gate, Waiting};
 use lookalike_tests::plan::{Leaves, TestPlanner};

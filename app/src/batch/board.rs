@@ -18,7 +18,7 @@ use lookalike::{
     graph::split_label,
 };
 use lookalike_coordinator::{
-    comm::RunEvent,
+    events::RunEvent,
     journal::{PartLedger, PartRow, PartStatus},
     metrics::Metrics,
 };

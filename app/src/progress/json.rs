@@ -6,7 +6,7 @@ use super::{
     print_line,
 };
 use lookalike::graph::split_label;
-use lookalike_coordinator::comm::{NodeName, RunEvent, Site};
+use lookalike_coordinator::events::{NodeName, RunEvent, Site};
 use serde_json::{Value, json};
 use std::time::Instant;
 

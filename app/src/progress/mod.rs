@@ -12,7 +12,7 @@ pub(crate) use fits::{FitCount, FitEvent};
 
 use crate::settings::ProgressKind;
 use lookalike::fit::BestScore;
-use lookalike_coordinator::comm::RunEvent;
+use lookalike_coordinator::events::RunEvent;
 use std::{
     io::{self, IsTerminal, Write as _},
     sync::Arc,

@@ -41,7 +41,7 @@ use lookalike::{
     plan::encode_light,
 };
 use lookalike_coordinator::{
-    comm::RunEvent,
+    events::RunEvent,
     journal::{self, Finished, JOURNAL_FILE, JournalOptions, PartLedger, RunIdentity},
     metrics::Metrics,
 };

@@ -5,7 +5,8 @@ use std::time::Duration;
 
 use lookalike::graph::{Blob, FailureReason, NodeId, NodeKey, NodeState, WorkerId};
 
-use crate::comm::{Action, RunEvent, Site};
+use crate::actions::Action;
+use crate::events::{RunEvent, Site};
 use crate::state::{Core, Deaths, Record};
 
 /// The worker's number of what runs in the coordinator itself. Workers count from 1.

@@ -8,7 +8,7 @@ mod histogram;
 mod http;
 mod text;
 
-use crate::{comm::RunEvent, runner::Pulse};
+use crate::{events::RunEvent, runner::Pulse};
 use book::Book;
 use std::{
     io,

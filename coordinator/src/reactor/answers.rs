@@ -6,9 +6,10 @@ use lookalike::graph::{Blob, BlobHash, Completion, FailureReason, NodeFailure, N
 use lookalike::protocol::ProcessName;
 
 use super::{membership, schedule};
-use crate::comm::{Action, Departure, Outbox, RunEvent, Site};
-use crate::state::{Candidate, Core, Place};
+use crate::actions::{Action, Outbox};
+use crate::events::{Departure, RunEvent, Site};
 use crate::runner::{NodeAnswer, RunError};
+use crate::state::{Candidate, Core, Place};
 
 /// An answer: (where from, for which node, for which attempt).
 pub(super) type Answer = (Site, NodeId, u32);

@@ -5,7 +5,8 @@ use std::time::Duration;
 use lookalike::graph::{BlobHash, FailureReason, NodeId, NodeState, WorkerId};
 
 use super::{answers, quarantine, schedule};
-use crate::comm::{Action, Departure, Lease, Outbox, RunEvent, WorkerProcess};
+use crate::actions::{Action, Lease, Outbox, WorkerProcess};
+use crate::events::{Departure, RunEvent};
 use crate::state::{Core, Lost, Place};
 
 /// The pause after a node in execution has lost its worker for the second time; each further one is twice as long.

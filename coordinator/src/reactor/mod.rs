@@ -20,9 +20,10 @@ use lookalike::graph::{
     WorkerId,
 };
 
-use crate::comm::{Action, Departure, Outbox, RunEvent, Site, WorkerProcess};
-use crate::state::{Core, Record, Starving};
+use crate::actions::{Action, Outbox, WorkerProcess};
+use crate::events::{Departure, RunEvent, Site};
 use crate::runner::RunError;
+use crate::state::{Core, Record, Starving};
 
 /// Something that happened.
 #[derive(Clone, Debug, PartialEq)]

@@ -9,9 +9,10 @@ use proptest::prelude::*;
 
 use super::tests::{Script, node, process};
 use super::{Event, Executing, handle, start};
-use crate::comm::{Action, Departure, Outbox, Site};
-use crate::state::{Core, Policy};
+use crate::actions::{Action, Outbox};
+use crate::events::{Departure, Site};
 use crate::policy::Speculation;
+use crate::state::{Core, Policy};
 use lookalike::graph::FailureReason;
 
 /// One thing that the outside world does. Numbers choose among what is there, modulo.

@@ -16,7 +16,8 @@ use lookalike::graph::NodeId;
 use lookalike::protocol::ProcessName;
 
 use super::schedule;
-use crate::comm::{Outbox, RunEvent};
+use crate::actions::Outbox;
+use crate::events::RunEvent;
 use crate::state::{Core, Death, Deaths, Member, Place, Unexplained};
 
 /// How many deaths of a suspect's workers are excused for one that would count: where a machine fails all the time, a node that

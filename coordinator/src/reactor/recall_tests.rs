@@ -7,10 +7,11 @@ use lookalike::graph::{Blob, Graph, Input, NodeId, NodeKey, NodeSpec, Placement,
 
 use super::tests::{Script, node, process};
 use super::{Event, handle, start};
-use crate::comm::{Action, Departure, Outbox, RunEvent, Site};
+use crate::actions::{Action, Outbox};
+use crate::events::{Departure, RunEvent, Site};
+use crate::runner::RunError;
 use crate::state::recall::{Memory, Recall};
 use crate::state::{Core, Deaths, Policy};
-use crate::runner::RunError;
 
 const A: WorkerId = WorkerId(1);
 

@@ -6,7 +6,8 @@ use std::time::Duration;
 use lookalike::graph::{NodeId, WorkerId};
 
 use super::speculation;
-use crate::comm::{Action, Lease, Outbox, RunEvent, Site};
+use crate::actions::{Action, Lease, Outbox};
+use crate::events::{RunEvent, Site};
 use crate::state::{Core, Place};
 
 /// How many nodes are looked at to find one that a worker may check. More are only more of the same: outputs of this very

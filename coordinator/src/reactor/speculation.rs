@@ -5,7 +5,8 @@ use std::time::Duration;
 use lookalike::graph::{NodeId, WorkerId};
 
 use super::schedule::{assign, is_origin};
-use crate::comm::{Outbox, RunEvent};
+use crate::actions::Outbox;
+use crate::events::RunEvent;
 use crate::state::Core;
 
 /// How many workers that do not get on are looked at. More are not needed at a time: what they hold that a second worker has

@@ -8,7 +8,8 @@ use lookalike::graph::{Blob, FailureReason, NodeId, Placement, WorkerId};
 
 use super::tests::{Script, node, process};
 use super::{Event, handle, start};
-use crate::comm::{Action, Departure, Outbox, Site};
+use crate::actions::{Action, Outbox};
+use crate::events::{Departure, Site};
 use crate::state::{Core, Policy};
 
 /// What happens at its time.

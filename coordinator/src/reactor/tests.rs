@@ -9,10 +9,11 @@ use lookalike::graph::{
 use lookalike::protocol::ProcessName;
 
 use super::{Event, Executing, handle, handle_arrived, start};
-use crate::comm::{Action, Departure, Outbox, RunEvent, Site, WorkerProcess};
-use crate::state::{Core, Policy};
+use crate::actions::{Action, Outbox, WorkerProcess};
+use crate::events::{Departure, RunEvent, Site};
 use crate::policy::Speculation;
 use crate::runner::RunError;
+use crate::state::{Core, Policy};
 
 mod differing;
 mod draining;

@@ -20,7 +20,7 @@ use tracing::info;
 
 use super::mailbox::{Patient, Postman, mailbox};
 use super::{Gate, Greeted, Inbound, Outgoing};
-use crate::comm::{Departure, Site};
+use crate::events::{Departure, Site};
 use crate::reactor::{Event, Executing};
 
 /// How many bytes of small outputs a worker may send before it is asked for how many the reactor has taken (8 MiB).

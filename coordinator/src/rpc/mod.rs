@@ -32,7 +32,7 @@ use tracing::{debug, warn};
 
 pub(crate) use self::mailbox::Mailbox;
 use self::strangers::{Place, Strangers};
-use crate::comm::RunEvent;
+use crate::events::RunEvent;
 use crate::limits::Limits;
 use crate::policy::Policy;
 use crate::reactor::Event;

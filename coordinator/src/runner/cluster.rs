@@ -17,7 +17,7 @@ use tokio_util::sync::CancellationToken;
 
 use super::{RunError, RunnerOptions};
 use crate::access::{Credentials, CredentialsError};
-use crate::comm::WorkerProcess;
+use crate::actions::WorkerProcess;
 use crate::rpc::{Gate, Inbound, Mailbox, Outgoing, serve_forever};
 use crate::spawn::{LocalWorkers, Worked, WorkerCommand, threads_per_worker};
 use crate::tls::server_config;

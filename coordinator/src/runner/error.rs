@@ -10,7 +10,7 @@ use lookalike::graph::{BlobHash, FailureReason, NodeFailure, PlanError};
 use thiserror::Error;
 
 use crate::access::CredentialsError;
-use crate::comm::{NodeName, Site};
+use crate::events::{NodeName, Site};
 use crate::journal::JournalError;
 use crate::policy::PolicyError;
 

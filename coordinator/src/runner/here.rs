@@ -7,7 +7,7 @@ use lookalike::graph::{Blob, DecodedCache, NodeId, NodeSpec, Registry, RunContex
 use lookalike_worker::world::Pool;
 use tokio::sync::mpsc::UnboundedSender;
 
-use crate::comm::{RunEvent, Site};
+use crate::events::{RunEvent, Site};
 use crate::reactor::Event;
 
 /// How many encoded bytes of inputs are kept decoded for them (128 MiB).

@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 
 use super::RunError;
-use crate::comm::Action;
+use crate::actions::Action;
 use crate::journal::{Batch, Journal};
 
 /// How many groups may wait for their transactions. With one, what comes while it is written becomes the next: a transaction costs

@@ -39,11 +39,12 @@ use self::interrupt::Interrupt;
 use self::memory::{Group, Memory};
 pub use self::options::RunnerOptions;
 pub use self::pulse::Pulse;
-use crate::comm::{Action, Lease, Outbox, RunEvent, Site, WorkerProcess};
-use crate::state::{Core, RunSummary};
+use crate::actions::{Action, Lease, Outbox, WorkerProcess};
+use crate::events::{RunEvent, Site};
 use crate::journal::Journal;
 use crate::reactor::{self, Event};
 use crate::rpc::{Inbound, Outgoing};
+use crate::state::{Core, RunSummary};
 
 /// Counts the coordinator processes of a run; without a journal there is only one.
 const FIRST_EPOCH: u64 = 1;

@@ -8,10 +8,10 @@ use std::sync::Arc;
 use tokio::sync::Notify;
 
 use super::{Pulse, RunError};
-use crate::state::Policy;
 use crate::journal::JournalOptions;
 use crate::limits::Limits;
 use crate::spawn::WorkerCommand;
+use crate::state::Policy;
 
 /// How to run a graph on workers.
 #[derive(Clone, Debug)]

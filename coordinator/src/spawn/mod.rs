@@ -22,7 +22,7 @@ use tokio_util::sync::CancellationToken;
 use tracing::{debug, warn};
 
 pub(crate) use self::worked::Worked;
-use crate::comm::RunEvent;
+use crate::events::RunEvent;
 use crate::reactor::Event;
 use crate::rpc::Inbound;
 use crate::runner::RunError;

@@ -9,7 +9,7 @@ use lookalike::graph::{BlobHash, NodeId, WorkerId};
 use lookalike::protocol::ProcessName;
 
 use super::Lost;
-use crate::comm::WorkerProcess;
+use crate::actions::WorkerProcess;
 
 /// How many bytes of assignments a worker may have been given that it has not begun with. What waits in its queue stays as
 /// small as this, and one assignment.

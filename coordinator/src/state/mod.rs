@@ -18,9 +18,9 @@ pub(crate) use self::members::{Held, Member, Members};
 use self::members::{Size, weight};
 use self::pace::Pace;
 pub(crate) use self::waiting::{Place, Waiting};
-use crate::comm::{NodeName, Site};
-use crate::state::recall::Recall;
+use crate::events::{NodeName, Site};
 pub use crate::policy::Policy;
+use crate::state::recall::Recall;
 
 /// What a run has cost, for people: nothing of it may reach a result.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -11,7 +11,7 @@ mod storms;
 use std::path::Path;
 use std::process::Command;
 
-use lookalike_coordinator::comm::{Departure, RunEvent};
+use lookalike_coordinator::events::{Departure, RunEvent};
 use lookalike_coordinator::runner::RunnerOptions;
 use lookalike_tests::cluster::{Cluster, options};
 use lookalike_tests::gate::Gate;

@@ -6,10 +6,10 @@ use std::time::Duration;
 
 use lookalike::graph::BlobHash;
 use lookalike::protocol::{Executing, FailureKind, FrameTag, Hello, LeaseName, ToCoordinator, ToWorker};
-use lookalike_coordinator::comm::{Departure, RunEvent};
-use lookalike_coordinator::state::Policy;
+use lookalike_coordinator::events::{Departure, RunEvent};
 use lookalike_coordinator::limits::Limits;
 use lookalike_coordinator::runner::{RunError, RunnerOptions};
+use lookalike_coordinator::state::Policy;
 use lookalike_tests::cluster::{Cluster, options, read_access};
 use lookalike_tests::gate::{Gate, Waiting};
 use lookalike_tests::journal::JournalView;

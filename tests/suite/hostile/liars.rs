@@ -5,10 +5,10 @@ use lookalike::graph::BlobHash;
 use lookalike::protocol::{
     FailureKind, FrameTag, LeaseName, PART_BYTES, ToCoordinator, ToWorker, encode_message, frame_header,
 };
-use lookalike_coordinator::comm::{Departure, RunEvent};
-use lookalike_coordinator::state::Policy;
+use lookalike_coordinator::events::{Departure, RunEvent};
 use lookalike_coordinator::limits::Limits;
 use lookalike_coordinator::runner::{RunError, RunnerOptions};
+use lookalike_coordinator::state::Policy;
 use lookalike_tests::cluster::{Cluster, options};
 use lookalike_tests::gate::Gate;
 use lookalike_tests::plan::{Leaves, TestPlanner};
