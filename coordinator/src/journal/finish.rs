@@ -7,7 +7,8 @@ use rusqlite::{OptionalExtension, params};
 use super::error::JournalError;
 use super::identity::RunIdentity;
 use super::parts::{self, PartLedger};
-use super::{past, schema, status, unix_ms};
+use super::time::unix_ms;
+use super::{past, schema, status};
 
 /// A finished run's files of results, each with the BLAKE3 of its bytes.
 #[derive(Clone, Debug, PartialEq, Eq)]

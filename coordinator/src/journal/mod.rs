@@ -34,20 +34,20 @@ mod error;
 mod finish;
 mod identity;
 mod lock;
+mod options;
 mod parts;
 mod past;
 mod place;
 mod schema;
 pub mod status;
+mod time;
 mod writer;
 
 use std::collections::{HashMap, HashSet};
-use std::fmt;
 use std::path::PathBuf;
-use std::sync::Arc;
 use std::sync::mpsc::{Sender, channel, sync_channel};
 use std::thread::{self, JoinHandle};
-use std::time::{Duration, Instant, SystemTime};
+use std::time::{Duration, Instant};
 
 use lookalike::graph::NodeKey;
 use lookalike::protocol::RunName;
@@ -60,52 +60,13 @@ pub use self::error::JournalError;
 pub use self::finish::{Finished, finish, finished, settle};
 pub use self::identity::{Difference, RunIdentity};
 pub use self::lock::{LOCK_FILE, LockError, RunLock};
-pub use self::parts::{PartLedger, PartStatus};
-pub use self::parts::{PartRow, written};
-pub(crate) use self::past::Past;
+pub use self::options::{JOURNAL_FILE, JournalOptions, Score};
+pub use self::parts::{PartLedger, PartRow, PartStatus, written};
+use self::past::{Loaded, Past};
 pub use self::schema::remove;
 use self::writer::{Command, Writer};
 use crate::state::Deaths;
 use crate::state::recall::{Memory, Recall};
-
-/// The journal's file in a folder of results.
-pub const JOURNAL_FILE: &str = "run.sqlite";
-
-/// Says the best score of a run so far, once there is one; the lowest is the best.
-pub type Score = Arc<dyn Fn() -> Option<f64> + Send + Sync>;
-
-/// Where a run is written down, and what it is a run of.
-#[derive(Clone)]
-pub struct JournalOptions {
-    /// The file; its folder has to exist. Only one process may use it at a time: see [`RunLock`].
-    pub path: PathBuf,
-    /// What shapes the result.
-    pub identity: RunIdentity,
-    /// Whether to go on with a run that is there. Without one, a new run begins either way.
-    pub resume: bool,
-    /// The best score so far, for people who look at the run.
-    pub score: Option<Score>,
-    /// What becomes of the parts, in a run of many.
-    pub parts: PartLedger,
-}
-
-impl JournalOptions {
-    /// A new run.
-    #[must_use]
-    pub fn new(path: PathBuf, identity: RunIdentity) -> Self {
-        Self { path, identity, resume: false, score: None, parts: PartLedger::default() }
-    }
-}
-
-/// Without the score, which is a function.
-impl fmt::Debug for JournalOptions {
-    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { path, identity, resume, parts, .. } = self;
-        let mut text = formatter.debug_struct("JournalOptions");
-        text.field("path", path).field("identity", identity).field("resume", resume).field("parts", parts);
-        text.finish_non_exhaustive()
-    }
-}
 
 /// The journal of a run that this process coordinates.
 #[derive(Debug)]
@@ -239,20 +200,6 @@ impl Recall for Recollection {
         };
         Memory { output: if is_known { read() } else { None }, deaths }
     }
-}
-
-/// What a journal says when it is opened.
-struct Loaded {
-    run: RunName,
-    epoch: u64,
-    results: HashMap<NodeKey, i64>,
-    past: Past,
-}
-
-/// Milliseconds since 1970.
-fn unix_ms() -> i64 {
-    let since = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
-    i64::try_from(since.as_millis()).unwrap_or(i64::MAX)
 }
 
 #[cfg(test)]

@@ -11,7 +11,8 @@ use rusqlite::{Connection, OptionalExtension, params};
 use super::error::JournalError;
 use super::identity::RunIdentity;
 use super::lock::host;
-use super::{Loaded, schema, unix_ms};
+use super::schema;
+use super::time::unix_ms;
 use crate::state::Deaths;
 
 /// What earlier epochs have left.
@@ -23,6 +24,14 @@ pub(crate) struct Past {
     pub(crate) listen: Option<SocketAddr>,
     /// How many nodes have a result.
     pub(crate) results: usize,
+}
+
+/// What a journal says when it is opened.
+pub(super) struct Loaded {
+    pub(super) run: RunName,
+    pub(super) epoch: u64,
+    pub(super) results: HashMap<NodeKey, i64>,
+    pub(super) past: Past,
 }
 
 /// Begin a new journal.

@@ -12,9 +12,10 @@ use thiserror::Error;
 
 use super::error::JournalError;
 use super::lock::RunLock;
+use super::options::JOURNAL_FILE;
 use super::parts::{self, PartStatus};
 use super::schema::node_id;
-use super::{JOURNAL_FILE, place, schema};
+use super::{place, schema};
 
 /// The status of a run beside its journal, for where the journal cannot be read by others.
 pub const STATUS_FILE: &str = "status.json";

@@ -9,14 +9,14 @@ use rusqlite::{Connection, Transaction, params};
 use tokio::sync::mpsc::UnboundedSender;
 use tracing::warn;
 
-use super::JournalOptions;
 use super::batch::{Batch, NodeRow};
 use super::deferred::{Deferred, ms};
 use super::error::JournalError;
+use super::options::JournalOptions;
 use super::parts;
 use super::schema::node_id;
 use super::status;
-use super::unix_ms;
+use super::time::unix_ms;
 use crate::state::Deaths;
 
 /// How often `status.json` is written at most.

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use lookalike::graph::{BlobHash, FailureReason, NodeId, NodeState, WorkerId};
 
-use super::{answers, quarantine, schedule};
+use super::{leases, quarantine, results};
 use crate::actions::{Action, Lease, Outbox, WorkerProcess};
 use crate::events::{Departure, RunEvent};
 use crate::state::{Core, Lost, Place};
@@ -64,7 +64,7 @@ fn may_go_on(core: &Core, worker: WorkerId, node: NodeId) -> bool {
         |holder: &&WorkerId| core.members.get(**holder).is_some_and(|holder| !holder.waiting.contains(&node));
     let is_free = !member.leases.contains_key(&node) && member.alone_with.is_none();
     let is_wanted = core.graph.state(node) == Some(&NodeState::Ready) && !core.is_suspect(node);
-    let is_other = !schedule::is_origin(core, node, worker);
+    let is_other = !leases::is_origin(core, node, worker);
     is_free && is_wanted && is_other && record.holders.iter().filter(is_begun).count() < 2
 }
 
@@ -72,24 +72,19 @@ fn may_go_on(core: &Core, worker: WorkerId, node: NodeId) -> bool {
 fn adopt(core: &mut Core, worker: WorkerId, node: NodeId, now: Duration, outbox: &mut Outbox) {
     for holder in core.look(node).map(|record| record.holders.clone()).unwrap_or_default() {
         if core.members.get(holder).is_some_and(|holder| holder.waiting.contains(&node)) {
-            schedule::take_back(core, holder, node, now, outbox);
+            leases::take_back(core, holder, node, now, outbox);
         }
     }
-    schedule::assign(core, worker, node, now, outbox);
+    leases::assign(core, worker, node, now, outbox);
     let attempt = core.look(node).map_or(0, |record| record.attempts);
-    answers::started(core, worker, (node, attempt), (now, now), outbox);
+    leases::started(core, worker, (node, attempt), (now, now), outbox);
     let spare_leases = core.policy.spare_leases;
     while let Some(excess) = core.members.get(worker).and_then(|member| member.excess(spare_leases)) {
-        schedule::take_back(core, worker, excess, now, outbox);
+        leases::take_back(core, worker, excess, now, outbox);
         if core.look(excess).is_some_and(|record| record.holders.is_empty()) {
-            schedule::await_now(core, excess, now);
+            leases::await_now(core, excess, now);
         }
     }
-}
-
-/// A worker was heard of.
-pub(super) fn renew(core: &mut Core, worker: WorkerId, now: Duration) {
-    core.members.renew(worker, now + core.policy.lost_after);
 }
 
 /// Take back what a worker held. The nodes it executed are suspects if it may have died of them.
@@ -117,7 +112,7 @@ pub(super) fn leave(core: &mut Core, worker: WorkerId, departure: &Departure, no
 
 /// A worker begins with nothing more: take back what it has not begun with.
 pub(super) fn drain(core: &mut Core, worker: WorkerId, now: Duration, outbox: &mut Outbox) {
-    renew(core, worker, now);
+    leases::renew(core, worker, now);
     core.clearing = core.clearing.filter(|clearing| *clearing != worker);
     let drained = core.members.change(worker, |member| {
         let was_draining = std::mem::replace(&mut member.is_draining, true);
@@ -141,7 +136,7 @@ fn requeue(core: &mut Core, node: NodeId, worker: WorkerId, now: Duration, outbo
         return;
     }
     let deaths = record.deaths;
-    if core.is_suspect(node) && answers::accept_candidate(core, node, now, outbox) {
+    if core.is_suspect(node) && results::accept_candidate(core, node, now, outbox) {
         return;
     }
     if deaths.alone >= core.policy.node_crashes {
@@ -159,7 +154,7 @@ fn await_worker(core: &mut Core, node: NodeId, now: Duration) {
     let doublings = losses.saturating_sub(2).min(16);
     let delay = (FIRST_DELAY * 2_u32.pow(doublings)).min(LONGEST_DELAY);
     if losses < 2 || core.is_suspect(node) {
-        schedule::await_now(core, node, now);
+        leases::await_now(core, node, now);
     } else {
         core.put(node, Place::Delayed(now + delay));
     }
@@ -180,7 +175,7 @@ pub(super) fn drop_worker(
 }
 
 pub(super) fn send_blob(core: &mut Core, worker: WorkerId, hash: BlobHash, now: Duration, outbox: &mut Outbox) {
-    renew(core, worker, now);
+    leases::renew(core, worker, now);
     let Some(member) = core.members.get(worker) else { return };
     if !member.readable.contains(&hash) {
         let what = format!("it asked for blob {hash}, which none of its nodes reads");

@@ -8,119 +8,30 @@
 //! No event looks at all nodes or all workers: what has to be found among them is indexed in [`state`](crate::state).
 
 mod answers;
+mod error;
+mod event;
+mod leases;
 mod membership;
 mod quarantine;
+mod results;
 mod schedule;
 mod speculation;
 
 use std::time::Duration;
 
-use lookalike::graph::{
-    Blob, BlobHash, Change, Completion, GraphEdit, NodeFailure, NodeId, NodeState, Placement, PlanError, Planner,
-    WorkerId,
-};
+use lookalike::graph::{Change, Completion, GraphEdit, NodeId, NodeState, Placement, PlanError, Planner};
 
-use crate::actions::{Action, Outbox, WorkerProcess};
+pub use self::error::{NodeAnswer, Stop};
+pub use self::event::{Event, Executing};
+use crate::actions::{Action, Outbox};
 use crate::events::{Departure, RunEvent, Site};
-use crate::runner::RunError;
 use crate::state::{Core, Record, Starving};
-
-/// Something that happened.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Event {
-    /// A worker has said hello and was welcomed.
-    WorkerJoined {
-        /// Its number, never used before.
-        worker: WorkerId,
-        /// How many nodes it executes at a time.
-        threads: usize,
-        /// Its process, which may have been here before under another number.
-        process: WorkerProcess,
-    },
-    /// A worker's connection is gone.
-    WorkerLeft {
-        /// The worker.
-        worker: WorkerId,
-        /// Why.
-        departure: Departure,
-    },
-    /// A worker was asked to end: it finishes what it executes, and what it has not begun with it will not begin with.
-    WorkerDrains {
-        /// The worker.
-        worker: WorkerId,
-    },
-    /// A worker was heard of; it executes these nodes.
-    Heartbeat {
-        /// The worker.
-        worker: WorkerId,
-        /// The nodes it executes.
-        executing: Vec<Executing>,
-    },
-    /// A worker begins to execute a node.
-    Started {
-        /// The worker.
-        worker: WorkerId,
-        /// The node.
-        node: NodeId,
-        /// The attempt under which it was assigned.
-        attempt: u32,
-    },
-    /// A node has an output; its hash was verified.
-    Finished {
-        /// Where it ran.
-        site: Site,
-        /// The node.
-        node: NodeId,
-        /// The attempt under which it was assigned.
-        attempt: u32,
-        /// The output.
-        output: Blob,
-    },
-    /// A node has no output and never will: its own error.
-    Failed {
-        /// Where it ran.
-        site: Site,
-        /// The node.
-        node: NodeId,
-        /// The attempt under which it was assigned.
-        attempt: u32,
-        /// The error.
-        failure: NodeFailure,
-    },
-    /// A worker wants a blob.
-    BlobRequested {
-        /// The worker.
-        worker: WorkerId,
-        /// The name of the blob.
-        hash: BlobHash,
-    },
-    /// The last local worker was given up, and no other can join.
-    LocalWorkersGivenUp {
-        /// How the last one ended.
-        last_status: String,
-    },
-    /// The time of [`Core::next_deadline`] has come.
-    DeadlinePassed,
-    /// The planner may have more to add, though no node has ended.
-    LookAgain,
-}
-
-/// A node that a worker says to execute.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Executing {
-    /// The node.
-    pub node: NodeId,
-    /// The attempt under which it was assigned, perhaps on an earlier connection.
-    pub attempt: u32,
-    /// How much of it is done, in thousandths.
-    pub permille: u16,
-}
 
 /// Begin a run: let the planner add the first nodes and act upon them.
 ///
 /// # Errors
 /// Those of the planner.
-pub fn start(core: &mut Core, planner: &mut impl Planner, now: Duration, outbox: &mut Outbox) -> Result<(), RunError> {
+pub fn start(core: &mut Core, planner: &mut impl Planner, now: Duration, outbox: &mut Outbox) -> Result<(), Stop> {
     planner.start(&mut GraphEdit::new(&mut core.graph))?;
     settle(core, planner, now, outbox)
 }
@@ -135,7 +46,7 @@ pub fn handle(
     event: Event,
     now: Duration,
     outbox: &mut Outbox,
-) -> Result<(), RunError> {
+) -> Result<(), Stop> {
     handle_arrived(core, planner, event, (now, now), outbox)
 }
 
@@ -151,7 +62,7 @@ pub fn handle_arrived(
     event: Event,
     (arrived, now): (Duration, Duration),
     outbox: &mut Outbox,
-) -> Result<(), RunError> {
+) -> Result<(), Stop> {
     match event {
         Event::WorkerJoined { worker, threads, process } => {
             membership::join(core, worker, threads, process, now, outbox);
@@ -159,7 +70,7 @@ pub fn handle_arrived(
         Event::WorkerLeft { worker, departure } => membership::leave(core, worker, &departure, now, outbox),
         Event::WorkerDrains { worker } => membership::drain(core, worker, now, outbox),
         Event::Heartbeat { worker, executing } => {
-            membership::renew(core, worker, now);
+            leases::renew(core, worker, now);
             for Executing { node, attempt, permille } in executing {
                 match core.members.progress(worker, node, permille) {
                     Some(true) => outbox.tell(RunEvent::NodeProgress { node, permille }),
@@ -169,7 +80,7 @@ pub fn handle_arrived(
             }
         }
         Event::Started { worker, node, attempt } => {
-            answers::started(core, worker, (node, attempt), (arrived, now), outbox);
+            leases::started(core, worker, (node, attempt), (arrived, now), outbox);
         }
         Event::Finished { site, node, attempt, output } => {
             answers::finished(core, (site, node, attempt), output, (arrived, now), outbox)?;
@@ -190,7 +101,7 @@ pub fn handle_arrived(
 }
 
 /// Let everything follow that follows: tell the planner what happened, queue what became ready, give out leases.
-fn settle(core: &mut Core, planner: &mut impl Planner, now: Duration, outbox: &mut Outbox) -> Result<(), RunError> {
+fn settle(core: &mut Core, planner: &mut impl Planner, now: Duration, outbox: &mut Outbox) -> Result<(), Stop> {
     while let Some(change) = core.graph.next_change() {
         match change {
             Change::Added(node) => {
@@ -207,7 +118,7 @@ fn settle(core: &mut Core, planner: &mut impl Planner, now: Duration, outbox: &m
             }
             Change::Forgotten(node) => outbox.tell(RunEvent::NodeReleased { name: core.name(node) }),
             Change::Failed(node) => {
-                answers::retract(core, node, now, outbox);
+                results::retract(core, node, now, outbox);
                 if let Some(NodeState::Failed(reason)) = core.graph.state(node).cloned() {
                     outbox.tell(RunEvent::NodeFailed { name: core.name(node), reason: reason.clone() });
                     if reason.is_cancellation() {
@@ -226,12 +137,12 @@ fn settle(core: &mut Core, planner: &mut impl Planner, now: Duration, outbox: &m
 }
 
 /// What the planner says of an output, with the name of whom it came from where that one did wrong.
-fn refused(core: &Core, node: NodeId, error: PlanError) -> RunError {
+fn refused(core: &Core, node: NodeId, error: PlanError) -> Stop {
     if !matches!(error, PlanError::NotVerified { .. } | PlanError::WrongOutput { .. }) {
-        return RunError::Plan(error);
+        return Stop::Plan(error);
     }
     let site = core.look(node).and_then(|record| record.finished_by).unwrap_or(Site::Coordinator);
-    RunError::WrongResult { name: Box::new(core.name(node)), site, error }
+    Stop::WrongResult { name: Box::new(core.name(node)), site, error }
 }
 
 /// Complete a node from what an earlier coordinator of this run has left. Whether there was something.
@@ -267,7 +178,7 @@ fn make_ready(core: &mut Core, planner: &impl Planner, node: NodeId, now: Durati
     if spec.placement == Placement::Worker {
         let is_verified = answers::is_chosen(core, spec, node) && planner.is_verified_by_repetition(spec);
         core.record(node).into_iter().for_each(|record| record.is_verified = is_verified);
-        schedule::await_now(core, node, now);
+        leases::await_now(core, node, now);
         return;
     }
     core.summary.attempts += 1;
@@ -281,13 +192,13 @@ fn make_ready(core: &mut Core, planner: &impl Planner, node: NodeId, now: Durati
 }
 
 /// Work without a worker: remind the user, and give up after a while.
-fn watch_starvation(core: &mut Core, now: Duration, outbox: &mut Outbox) -> Result<(), RunError> {
+fn watch_starvation(core: &mut Core, now: Duration, outbox: &mut Outbox) -> Result<(), Stop> {
     if core.waiting.is_empty() || !core.members.is_empty() {
         core.starving = None;
         return Ok(());
     }
     if let Some(last_status) = core.given_up.clone() {
-        return Err(RunError::LocalWorkersKeepDying { last_status });
+        return Err(Stop::LocalWorkersKeepDying { last_status });
     }
     let limit = core.starvation_limit();
     // Never zero: the next deadline has to lie ahead.
@@ -296,7 +207,7 @@ fn watch_starvation(core: &mut Core, now: Duration, outbox: &mut Outbox) -> Resu
     let waited = now.saturating_sub(starving.since);
     if waited >= limit {
         let had_workers = core.summary.workers_joined > 0;
-        return Err(if had_workers { RunError::LostAllWorkers { waited } } else { RunError::NoWorkerCame { waited } });
+        return Err(if had_workers { Stop::LostAllWorkers { waited } } else { Stop::NoWorkerCame { waited } });
     }
     if now >= starving.next_reminder {
         starving.next_reminder = now + remind_every;

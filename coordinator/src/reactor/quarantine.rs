@@ -15,7 +15,7 @@ use std::time::Duration;
 use lookalike::graph::NodeId;
 use lookalike::protocol::ProcessName;
 
-use super::schedule;
+use super::leases;
 use crate::actions::Outbox;
 use crate::events::RunEvent;
 use crate::state::{Core, Death, Deaths, Member, Place, Unexplained};
@@ -84,7 +84,7 @@ pub(super) fn take_back_death(
         let (deaths, place) = (record.deaths.total(), record.place);
         outbox.tell(RunEvent::DeathsCounted { name: core.name(*node), deaths });
         if matches!(place, Place::Suspects(_)) && !core.is_suspect(*node) {
-            schedule::await_now(core, *node, now);
+            leases::await_now(core, *node, now);
         }
         core.watch(*node);
     }

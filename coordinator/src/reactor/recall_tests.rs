@@ -6,10 +6,9 @@ use std::time::Duration;
 use lookalike::graph::{Blob, Graph, Input, NodeId, NodeKey, NodeSpec, Placement, WorkerId};
 
 use super::tests::{Script, node, process};
-use super::{Event, handle, start};
+use super::{Event, Stop, handle, start};
 use crate::actions::{Action, Outbox};
 use crate::events::{Departure, RunEvent, Site};
-use crate::runner::RunError;
 use crate::state::recall::{Memory, Recall};
 use crate::state::{Core, Deaths, Policy};
 
@@ -61,7 +60,7 @@ impl Bench {
         bench
     }
 
-    fn handle(&mut self, event: Event) -> Result<Vec<String>, RunError> {
+    fn handle(&mut self, event: Event) -> Result<Vec<String>, Stop> {
         handle(&mut self.core, &mut self.planner, event, Duration::ZERO, &mut self.outbox)?;
         Ok(self.said())
     }

@@ -5,10 +5,10 @@ use std::time::Duration;
 
 use lookalike::graph::{NodeId, WorkerId};
 
+use super::leases::{assign, await_now, is_origin, take_back};
 use super::speculation;
-use crate::actions::{Action, Lease, Outbox};
-use crate::events::{RunEvent, Site};
-use crate::state::{Core, Place};
+use crate::actions::Outbox;
+use crate::state::Core;
 
 /// How many nodes are looked at to find one that a worker may check. More are only more of the same: outputs of this very
 /// worker, which another one will check.
@@ -27,17 +27,6 @@ pub(super) fn schedule(core: &mut Core, now: Duration, outbox: &mut Outbox) {
     }
     balance(core, now, outbox);
     speculation::speculate(core, now, outbox);
-}
-
-/// Let a node wait for a worker from now on.
-pub(super) fn await_now(core: &mut Core, node: NodeId, now: Duration) {
-    let has_candidate = core.look(node).is_some_and(|record| record.candidate.is_some());
-    let place = match (core.is_suspect(node), has_candidate) {
-        (true, _) => Place::Suspects(now),
-        (false, true) => Place::Checks,
-        (false, false) => Place::Queue(core.graph.spec(node).map_or(0, |spec| spec.priority)),
-    };
-    core.put(node, place);
 }
 
 /// Give every suspect a worker for itself: a fresh one, or after a while any that holds nothing; if there is none, one after
@@ -108,15 +97,6 @@ fn give_checks(core: &mut Core, now: Duration, outbox: &mut Outbox) {
     }
 }
 
-/// Whether the output that is to be verified came from this worker, under whatever number.
-pub(super) fn is_origin(core: &Core, node: NodeId, worker: WorkerId) -> bool {
-    let candidate = core.look(node).and_then(|record| record.candidate.as_ref());
-    let process = core.members.get(worker).map(|member| member.process.name);
-    candidate.is_some_and(|candidate| {
-        candidate.site == Site::Worker(worker) || (process.is_some() && candidate.process == process)
-    })
-}
-
 /// Move nodes that merely wait on one worker to a worker with an idle thread.
 fn balance(core: &mut Core, now: Duration, outbox: &mut Outbox) {
     core.next_move = None;
@@ -132,26 +112,5 @@ fn balance(core: &mut Core, now: Duration, outbox: &mut Outbox) {
         let Some(node) = movable.copied().find(|node| !has(node) && !is_origin(core, *node, idle)) else { return };
         take_back(core, from, node, now, outbox);
         assign(core, idle, node, now, outbox);
-    }
-}
-
-/// Give a worker a lease of a node.
-pub(super) fn assign(core: &mut Core, worker: WorkerId, node: NodeId, now: Duration, outbox: &mut Outbox) {
-    core.put(node, Place::Nowhere);
-    let epoch = core.epoch;
-    let Some(record) = core.record(node) else { return };
-    record.attempts += 1;
-    let attempt = record.attempts;
-    core.summary.attempts += 1;
-    core.give(worker, node, attempt, now);
-    outbox.push(Action::Assign { worker, lease: Lease { node, attempt, epoch } });
-    outbox.tell(RunEvent::NodeAssigned { node, worker });
-}
-
-/// End a lease and tell its worker.
-pub(super) fn take_back(core: &mut Core, worker: WorkerId, node: NodeId, now: Duration, outbox: &mut Outbox) {
-    let epoch = core.epoch;
-    if let Some(held) = core.end_lease(worker, node, now) {
-        outbox.push(Action::Cancel { worker, lease: Lease { node, attempt: held.attempt, epoch } });
     }
 }

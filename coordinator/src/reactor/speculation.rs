@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use lookalike::graph::{NodeId, WorkerId};
 
-use super::schedule::{assign, is_origin};
+use super::leases::{assign, is_origin};
 use crate::actions::Outbox;
 use crate::events::RunEvent;
 use crate::state::Core;

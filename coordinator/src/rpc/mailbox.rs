@@ -13,7 +13,7 @@ use tokio::sync::mpsc::{UnboundedReceiver, UnboundedSender, unbounded_channel};
 use tokio::time::{Instant, Sleep, sleep};
 use tokio_util::sync::CancellationToken;
 
-use super::Outgoing;
+use super::outgoing::Outgoing;
 
 /// What a message takes in a queue beside what it points to.
 const MESSAGE_BYTES: usize = 128;

@@ -18,8 +18,10 @@ use tokio::sync::oneshot;
 use tokio::time::{Instant, MissedTickBehavior, interval_at, timeout};
 use tracing::info;
 
+use super::gate::{Gate, Greeted};
+use super::inbound::Inbound;
 use super::mailbox::{Patient, Postman, mailbox};
-use super::{Gate, Greeted, Inbound, Outgoing};
+use super::outgoing::Outgoing;
 use crate::events::{Departure, Site};
 use crate::reactor::{Event, Executing};
 

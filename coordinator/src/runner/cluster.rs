@@ -19,7 +19,7 @@ use super::{RunError, RunnerOptions};
 use crate::access::{Credentials, CredentialsError};
 use crate::actions::WorkerProcess;
 use crate::rpc::{Gate, Inbound, Mailbox, Outgoing, serve_forever};
-use crate::spawn::{LocalWorkers, Worked, WorkerCommand, threads_per_worker};
+use crate::spawn::{LocalWorkers, SpawnError, Worked, WorkerCommand, threads_per_worker};
 use crate::tls::server_config;
 
 /// Everything of a run that has to end with it.
@@ -190,7 +190,7 @@ fn access_path(options: &RunnerOptions) -> &PathBuf {
 
 fn local_workers(options: &RunnerOptions, address: String) -> Result<LocalWorkers, RunError> {
     let command = options.worker_command.clone().map_or_else(WorkerCommand::this_program, Ok);
-    let unknown_program = |source| RunError::Spawn { program: "this program".into(), source };
+    let unknown_program = |source| SpawnError { program: "this program".into(), source };
     Ok(LocalWorkers {
         count: options.workers,
         command: command.map_err(unknown_program)?,

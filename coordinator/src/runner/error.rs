@@ -1,18 +1,16 @@
 //! Why a run ended without its result.
 
-use std::fmt;
 use std::io;
 use std::net::SocketAddr;
-use std::path::PathBuf;
-use std::time::Duration;
 
-use lookalike::graph::{BlobHash, FailureReason, NodeFailure, PlanError};
+use lookalike::graph::{FailureReason, NodeFailure, PlanError};
 use thiserror::Error;
 
 use crate::access::CredentialsError;
-use crate::events::{NodeName, Site};
 use crate::journal::JournalError;
 use crate::policy::PolicyError;
+use crate::reactor::Stop;
+use crate::spawn::SpawnError;
 
 /// Why a run ended without its result.
 #[derive(Debug, Error)]
@@ -74,83 +72,14 @@ pub enum RunError {
     #[error("cannot listen for Ctrl-C and SIGTERM")]
     Signals(#[source] io::Error),
     /// A local worker process cannot be started at all.
-    #[error("cannot start a worker process of {}", program.display())]
-    Spawn {
-        /// The program.
-        program: PathBuf,
-        /// What the system says.
-        source: io::Error,
-    },
-    /// No worker has come.
-    #[error("no worker has come in {} s; check that workers can reach the address in the access file, or wait longer with --wait-for-workers", waited.as_secs())]
-    NoWorkerCame {
-        /// How long there was work but no worker.
-        waited: Duration,
-    },
-    /// All workers are gone, and no new one has come.
-    #[error("all workers were lost, and no other has come in {} s; see why they ended, or wait longer with --grace", waited.as_secs())]
-    LostAllWorkers {
-        /// How long there was work but no worker.
-        waited: Duration,
-    },
-    /// The local workers die whenever they are started.
-    #[error("the local worker processes keep dying, the last one with {last_status}; see their lines on stderr")]
-    LocalWorkersKeepDying {
-        /// How the last one ended.
-        last_status: String,
-    },
-    /// Two computations of one node gave different outputs.
-    #[error(
-        "two results of {name} differ ({first} from {first_site}, {second} from {second_site}), so neither can be trusted; use the same build everywhere, check the memory of these machines, and report this"
-    )]
-    ResultsDiffer {
-        /// The node.
-        name: Box<NodeName>,
-        /// Where the first result came from.
-        first_site: Site,
-        /// The first result.
-        first: NodeAnswer,
-        /// Where the second result came from.
-        second_site: Site,
-        /// The second result.
-        second: NodeAnswer,
-    },
-    /// A result is not what its node or its recomputation gives.
-    #[error(
-        "the result of {name} from {site} is wrong: {error}; use the same build everywhere, check the memory of that machine, and report this"
-    )]
-    WrongResult {
-        /// The node.
-        name: Box<NodeName>,
-        /// Where the result came from.
-        site: Site,
-        /// What is wrong with it.
-        error: PlanError,
-    },
-    /// The planner cannot go on, by default because a node failed.
     #[error(transparent)]
-    Plan(#[from] PlanError),
+    Spawn(#[from] SpawnError),
+    /// The run itself cannot continue.
+    #[error(transparent)]
+    Stop(#[from] Stop),
     /// The user interrupted the run.
     #[error("interrupted")]
     Interrupted,
-}
-
-/// What a computation of a node came to.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum NodeAnswer {
-    /// An output of this name.
-    Output(BlobHash),
-    /// An error.
-    Failure(Box<NodeFailure>),
-}
-
-impl fmt::Display for NodeAnswer {
-    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Output(hash) => write!(formatter, "output {hash:?}"),
-            Self::Failure(failure) => write!(formatter, "the error {:?}", failure.to_string()),
-        }
-    }
 }
 
 impl RunError {
@@ -169,9 +98,10 @@ impl RunError {
             Self::Credentials(error) => error.exit_code(),
             Self::Journal(error) => error.exit_code(),
             // What a node says of its inputs is about the user's; a panic or an unknown kind is our own mistake.
-            Self::Plan(PlanError::NodeFailed {
-                reason: FailureReason::Node(NodeFailure::Application { .. }), ..
-            }) => 2,
+            Self::Stop(Stop::Plan(PlanError::NodeFailed {
+                reason: FailureReason::Node(NodeFailure::Application { .. }),
+                ..
+            })) => 2,
             Self::Interrupted => 130,
             _ => 3,
         }

@@ -33,7 +33,7 @@ use tokio_util::sync::CancellationToken;
 use tracing::{info, trace};
 
 use self::cluster::{Cluster, Resumed};
-pub use self::error::{NodeAnswer, RunError};
+pub use self::error::RunError;
 use self::here::Here;
 use self::interrupt::Interrupt;
 use self::memory::{Group, Memory};
@@ -42,7 +42,7 @@ pub use self::pulse::Pulse;
 use crate::actions::{Action, Lease, Outbox, WorkerProcess};
 use crate::events::{RunEvent, Site};
 use crate::journal::Journal;
-use crate::reactor::{self, Event};
+use crate::reactor::{self, Event, Stop};
 use crate::rpc::{Inbound, Outgoing};
 use crate::state::{Core, RunSummary};
 
@@ -167,7 +167,7 @@ impl<W: World, P: Planner, O: FnMut(&RunEvent)> Driver<W, P, O> {
             pulse.iter().for_each(|pulse| pulse.beat());
             let is_over = failure.is_some() || self.core.is_finished();
             if is_over && self.memory.is_written() {
-                return failure.map_or(Ok(()), Err);
+                return failure.map_or(Ok(()), |stop| Err(stop.into()));
             }
             let may_act = !is_over && self.memory.has_room();
             let deadline = self.core.next_deadline().map(|deadline| self.began + deadline);
@@ -205,7 +205,7 @@ impl<W: World, P: Planner, O: FnMut(&RunEvent)> Driver<W, P, O> {
         &mut self,
         Begin { options, run, resumed }: Begin,
         inbound: tokio::sync::mpsc::Sender<Inbound>,
-    ) -> Result<Option<RunError>, RunError> {
+    ) -> Result<Option<Stop>, RunError> {
         let (mut group, now) = (Group::default(), self.now());
         if let Some(resumed) = &resumed {
             let (epoch, results) = (self.core.epoch, resumed.results);
@@ -240,7 +240,7 @@ impl<W: World, P: Planner, O: FnMut(&RunEvent)> Driver<W, P, O> {
     }
 
     /// Act upon events, as one group.
-    fn handle_all(&mut self, events: &mut Vec<Inbound>) -> Result<(), RunError> {
+    fn handle_all(&mut self, events: &mut Vec<Inbound>) -> Result<(), Stop> {
         let mut group = Group::default();
         let mut handle_all = || {
             for inbound in events.drain(..) {
@@ -260,7 +260,7 @@ impl<W: World, P: Planner, O: FnMut(&RunEvent)> Driver<W, P, O> {
         outcome
     }
 
-    fn handle_arrived(&mut self, event: Event, arrived: Option<Instant>, group: &mut Group) -> Result<(), RunError> {
+    fn handle_arrived(&mut self, event: Event, arrived: Option<Instant>, group: &mut Group) -> Result<(), Stop> {
         trace!(?event);
         self.here.forget(&event);
         let now = self.now();
@@ -282,8 +282,8 @@ impl<W: World, P: Planner, O: FnMut(&RunEvent)> Driver<W, P, O> {
     }
 
     /// A result that is wrong, or one of two that differ, must not be there when the run is gone on with.
-    fn forget_if_wrong(&self, error: Option<&RunError>, group: &mut Group) {
-        if let Some(RunError::WrongResult { name, .. } | RunError::ResultsDiffer { name, .. }) = error {
+    fn forget_if_wrong(&self, error: Option<&Stop>, group: &mut Group) {
+        if let Some(Stop::WrongResult { name, .. } | Stop::ResultsDiffer { name, .. }) = error {
             let index = usize::try_from(name.node.0).unwrap_or(usize::MAX);
             let key = self.core.records.get(index).and_then(|record| record.key);
             key.into_iter().for_each(|key| group.batch.forget(key));

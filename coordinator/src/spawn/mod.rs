@@ -13,6 +13,7 @@ use std::path::PathBuf;
 use std::process::{ExitStatus, Stdio};
 use std::time::Duration;
 
+use thiserror::Error;
 use tokio::io::AsyncWriteExt;
 use tokio::process::{Child, ChildStdin, Command};
 use tokio::sync::mpsc::Sender;
@@ -25,7 +26,6 @@ pub(crate) use self::worked::Worked;
 use crate::events::RunEvent;
 use crate::reactor::Event;
 use crate::rpc::Inbound;
-use crate::runner::RunError;
 
 /// A worker that lived for this long was well; its death starts the count again, and so does that of one that has executed
 /// something: it may have died of a node, and then the node fails in the end.
@@ -64,6 +64,16 @@ impl WorkerCommand {
     }
 }
 
+/// A local worker process that cannot be started at all.
+#[derive(Debug, Error)]
+#[error("cannot start a worker process of {}", program.display())]
+pub struct SpawnError {
+    /// The program.
+    pub program: PathBuf,
+    /// What the system says.
+    pub source: io::Error,
+}
+
 /// How many local workers there are, and how they are started.
 #[derive(Clone, Debug)]
 pub(crate) struct LocalWorkers {
@@ -88,11 +98,11 @@ pub(crate) fn threads_per_worker(workers: usize) -> NonZeroUsize {
 
 impl LocalWorkers {
     /// Start the workers. A program that cannot be started at all is an error at once.
-    pub(crate) fn start(&self, inbound: &Sender<Inbound>, stop: &CancellationToken) -> Result<JoinSet<()>, RunError> {
+    pub(crate) fn start(&self, inbound: &Sender<Inbound>, stop: &CancellationToken) -> Result<JoinSet<()>, SpawnError> {
         let mut first = Vec::new();
         for _ in 0..self.count {
             let process = self.spawn();
-            first.push(process.map_err(|source| RunError::Spawn { program: self.command.program.clone(), source })?);
+            first.push(process.map_err(|source| SpawnError { program: self.command.program.clone(), source })?);
         }
         let mut given_up = JoinSet::new();
         for process in first {

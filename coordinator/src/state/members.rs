@@ -8,7 +8,7 @@ use std::time::Duration;
 use lookalike::graph::{BlobHash, NodeId, WorkerId};
 use lookalike::protocol::ProcessName;
 
-use super::Lost;
+use super::departed::Lost;
 use crate::actions::WorkerProcess;
 
 /// How many bytes of assignments a worker may have been given that it has not begun with. What waits in its queue stays as

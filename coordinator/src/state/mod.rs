@@ -1,6 +1,7 @@
 //! The coordinator's state: the graph, who holds which node, who is a member. Data and questions; what changes it is in
 //! [`reactor`](crate::reactor).
 
+mod deaths;
 mod departed;
 mod members;
 mod pace;
@@ -13,14 +14,15 @@ use std::time::Duration;
 use lookalike::graph::{Blob, Graph, NodeId, NodeKey, WorkerId};
 use lookalike::protocol::ProcessName;
 
+pub use self::deaths::Deaths;
 pub(crate) use self::departed::{Death, Departed, Lost};
 pub(crate) use self::members::{Held, Member, Members};
 use self::members::{Size, weight};
 use self::pace::Pace;
+use self::recall::Recall;
 pub(crate) use self::waiting::{Place, Waiting};
 use crate::events::{NodeName, Site};
 pub use crate::policy::Policy;
-use crate::state::recall::Recall;
 
 /// What a run has cost, for people: nothing of it may reach a result.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -115,23 +117,6 @@ pub(crate) struct Record {
     pub(crate) deaths: Deaths,
     /// What it computes: known once it is ready, where the run is remembered.
     pub(crate) key: Option<NodeKey>,
-}
-
-/// The deaths of workers that executed a node.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Deaths {
-    /// While they executed it, perhaps with others, or before it was a suspect.
-    pub in_company: u32,
-    /// While it had its worker for itself.
-    pub alone: u32,
-    /// While it had its worker for itself, when other workers died of something else.
-    pub excused: u32,
-}
-
-impl Deaths {
-    pub(crate) fn total(self) -> u32 {
-        self.in_company + self.alone + self.excused
-    }
 }
 
 /// An output that waits for its verification.

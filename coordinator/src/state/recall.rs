@@ -4,7 +4,7 @@ use std::fmt;
 
 use lookalike::graph::{Blob, NodeKey};
 
-use crate::state::Deaths;
+use super::deaths::Deaths;
 
 /// What is known of a node from earlier.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]

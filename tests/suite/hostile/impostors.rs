@@ -8,6 +8,7 @@ use lookalike::graph::BlobHash;
 use lookalike::protocol::{Executing, FailureKind, FrameTag, Hello, LeaseName, ToCoordinator, ToWorker};
 use lookalike_coordinator::events::{Departure, RunEvent};
 use lookalike_coordinator::limits::Limits;
+use lookalike_coordinator::reactor::Stop;
 use lookalike_coordinator::runner::{RunError, RunnerOptions};
 use lookalike_coordinator::state::Policy;
 use lookalike_tests::cluster::{Cluster, options, read_access};
@@ -69,7 +70,7 @@ fn worker_that_answers_for_a_node_of_another_is_found_out_where_outputs_are_veri
     hear(&mut liar, |message| (message == ToWorker::Acknowledge(name)).then_some(()));
     waiting.release();
     let error = cluster.error();
-    assert!(matches!(error, RunError::ResultsDiffer { .. }), "{error}");
+    assert!(matches!(error, RunError::Stop(Stop::ResultsDiffer { .. })), "{error}");
 }
 
 #[test]
