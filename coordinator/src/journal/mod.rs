@@ -66,7 +66,7 @@ use self::past::{Loaded, Past};
 pub use self::schema::remove;
 use self::writer::{Command, Writer};
 use crate::state::Deaths;
-use crate::state::recall::{Memory, Recall};
+use crate::state::past_outputs::{Memory, PastOutputs};
 
 /// The journal of a run that this process coordinates.
 #[derive(Debug)]
@@ -124,9 +124,9 @@ impl Journal {
     }
 
     /// What the reactor asks for the outputs of earlier epochs.
-    pub(crate) fn recall(&self) -> Box<dyn Recall> {
+    pub(crate) fn past_outputs(&self) -> Box<dyn PastOutputs> {
         let deaths = self.past.deaths.clone();
-        Box::new(Recollection { known: self.known.clone(), deaths, commands: self.commands.clone() })
+        Box::new(JournalledOutputs { known: self.known.clone(), deaths, commands: self.commands.clone() })
     }
 
     /// Write a batch, after those before. [`Self::committed`] tells when it is written.
@@ -183,14 +183,14 @@ impl Drop for Journal {
 
 /// Answers the reactor from the journal.
 #[derive(Debug)]
-struct Recollection {
+struct JournalledOutputs {
     known: HashSet<NodeKey>,
     deaths: HashMap<NodeKey, Deaths>,
     commands: Sender<Command>,
 }
 
-impl Recall for Recollection {
-    fn recall(&mut self, key: NodeKey) -> Memory {
+impl PastOutputs for JournalledOutputs {
+    fn of(&mut self, key: NodeKey) -> Memory {
         let deaths = self.deaths.get(&key).copied().unwrap_or_default();
         let is_known = self.known.contains(&key);
         let read = || {

@@ -92,13 +92,13 @@ fn results(connection: &Connection) -> rusqlite::Result<HashMap<NodeKey, i64>> {
 fn past(connection: &Connection, results: usize) -> rusqlite::Result<Past> {
     let mut past = Past { results, ..Past::default() };
     let mut statement = connection.prepare(
-        "SELECT key, deaths, deaths_alone, deaths_excused FROM nodes
-         WHERE key IS NOT NULL AND deaths + deaths_alone + deaths_excused > 0",
+        "SELECT key, deaths, deaths_alone, deaths_not_counted FROM nodes
+         WHERE key IS NOT NULL AND deaths + deaths_alone + deaths_not_counted > 0",
     )?;
     let mut rows = statement.query([])?;
     while let Some(row) = rows.next()? {
         let key = NodeKey(row.get(0)?);
-        let deaths = Deaths { in_company: row.get(1)?, alone: row.get(2)?, excused: row.get(3)? };
+        let deaths = Deaths { in_company: row.get(1)?, alone: row.get(2)?, not_counted: row.get(3)? };
         // Each epoch counts on from the one before.
         if deaths.total() > past.deaths.get(&key).map_or(0, |most| most.total()) {
             past.deaths.insert(key, deaths);

@@ -46,7 +46,7 @@ CREATE TABLE nodes (
     attempts    INTEGER NOT NULL,
     deaths      INTEGER NOT NULL,
     deaths_alone    INTEGER NOT NULL,
-    deaths_excused  INTEGER NOT NULL,
+    deaths_not_counted  INTEGER NOT NULL,
     key         BLOB,
     error       TEXT
 );
@@ -91,7 +91,7 @@ CREATE VIEW node_list AS
     SELECT id >> 32 AS epoch, id & 0xffffffff AS node, kind, label,
            CASE state WHEN 0 THEN 'waiting' WHEN 1 THEN 'ready' WHEN 2 THEN 'running' WHEN 3 THEN 'completed'
                       WHEN 4 THEN 'recalled' ELSE 'failed' END AS state,
-           attempts, deaths + deaths_alone + deaths_excused AS deaths, lower(hex(key)) AS key, error
+           attempts, deaths + deaths_alone + deaths_not_counted AS deaths, lower(hex(key)) AS key, error
     FROM nodes;
 CREATE VIEW attempt_list AS
     SELECT epoch, node, attempt, worker, begun_ms, ended_ms,

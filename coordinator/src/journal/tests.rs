@@ -16,7 +16,7 @@ use super::*;
 mod parts;
 
 const NAME: RunName = RunName([7; 16]);
-const DEATHS: Deaths = Deaths { in_company: 2, alone: 1, excused: 3 };
+const DEATHS: Deaths = Deaths { in_company: 2, alone: 1, not_counted: 3 };
 
 fn identity() -> RunIdentity {
     RunIdentity::default().with("--seed", "0")
@@ -84,10 +84,10 @@ fn next_epoch_finds_results_deaths_and_the_address() {
     let again = Journal::open(&options(&copy), RunName([8; 16]), None).unwrap();
     assert_eq!((again.run, again.epoch, again.past.results), (NAME, 2, 1));
     assert_eq!(again.past.listen, "127.0.0.1:4100".parse().ok());
-    let mut recall = again.recall();
-    assert_eq!(recall.recall(key(1)), Memory { output: Some(output(1)), ..Memory::default() });
-    assert_eq!(recall.recall(key(2)), Memory { output: None, deaths: DEATHS });
-    assert_eq!(recall.recall(key(3)), Memory::default());
+    let mut past = again.past_outputs();
+    assert_eq!(past.of(key(1)), Memory { output: Some(output(1)), ..Memory::default() });
+    assert_eq!(past.of(key(2)), Memory { output: None, deaths: DEATHS });
+    assert_eq!(past.of(key(3)), Memory::default());
 }
 
 /// The files of the journal as they are at this moment, in a folder of their own.
@@ -113,9 +113,9 @@ fn torn_write_costs_only_the_group_that_was_being_written() {
         let torn = fs::OpenOptions::new().write(true).open(copy.path().join("run.sqlite-wal")).unwrap();
         torn.set_len(length).unwrap();
         let again = Journal::open(&options(&copy), NAME, None).unwrap();
-        let mut recall = again.recall();
-        assert_eq!(recall.recall(key(1)).output, Some(output(1)), "{length}");
-        assert_eq!(recall.recall(key(2)).output, None, "{length}");
+        let mut past = again.past_outputs();
+        assert_eq!(past.of(key(1)).output, Some(output(1)), "{length}");
+        assert_eq!(past.of(key(2)).output, None, "{length}");
     }
 }
 
@@ -144,9 +144,9 @@ fn damaged_output_is_dropped_and_the_others_stay() {
         "UPDATE results SET bytes = zeroblob(1000) WHERE key = (SELECT key FROM nodes WHERE id & 0xffffffff = 1)",
     );
     let again = begun(&folder);
-    let mut recall = again.recall();
-    assert_eq!(recall.recall(key(1)).output, None);
-    assert_eq!(recall.recall(key(2)).output, Some(output(2)));
+    let mut past = again.past_outputs();
+    assert_eq!(past.of(key(1)).output, None);
+    assert_eq!(past.of(key(2)).output, Some(output(2)));
     again.close(None).unwrap();
     assert_eq!(begun(&folder).past.results, 1);
 }
@@ -190,9 +190,9 @@ fn output_that_is_computed_again_after_its_release_is_written_again() {
     both.keep(key(2), output(2));
     write(&mut journal, [again, completed(2), both]);
     let copy = copied(&folder);
-    let mut recall = Journal::open(&options(&copy), NAME, None).unwrap().recall();
-    assert_eq!(recall.recall(key(1)).output, Some(output(1)));
-    assert_eq!(recall.recall(key(2)).output, Some(output(2)));
+    let mut past = Journal::open(&options(&copy), NAME, None).unwrap().past_outputs();
+    assert_eq!(past.of(key(1)).output, Some(output(1)));
+    assert_eq!(past.of(key(2)).output, Some(output(2)));
 }
 
 #[test]

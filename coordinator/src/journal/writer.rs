@@ -239,23 +239,23 @@ fn write(
 
 fn write_node(transaction: &Transaction<'_>, id: u64, row: &NodeRow) -> rusqlite::Result<()> {
     let NodeRow { added, state, attempts, deaths, key, error } = row;
-    let Deaths { in_company, alone, excused } = deaths;
+    let Deaths { in_company, alone, not_counted } = deaths;
     let (state, key) = (*state as u8, key.as_ref().map(|key| key.0));
     match added {
         Some((kind, label)) => transaction
             .prepare_cached(
                 "INSERT INTO nodes
-                     (id, kind, label, state, attempts, deaths, deaths_alone, deaths_excused, key, error)
+                     (id, kind, label, state, attempts, deaths, deaths_alone, deaths_not_counted, key, error)
                  VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10)",
             )?
-            .execute(params![id, kind, label, state, attempts, in_company, alone, excused, key, error])?,
+            .execute(params![id, kind, label, state, attempts, in_company, alone, not_counted, key, error])?,
         None => transaction
             .prepare_cached(
-                "UPDATE nodes SET state = ?2, attempts = ?3, deaths = ?4, deaths_alone = ?5, deaths_excused = ?6, key = ?7,
+                "UPDATE nodes SET state = ?2, attempts = ?3, deaths = ?4, deaths_alone = ?5, deaths_not_counted = ?6, key = ?7,
                      error = ?8
                  WHERE id = ?1",
             )?
-            .execute(params![id, state, attempts, in_company, alone, excused, key, error])?,
+            .execute(params![id, state, attempts, in_company, alone, not_counted, key, error])?,
     };
     Ok(())
 }

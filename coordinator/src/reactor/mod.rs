@@ -146,9 +146,9 @@ fn refused(core: &Core, node: NodeId, error: PlanError) -> Stop {
 }
 
 /// Complete a node from what an earlier coordinator of this run has left. Whether there was something.
-fn recall(core: &mut Core, node: NodeId, outbox: &mut Outbox) -> bool {
+fn complete_from_past(core: &mut Core, node: NodeId, outbox: &mut Outbox) -> bool {
     let Some(key) = core.graph.key(node) else { return false };
-    let Some(memory) = core.recall.as_mut().map(|recall| recall.recall(key)) else { return false };
+    let Some(memory) = core.past_outputs.as_mut().map(|past| past.of(key)) else { return false };
     if let Some(record) = core.record(node) {
         record.key = Some(key);
         record.deaths = memory.deaths;
@@ -168,8 +168,8 @@ fn make_ready(core: &mut Core, planner: &impl Planner, node: NodeId, now: Durati
     if !core.graph.is_open(node) {
         return;
     }
-    if core.recall.is_some() {
-        if recall(core, node, outbox) {
+    if core.past_outputs.is_some() {
+        if complete_from_past(core, node, outbox) {
             return;
         }
         outbox.tell(RunEvent::NodeReady { node });
@@ -217,9 +217,9 @@ fn watch_starvation(core: &mut Core, now: Duration, outbox: &mut Outbox) -> Resu
 }
 
 #[cfg(test)]
-mod property_tests;
+mod past_outputs_tests;
 #[cfg(test)]
-mod recall_tests;
+mod property_tests;
 #[cfg(test)]
 mod storm_tests;
 #[cfg(test)]

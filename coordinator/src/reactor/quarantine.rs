@@ -6,7 +6,7 @@
 //! them ([`Policy::node_crashes`](crate::state::Policy::node_crashes)) fail it by name.
 //!
 //! Somebody who kills workers from outside may hit a suspect's worker as well. What tells the two apart is whom else they
-//! hit: as long as workers die whose deaths no suspect explains, a suspect is excused, though not for ever.
+//! hit: as long as workers die whose deaths no suspect explains, a suspect's deaths are not counted, up to a limit.
 //!
 //! A connection that breaks looks like a death, too. When its process comes back, what was counted is taken back.
 
@@ -20,9 +20,9 @@ use crate::actions::Outbox;
 use crate::events::RunEvent;
 use crate::state::{Core, Death, Deaths, Member, Place, Unexplained};
 
-/// How many deaths of a suspect's workers are excused for one that would count: where a machine fails all the time, a node that
+/// How many deaths of a suspect's workers are not counted for one that would count: where a machine fails all the time, a node that
 /// kills its workers has to fail in the end.
-const EXCUSES_PER_CRASH: u32 = 10;
+const NOT_COUNTED_PER_CRASH: u32 = 10;
 
 /// How many unexplained deaths are remembered.
 const REMEMBERED: usize = 8;
@@ -94,7 +94,7 @@ fn of(deaths: &mut Deaths, death: Death) -> &mut u32 {
     match death {
         Death::InCompany => &mut deaths.in_company,
         Death::Alone => &mut deaths.alone,
-        Death::Excused => &mut deaths.excused,
+        Death::NotCounted => &mut deaths.not_counted,
     }
 }
 
@@ -103,7 +103,7 @@ fn judge_death_alone(core: &Core, suspect: NodeId, since: Duration) -> Death {
     let lately = since.saturating_sub(core.policy.lost_after);
     let is_other = |death: &Unexplained| death.when >= lately && !death.executed.contains(&suspect);
     let others_die = core.unexplained.iter().any(is_other);
-    let most_excuses = core.policy.node_crashes.saturating_mul(EXCUSES_PER_CRASH);
-    let excused = core.look(suspect).map_or(0, |record| record.deaths.excused);
-    if others_die && excused < most_excuses { Death::Excused } else { Death::Alone }
+    let most = core.policy.node_crashes.saturating_mul(NOT_COUNTED_PER_CRASH);
+    let not_counted = core.look(suspect).map_or(0, |record| record.deaths.not_counted);
+    if others_die && not_counted < most { Death::NotCounted } else { Death::Alone }
 }

@@ -31,7 +31,7 @@ pub(super) fn accept(
             core.record(node).into_iter().for_each(|record| record.finished_by = Some(site));
             let name = core.name(node);
             took.filter(|took| !took.is_zero()).into_iter().for_each(|took| core.pace.note(&name.kind, took));
-            if core.recall.is_some() {
+            if core.past_outputs.is_some() {
                 outbox.push(Action::Keep { node, output: result.output });
             }
             outbox.tell(RunEvent::NodeFinished { name, site, bytes, elapsed: took.unwrap_or_default() });

@@ -99,7 +99,7 @@ pub async fn run_in<W: World, P: Planner>(
     let resumed = earlier.map(|journal| Resumed { listen: journal.past.listen, results: journal.past.results });
     let core = Core::new(options.policy, epoch);
     let core = match &journal {
-        Some(journal) => core.with_recall(journal.recall()),
+        Some(journal) => core.with_past_outputs(journal.past_outputs()),
         None => core,
     };
     let (results_sender, results) = unbounded_channel();

@@ -8,11 +8,11 @@ pub struct Deaths {
     /// While it had its worker for itself.
     pub alone: u32,
     /// While it had its worker for itself, when other workers died of something else.
-    pub excused: u32,
+    pub not_counted: u32,
 }
 
 impl Deaths {
     pub(crate) fn total(self) -> u32 {
-        self.in_company + self.alone + self.excused
+        self.in_company + self.alone + self.not_counted
     }
 }

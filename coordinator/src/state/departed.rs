@@ -24,7 +24,7 @@ pub(crate) struct Lost {
 pub(crate) enum Death {
     InCompany,
     Alone,
-    Excused,
+    NotCounted,
 }
 
 /// All of them, as far as they are remembered.

@@ -5,7 +5,7 @@ mod deaths;
 mod departed;
 mod members;
 mod pace;
-pub mod recall;
+pub mod past_outputs;
 mod waiting;
 
 use std::collections::VecDeque;
@@ -19,7 +19,7 @@ pub(crate) use self::departed::{Death, Departed, Lost};
 pub(crate) use self::members::{Held, Member, Members};
 use self::members::{Size, weight};
 use self::pace::Pace;
-use self::recall::Recall;
+use self::past_outputs::PastOutputs;
 pub(crate) use self::waiting::{Place, Waiting};
 use crate::events::{NodeName, Site};
 pub use crate::policy::Policy;
@@ -91,7 +91,7 @@ pub struct Core {
     pub(crate) given_up: Option<String>,
     pub(crate) summary: RunSummary,
     /// What earlier coordinators of this run have left.
-    pub(crate) recall: Option<Box<dyn Recall>>,
+    pub(crate) past_outputs: Option<Box<dyn PastOutputs>>,
 }
 
 /// What the coordinator knows of a node beside the graph.
@@ -166,14 +166,14 @@ impl Core {
             starving: None,
             given_up: None,
             summary: RunSummary::default(),
-            recall: None,
+            past_outputs: None,
         }
     }
 
     /// Complete nodes from what earlier coordinators of this run have left, wherever there is something.
     #[must_use]
-    pub fn with_recall(self, recall: Box<dyn Recall>) -> Self {
-        Self { recall: Some(recall), ..self }
+    pub fn with_past_outputs(self, past_outputs: Box<dyn PastOutputs>) -> Self {
+        Self { past_outputs: Some(past_outputs), ..self }
     }
 
     /// The graph of the run.

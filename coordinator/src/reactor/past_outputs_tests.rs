@@ -9,7 +9,7 @@ use super::tests::{Script, node, process};
 use super::{Event, Stop, handle, start};
 use crate::actions::{Action, Outbox};
 use crate::events::{Departure, RunEvent, Site};
-use crate::state::recall::{Memory, Recall};
+use crate::state::past_outputs::{Memory, PastOutputs};
 use crate::state::{Core, Deaths, Policy};
 
 const A: WorkerId = WorkerId(1);
@@ -17,8 +17,8 @@ const A: WorkerId = WorkerId(1);
 #[derive(Debug, Default)]
 struct Notebook(BTreeMap<NodeKey, Memory>);
 
-impl Recall for Notebook {
-    fn recall(&mut self, key: NodeKey) -> Memory {
+impl PastOutputs for Notebook {
+    fn of(&mut self, key: NodeKey) -> Memory {
         self.0.get(&key).cloned().unwrap_or_default()
     }
 }
@@ -54,7 +54,7 @@ impl Bench {
             node("join", all, Placement::Worker),
         ];
         let planner = Script { nodes, blob: vec![1], ..Script::default() };
-        let core = Core::new(Policy::default(), 2).with_recall(Box::new(notebook));
+        let core = Core::new(Policy::default(), 2).with_past_outputs(Box::new(notebook));
         let mut bench = Self { core, planner, outbox: Outbox::default() };
         start(&mut bench.core, &mut bench.planner, Duration::ZERO, &mut bench.outbox).unwrap();
         bench
@@ -123,7 +123,7 @@ fn deaths_are_remembered() {
 fn output_that_deaths_make_the_last_word_is_kept() {
     let nodes = vec![leaf("x", Placement::Worker)];
     let policy = Policy { verify_fraction: 1.0, ..Policy::default() };
-    let core = Core::new(policy, 1).with_recall(Box::new(Notebook::default()));
+    let core = Core::new(policy, 1).with_past_outputs(Box::new(Notebook::default()));
     let mut bench = Bench { core, planner: Script { nodes, ..Script::default() }, outbox: Outbox::default() };
     start(&mut bench.core, &mut bench.planner, Duration::ZERO, &mut bench.outbox).unwrap();
     bench.join(A);

@@ -11,7 +11,7 @@ use super::wire::Fate;
 
 /// Something that is done at its time.
 #[derive(Clone, Debug)]
-pub(super) enum Deed {
+pub(super) enum Event {
     /// A new fault, whichever it will be.
     Fault,
     /// The link to a worker works again.
