@@ -105,6 +105,8 @@ pub enum RunEvent {
     Listening {
         /// What the access file tells the workers.
         address: String,
+        /// How many local workers the coordinator starts.
+        local_workers: usize,
     },
     /// An earlier coordinator of this run is gone on with.
     Resumed {

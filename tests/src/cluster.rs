@@ -92,7 +92,7 @@ impl Cluster {
     /// Wait until the coordinator listens, and return where.
     pub fn address(&self) -> String {
         self.wait_for(|event| match event {
-            RunEvent::Listening { address } => Some(address.clone()),
+            RunEvent::Listening { address, .. } => Some(address.clone()),
             _ => None,
         })
     }

@@ -88,6 +88,14 @@ pub fn main_from(arguments: impl IntoIterator<Item = OsString>, registry: Regist
 /// Run a worker and tell its error on stderr: 0 done, 2 bad input or refused, 3 the coordinator was lost.
 #[must_use]
 pub fn run_and_report(options: &WorkerOptions, registry: Registry) -> ExitCode {
+    // A local worker has a coordinator that tells the user.
+    if !options.is_leashed
+        && let Some(address) = session::address(options)
+    {
+        let patience = humantime::format_duration(options.reconnect_for);
+        // Its reader may be gone.
+        let _ = writeln!(std::io::stderr(), "connecting to the coordinator at {address}, for at most {patience}");
+    }
     match run(options, registry) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {

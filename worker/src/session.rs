@@ -74,6 +74,11 @@ pub(crate) async fn run<W: World>(
     session.keep_connected(options.reconnect_for).await
 }
 
+/// Where a worker with these options connects to, if its access file says so.
+pub(crate) fn address(options: &WorkerOptions) -> Option<String> {
+    options.address.clone().or_else(|| read_access(options).ok().map(|access| access.address))
+}
+
 fn read_access(options: &WorkerOptions) -> Result<Access, WorkerError> {
     let path = options.access.clone();
     let text =

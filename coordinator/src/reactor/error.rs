@@ -12,14 +12,14 @@ use crate::events::{NodeName, Site};
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum Stop {
-    /// No worker has come.
-    #[error("no worker has come in {} s; check that workers can reach the address in the access file, or wait longer with --wait-for-workers", waited.as_secs())]
+    /// No worker has connected.
+    #[error("no worker connected in {} s; check that workers can reach the address in the access file, or wait longer with --wait-for-workers", waited.as_secs())]
     NoWorkerCame {
         /// How long there was work but no worker.
         waited: Duration,
     },
-    /// All workers are gone, and no new one has come.
-    #[error("all workers were lost, and no other has come in {} s; see why they ended, or wait longer with --grace", waited.as_secs())]
+    /// All workers are lost, and no other has connected.
+    #[error("all workers were lost, and no other connected in {} s; see why they ended, or wait longer with --grace", waited.as_secs())]
     LostAllWorkers {
         /// How long there was work but no worker.
         waited: Duration,

@@ -422,7 +422,7 @@ fn without_any_worker_the_user_is_reminded_and_then_told() {
     assert_eq!(bench.pass_time(31).unwrap(), ["waiting since 61 s"]);
     assert_eq!(bench.core.next_deadline(), Some(Duration::from_secs(91)));
     let error = bench.pass_time(539).unwrap_err();
-    assert!(error.to_string().starts_with("no worker has come in 600 s"), "{error}");
+    assert!(error.to_string().starts_with("no worker connected in 600 s"), "{error}");
 }
 
 #[test]
@@ -435,7 +435,7 @@ fn after_the_last_worker_there_is_a_grace_and_a_new_one_ends_it() {
     bench.lose(B, Departure::Lost);
     assert!(bench.pass_time(1).unwrap().is_empty());
     let error = bench.pass_time(59).unwrap_err();
-    assert!(error.to_string().starts_with("all workers were lost, and no other has come in 60 s"), "{error}");
+    assert!(error.to_string().starts_with("all workers were lost, and no other connected in 60 s"), "{error}");
 }
 
 #[test]

@@ -219,7 +219,8 @@ impl<W: World, P: Planner, O: FnMut(&RunEvent)> Driver<W, P, O> {
             let world = self.world.clone();
             match Cluster::start(world, &options, (run, self.core.epoch), resumed, inbound).await {
                 Ok(cluster) => {
-                    (self.observer)(&RunEvent::Listening { address: cluster.address.clone() });
+                    let (address, local_workers) = (cluster.address.clone(), options.workers);
+                    (self.observer)(&RunEvent::Listening { address, local_workers });
                     group.batch.listens(cluster.bound.to_string());
                     self.cluster = Some(cluster);
                 }
