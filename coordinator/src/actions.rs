@@ -5,8 +5,7 @@ use lookalike::protocol::ProcessName;
 
 use crate::events::RunEvent;
 
-/// A worker's permission, and duty, to execute a node. It ends with an answer, when it is cancelled, or with its worker's
-/// membership, which lasts as long as the worker is heard of.
+/// The right, and duty, of a worker to execute a node. It ends with an answer, with a cancellation, or when the worker is lost.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Lease {
     /// The node.
@@ -71,7 +70,7 @@ pub enum Action {
         /// The worker.
         worker: WorkerId,
     },
-    /// Keep the output of a node that has just been completed: its run is remembered.
+    /// Write the output of a node that has just been completed to the journal.
     Keep {
         /// The node.
         node: NodeId,
@@ -94,7 +93,7 @@ pub enum Action {
     Tell(RunEvent),
 }
 
-/// What the reactor has said and nobody has done yet, in order.
+/// The actions that wait to be performed, in order.
 #[derive(Debug, Default)]
 pub struct Outbox {
     actions: Vec<Action>,

@@ -14,7 +14,7 @@ pub enum Departure {
     Silent,
     /// It did not read what was sent to it.
     TooSlow,
-    /// Its process is back on another connection, before anybody noticed that this one is broken.
+    /// Its process is back on another connection, before this one was noticed to be broken.
     Replaced,
     /// It said goodbye: somebody asked it to end.
     Goodbye,
@@ -23,8 +23,8 @@ pub enum Departure {
 }
 
 impl Departure {
-    /// Whether the nodes that the worker executed may have caused it. How a local process ended would not tell more: a node
-    /// that takes all memory and somebody with `kill -9` leave the same status behind.
+    /// Whether the nodes that the worker executed may have caused it. The exit status of a local process would not tell more: a node that
+    /// takes all memory and a `kill -9` from outside leave the same status.
     #[must_use]
     pub fn is_suspicious(&self) -> bool {
         match self {
@@ -35,7 +35,7 @@ impl Departure {
 }
 
 impl Departure {
-    /// It in one word of a closed list, for programs.
+    /// The departure as one word of a closed list, for programs.
     #[must_use]
     pub fn word(&self) -> &'static str {
         match self {
@@ -108,7 +108,7 @@ pub enum RunEvent {
         /// How many local workers the coordinator starts.
         local_workers: usize,
     },
-    /// An earlier coordinator of this run is gone on with.
+    /// The run of an earlier coordinator is resumed.
     Resumed {
         /// Counts the coordinator processes of the run, from 1.
         epoch: u64,
@@ -162,7 +162,7 @@ pub enum RunEvent {
         /// The node.
         name: NodeName,
     },
-    /// The inputs of a node are there. Told of runs that are remembered only.
+    /// The inputs of a node are there. Only reported for runs with a journal.
     NodeReady {
         /// The node.
         node: NodeId,
@@ -181,7 +181,7 @@ pub enum RunEvent {
         /// The size of the output in bytes.
         bytes: usize,
     },
-    /// Nobody needs the output of a node any more, not even a coordinator that goes on with this run: only its hash is kept.
+    /// The output of a node is not needed any more, not even to resume the run: only its hash is kept.
     NodeReleased {
         /// The node.
         name: NodeName,
@@ -234,7 +234,7 @@ pub enum RunEvent {
         /// How many workers have died while they executed it.
         crashes: u32,
     },
-    /// A worker has died while it executed this node; or one that was thought to have died of it is back, and its death is taken back.
+    /// A worker has died while it executed this node; or its process is back, and the death is not counted any more.
     DeathsCounted {
         /// The node.
         name: NodeName,

@@ -12,13 +12,13 @@ use super::identity::Difference;
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum JournalError {
-    /// There is a run already, and nobody asked to go on with it.
+    /// The file holds a run, and `--resume` was not given.
     #[error("{} already holds a run; go on with it with --resume, choose another --out, or remove it first", path.display())]
     Exists {
         /// The journal.
         path: PathBuf,
     },
-    /// The file is something else.
+    /// The file is not a journal.
     #[error("{} is not the journal of a run; choose another --out, or move that file away", path.display())]
     NotAJournal {
         /// The file.
@@ -54,7 +54,7 @@ pub enum JournalError {
         /// The journal.
         path: PathBuf,
     },
-    /// There is no room for more.
+    /// The disk is full.
     #[error(
         "cannot write the journal {}: the disk is full; free some space there and go on with --resume: nothing that was acknowledged is lost",
         path.display()
@@ -82,7 +82,7 @@ pub enum JournalError {
         /// What SQLite says.
         source: rusqlite::Error,
     },
-    /// The thread that writes the journal is gone: a mistake of this program.
+    /// The thread that writes the journal has panicked: an error of this program.
     #[error(
         "nothing writes the journal {} any more: its thread has ended with a panic; go on with --resume, and please report this",
         path.display()

@@ -3,10 +3,10 @@
 //! ```text
 //!   reactor --actions of a group of events--> Batch --one transaction--> thread "journal" --committed--> the actions are done
 //! ```
-//! A worker's answer is acknowledged, and the next node given out, only after the transaction that says so: whatever ends the
-//! coordinator, nothing is lost that anybody was told of. Each process that coordinates a run is an *epoch* of it, and the first
-//! one has the number 1. Planners are pure, so a later epoch plans anew from the same inputs; nodes whose [`NodeKey`] has a result are completed
-//! from here, whatever their numbers were, and those alone run that have none.
+//! A worker's answer is acknowledged, and the next node given out, only after the transaction that records it: whatever ends the
+//! coordinator, nothing that was acknowledged is lost. Each process that coordinates a run is an *epoch* of it, counted from 1.
+//! Planners are pure, so a later epoch plans anew from the same inputs. Nodes whose [`NodeKey`] has a result are completed from here,
+//! whatever their numbers were; the others run.
 //!
 //! The tables are in `schema.rs`, and explained in `docs/journal.md`:
 //!

@@ -20,7 +20,7 @@ pub struct JournalOptions {
     pub path: PathBuf,
     /// What shapes the result.
     pub identity: RunIdentity,
-    /// Whether to go on with a run that is there. Without one, a new run begins either way.
+    /// Whether to resume an unfinished run. Without one in the file, a new run begins either way.
     pub resume: bool,
     /// The best score so far, for people who look at the run.
     pub score: Option<Score>,

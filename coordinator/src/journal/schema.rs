@@ -138,8 +138,8 @@ pub fn remove(path: &Path) -> io::Result<()> {
     Ok(())
 }
 
-/// Make a journal where none is, readable by its owner alone, and open it. It is there with all its tables and what `begin` writes, or
-/// not at all, whatever ends the process or fills the disk meanwhile.
+/// Create a journal, readable by its owner alone, and open it. It appears with all its tables and what `begin` writes, or not at all,
+/// whatever ends the process or fills the disk meanwhile.
 pub(super) fn create(
     path: &Path,
     begin: impl FnOnce(&Connection) -> rusqlite::Result<()>,
@@ -185,9 +185,9 @@ fn make(path: &Path, begin: impl FnOnce(&Connection) -> rusqlite::Result<()>) ->
     write().map_err(|source| JournalError::writing(path, source))
 }
 
-/// Open a journal that is there, to go on with it.
+/// Open an existing journal, to resume its run.
 pub(super) fn open(path: &Path) -> Result<Connection, JournalError> {
-    // Before anything else: it must not become a journal by being looked at.
+    // Check first: opening the file must not turn it into a journal.
     let looking = Connection::open_with_flags(path, OpenFlags::SQLITE_OPEN_READ_WRITE)
         .map_err(|source| JournalError::reading(path, source))?;
     check_format(path, &looking)?;

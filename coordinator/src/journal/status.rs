@@ -35,7 +35,7 @@ const BUSY_TIME: Duration = Duration::from_secs(1);
 pub enum RunState {
     /// A coordinator is at work.
     Running,
-    /// No coordinator is at work, and the run is not finished: `--resume` goes on with it.
+    /// No coordinator is running, and the run is not finished: `--resume` continues it.
     Stopped,
     /// Every part has ended, and some of them failed: `--resume` retries those.
     Ended,
@@ -164,7 +164,7 @@ pub enum StatusError {
         /// What the system says.
         source: io::Error,
     },
-    /// The status file is none.
+    /// The status file is not one of ours.
     #[error("{path} is not a status of a run")]
     Content {
         /// The file.
@@ -198,12 +198,12 @@ impl Status {
         Ok(status)
     }
 
-    /// What the writer of the status cannot know: whether it is still there.
+    /// Correct what the writer of the status cannot know: whether it still runs.
     fn settle(&mut self, is_running: Option<bool>) {
         if matches!(self.state, RunState::Finished | RunState::Ended) {
             return;
         }
-        // Where nobody can tell it is as it was.
+        // If the lock cannot be read, the state stays as written.
         match is_running {
             Some(true) => {
                 self.state = RunState::Running;

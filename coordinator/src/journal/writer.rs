@@ -41,7 +41,7 @@ pub(super) enum Command {
     Wait(SyncSender<()>),
     /// Write how this coordinator's part ended, and end.
     Close(Option<String>),
-    /// End without another word, as a process does that is killed.
+    /// End at once, as a killed process does.
     Die,
 }
 
@@ -61,7 +61,7 @@ pub(super) struct Writer {
 }
 
 impl Writer {
-    /// Do what is asked for until the end, or until nobody asks any more.
+    /// Process commands until the end, or until the sender is gone.
     pub(super) fn run(mut self) -> Result<(), JournalError> {
         loop {
             let soon = self.next_status.saturating_duration_since(Instant::now());
@@ -82,7 +82,7 @@ impl Writer {
                 Ok(Command::Close(ended)) => return self.close(ended.as_deref()),
                 // The coordinator's future was dropped.
                 Err(RecvTimeoutError::Disconnected) => return self.close(Some("it was dropped")),
-                // Somebody is still here.
+                // Nothing has happened, but the coordinator is alive.
                 Err(RecvTimeoutError::Timeout) => self.is_news = true,
             }
             if self.is_news && Instant::now() >= self.next_status {
@@ -123,9 +123,9 @@ impl Writer {
         Ok(())
     }
 
-    /// Wait until all that was written is on the disk. Once per epoch, before its first lease: a machine that loses its power may
-    /// lose the end of the log, but must not lose which epochs there were. The next one would have the number of one that was lost,
-    /// and a worker elsewhere might bring it an answer to the other's node of the same number.
+    /// Wait until everything written is on the disk. Once per epoch, before its first lease: a power loss may cost the end of the log, but
+    /// not the number of an epoch. Otherwise the next epoch could have the same number, and a worker of the lost one would take the next
+    /// coordinator for its own and answer for other nodes of the same numbers.
     fn reach_the_disk(&self) -> rusqlite::Result<()> {
         // What readers still need stays in the log as well, and is synchronised with it.
         self.connection.query_row("PRAGMA wal_checkpoint(PASSIVE)", [], |_| Ok(()))

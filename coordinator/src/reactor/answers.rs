@@ -1,4 +1,4 @@
-//! Workers begin with nodes and answer for them: which answer counts, and what becomes of the others.
+//! Answers of workers: which one counts, and what happens to the others.
 
 use std::time::Duration;
 
@@ -60,7 +60,7 @@ pub(super) fn failed(
     }
     if !core.graph.is_open(node) {
         let has_output = matches!(core.graph.state(node), Some(NodeState::Completed(_)));
-        // What was stopped because nobody wants it has no opinion.
+        // A cancelled execution says nothing about the node.
         if has_output && failure != NodeFailure::Cancelled {
             results::tell_difference(core, node, second_site, failure.to_string(), outbox);
         }
@@ -77,8 +77,8 @@ pub(super) fn failed(
     Ok(())
 }
 
-/// An answer has come: its lease ends. Since when the node has run under it, as far as it is known; `None` if nobody asked for this
-/// answer. What worker gives one to nothing is thrown out.
+/// An answer has come: its lease ends. Returns since when the node has run under it, as far as known; `None` if the attempt was never
+/// given out. A worker that answers for such an attempt is dropped.
 fn answered(core: &mut Core, answer: Answer, now: Duration, outbox: &mut Outbox) -> Option<Option<Duration>> {
     let (site, node, attempt) = answer;
     let was_asked = core.was_given_out(node, attempt);
@@ -106,9 +106,9 @@ fn answered(core: &mut Core, answer: Answer, now: Duration, outbox: &mut Outbox)
     was_asked.then_some(since)
 }
 
-/// An output of a node whose output has to come twice: keep the first, compare the second.
+/// An output of a node that is verified by a second computation: keep the first output, compare the second.
 fn verify(core: &mut Core, node: NodeId, result: Candidate, now: Duration, outbox: &mut Outbox) -> Result<(), Stop> {
-    // Whoever may kill its workers runs as often as it has to and not more.
+    // A suspect node's first result is accepted without a second computation.
     let is_suspect = core.is_suspect(node);
     let Some(record) = core.record(node) else { return Ok(()) };
     let first = match record.candidate.take() {
@@ -121,7 +121,7 @@ fn verify(core: &mut Core, node: NodeId, result: Candidate, now: Duration, outbo
             core.summary.verified_nodes += 1;
             return results::accept(core, node, *first, now, outbox);
         }
-        // Sent again by a worker that did not hear our thanks.
+        // A duplicate: the worker never received our acknowledgement.
         Some(first) => *first,
     };
     record.candidate = Some(Box::new(first));
@@ -131,8 +131,8 @@ fn verify(core: &mut Core, node: NodeId, result: Candidate, now: Duration, outbo
     Ok(())
 }
 
-/// Whether an output was computed anew. A process that has lost its connection may send one and the same output under two leases; but
-/// one that it began with it has not answered before.
+/// Whether an output was computed a second time. A process that has lost its connection may send one output under two leases, but
+/// not under a lease whose execution it has announced.
 fn is_second_computation(first: &Candidate, second: &Candidate) -> bool {
     let is_another = first.process.is_some() && second.process.is_some() && first.process != second.process;
     first.attempt != second.attempt && (is_another || second.took.is_some())
@@ -150,6 +150,6 @@ pub(super) fn is_chosen(core: &Core, spec: &NodeSpec, node: NodeId) -> bool {
     named.extend_from_slice(&BlobHash::of(&spec.parameters).0);
     inputs.iter().for_each(|input| named.extend_from_slice(&input.hash().0));
     let [a, b, c, d, ..] = BlobHash::of(&named).0;
-    // Evenly spread over 0 to 1, the end not included.
+    // Uniform in [0, 1).
     f64::from(u32::from_le_bytes([a, b, c, d])) / (f64::from(u32::MAX) + 1.0) < fraction
 }

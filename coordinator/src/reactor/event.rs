@@ -24,12 +24,12 @@ pub enum Event {
         /// Why.
         departure: Departure,
     },
-    /// A worker was asked to end: it finishes what it executes, and what it has not begun with it will not begin with.
+    /// A worker drains: it finishes what it executes and begins nothing more.
     WorkerDrains {
         /// The worker.
         worker: WorkerId,
     },
-    /// A worker was heard of; it executes these nodes.
+    /// A heartbeat of a worker, with the nodes that it executes.
     Heartbeat {
         /// The worker.
         worker: WorkerId,
@@ -74,7 +74,7 @@ pub enum Event {
         /// The name of the blob.
         hash: BlobHash,
     },
-    /// The last local worker was given up, and no other can join.
+    /// The last local worker will not be restarted, and no other worker can join.
     LocalWorkersGivenUp {
         /// How the last one ended.
         last_status: String,
@@ -85,7 +85,7 @@ pub enum Event {
     LookAgain,
 }
 
-/// A node that a worker says to execute.
+/// A node that a worker reports as executing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Executing {
     /// The node.

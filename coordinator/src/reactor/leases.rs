@@ -1,4 +1,4 @@
-//! Leases: how one is given, begins, is taken back, and which worker may have one.
+//! Leases: given out, begun, taken back; and which worker may have one.
 
 use std::time::Duration;
 
@@ -49,19 +49,19 @@ pub(super) fn started(
     outbox: &mut Outbox,
 ) {
     renew(core, worker, now);
-    // A lease that has ended or changed meanwhile: the message crossed ours.
+    // Otherwise the lease has ended or changed while this message was on its way.
     if core.members.change(worker, |member| member.begin(node, attempt, (arrived, now))) == Some(true) {
         core.watch(node);
         outbox.tell(RunEvent::NodeStarted { name: core.name(node), site: Site::Worker(worker) });
     }
 }
 
-/// A worker was heard of.
+/// A worker has sent something: its leases are renewed.
 pub(super) fn renew(core: &mut Core, worker: WorkerId, now: Duration) {
     core.members.renew(worker, now + core.policy.lost_after);
 }
 
-/// Whether the output that is to be verified came from this worker, under whatever number.
+/// Whether the output to be verified came from this worker's process, on this connection or an earlier one.
 pub(super) fn is_origin(core: &Core, node: NodeId, worker: WorkerId) -> bool {
     let candidate = core.look(node).and_then(|record| record.candidate.as_ref());
     let process = core.members.get(worker).map(|member| member.process.name);

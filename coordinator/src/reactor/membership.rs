@@ -1,4 +1,4 @@
-//! Workers come, are heard of, are asked to end, leave.
+//! Membership: workers join, send signs of life, drain, leave.
 
 use std::time::Duration;
 
@@ -35,8 +35,8 @@ pub(super) fn join(
     }
 }
 
-/// A worker executes a node of which it has no lease, under one that it had before it lost its connection: it goes on with it, or
-/// has to be told that nobody wants it.
+/// A worker reports a node that it executes under a lease from before its connection broke: it gets a new lease and continues, or is
+/// told to cancel.
 pub(super) fn found(
     core: &mut Core,
     worker: WorkerId,
@@ -45,7 +45,7 @@ pub(super) fn found(
     outbox: &mut Outbox,
 ) {
     let earlier = core.members.get(worker).and_then(|member| member.earlier.get(&node));
-    // What was taken back on this connection it has been told already.
+    // For leases taken back on this connection the cancellation has been sent already.
     if earlier != Some(&attempt) {
         return;
     }
@@ -57,7 +57,7 @@ pub(super) fn found(
     }
 }
 
-/// Whether a worker may have a node that it executes: it is not done, not to be run alone, and at most one other one executes it.
+/// Whether a worker may continue a node: the node is open, not a suspect, and at most one other worker executes it.
 fn may_go_on(core: &Core, worker: WorkerId, node: NodeId) -> bool {
     let (Some(member), Some(record)) = (core.members.get(worker), core.look(node)) else { return false };
     let is_begun =
@@ -68,7 +68,8 @@ fn may_go_on(core: &Core, worker: WorkerId, node: NodeId) -> bool {
     is_free && is_wanted && is_other && record.holders.iter().filter(is_begun).count() < 2
 }
 
-/// Give a worker the lease of a node that it executes. Who has not begun with it need not, nor with what is too much for this one.
+/// Give a worker the lease of a node that it executes. Workers that hold the node without having begun it lose that lease, and this
+/// worker loses the leases that are too many for it now.
 fn adopt(core: &mut Core, worker: WorkerId, node: NodeId, now: Duration, outbox: &mut Outbox) {
     for holder in core.look(node).map(|record| record.holders.clone()).unwrap_or_default() {
         if core.members.get(holder).is_some_and(|holder| holder.waiting.contains(&node)) {
@@ -87,13 +88,13 @@ fn adopt(core: &mut Core, worker: WorkerId, node: NodeId, now: Duration, outbox:
     }
 }
 
-/// Take back what a worker held. The nodes it executed are suspects if it may have died of them.
+/// Take back the leases of a worker. Its death counts against the nodes that it executed if they may have caused it.
 pub(super) fn leave(core: &mut Core, worker: WorkerId, departure: &Departure, now: Duration, outbox: &mut Outbox) {
     let Some(member) = core.members.remove(worker) else { return };
     core.clearing = core.clearing.filter(|clearing| *clearing != worker);
     core.summary.workers_left += 1;
     outbox.tell(RunEvent::WorkerLeft { worker, departure: departure.clone() });
-    // Whoever was asked to end may be ended by force, a time limit later: nobody's fault.
+    // A draining worker may be killed when its time limit ends: no node is to blame.
     let was_asked = member.is_draining || *departure == Departure::Goodbye;
     let counts = departure.is_suspicious() && !was_asked;
     let deaths = if counts { quarantine::count_death(core, &member, now, outbox) } else { Vec::new() };
@@ -110,7 +111,7 @@ pub(super) fn leave(core: &mut Core, worker: WorkerId, departure: &Departure, no
     }
 }
 
-/// A worker begins with nothing more: take back what it has not begun with.
+/// A worker drains: take back the leases that it has not begun.
 pub(super) fn drain(core: &mut Core, worker: WorkerId, now: Duration, outbox: &mut Outbox) {
     leases::renew(core, worker, now);
     core.clearing = core.clearing.filter(|clearing| *clearing != worker);
@@ -128,7 +129,7 @@ pub(super) fn drain(core: &mut Core, worker: WorkerId, now: Duration, outbox: &m
     }
 }
 
-/// Let a node that was taken from this worker wait for another one, unless another one has it already.
+/// Re-queue a node that was taken from this worker, unless another worker holds it or it waits already.
 fn requeue(core: &mut Core, node: NodeId, worker: WorkerId, now: Duration, outbox: &mut Outbox) {
     let Some(record) = core.look(node) else { return };
     let is_cared_for = !record.holders.is_empty() || record.place != Place::Nowhere;
@@ -148,7 +149,7 @@ fn requeue(core: &mut Core, node: NodeId, worker: WorkerId, now: Duration, outbo
     outbox.tell(RunEvent::NodeRequeued { name: core.name(node), worker, crashes: deaths.total() });
 }
 
-/// Let a node wait in its place; after each loss while it was executed a little longer, so that what always fails does not spin.
+/// Queue a node. After the second loss of its worker it waits, each time longer, so that a node that always fails does not spin.
 fn await_worker(core: &mut Core, node: NodeId, now: Duration) {
     let losses = core.look(node).map_or(0, |record| record.losses);
     let doublings = losses.saturating_sub(2).min(16);
@@ -160,7 +161,7 @@ fn await_worker(core: &mut Core, node: NodeId, now: Duration) {
     }
 }
 
-/// Throw a worker out.
+/// Close the connection of a worker and remove it.
 pub(super) fn drop_worker(
     core: &mut Core,
     worker: WorkerId,
@@ -182,7 +183,7 @@ pub(super) fn send_blob(core: &mut Core, worker: WorkerId, hash: BlobHash, now: 
         drop_worker(core, worker, &Departure::Violation(what), now, outbox);
         return;
     }
-    // A node that was taken back meanwhile may have been completed, and its inputs may be gone; it is not needed then.
+    // The node may have been taken back and completed meanwhile, and its inputs dropped: then the blob is not needed.
     let Some(blob) = core.graph.blob(hash).cloned() else {
         outbox.push(Action::ForgoBlob { worker });
         return;

@@ -1,11 +1,11 @@
-//! What happens when something happens: plain functions from state and event to state and actions. No sockets, no clock,
-//! no waiting: time comes in as an argument, and everything the coordinator does goes out through the [`Outbox`].
+//! The state machine: plain functions from state and event to state and actions. No sockets, no clock, no waiting: time is an
+//! argument, and every action goes out through the [`Outbox`].
 //!
-//! Scheduling reacts to events: whenever a node is ready and a worker has a place, the lease is given at once. A lease may
-//! end without a result (its worker left) or be overtaken by the result of another attempt; any attempt's result is as
-//! good as another's, because nodes are pure functions. Results that differ show that one was not, and end the run.
+//! Scheduling reacts to events: when a node is ready and a worker has a place, the lease is given out at once. A lease may end without a
+//! result (its worker left), or another attempt's result may come first. The result of any attempt counts, because nodes are pure
+//! functions; results that differ end the run.
 //!
-//! No event looks at all nodes or all workers: what has to be found among them is indexed in [`state`](crate::state).
+//! No event scans all nodes or all workers: [`state`](crate::state) has indices.
 
 mod answers;
 mod error;
@@ -50,8 +50,8 @@ pub fn handle(
     handle_arrived(core, planner, event, (now, now), outbox)
 }
 
-/// Act upon an event that came some time ago: `arrived`, not after `now`, says how long nodes have taken, and nothing else. Nobody
-/// is late because we are.
+/// Act upon an event that arrived earlier, at `arrived`, which is not after `now`. `arrived` measures how long nodes took; deadlines use
+/// `now`, so a late coordinator makes no worker late.
 ///
 /// # Errors
 /// What ends the run: an error of the planner, which by default is any failed node; results that differ; no worker for
@@ -100,7 +100,7 @@ pub fn handle_arrived(
     settle(core, planner, now, outbox)
 }
 
-/// Let everything follow that follows: tell the planner what happened, queue what became ready, give out leases.
+/// Process the consequences: tell the planner, queue the nodes that became ready, give out leases.
 fn settle(core: &mut Core, planner: &mut impl Planner, now: Duration, outbox: &mut Outbox) -> Result<(), Stop> {
     while let Some(change) = core.graph.next_change() {
         match change {
@@ -136,7 +136,7 @@ fn settle(core: &mut Core, planner: &mut impl Planner, now: Duration, outbox: &m
     watch_starvation(core, now, outbox)
 }
 
-/// What the planner says of an output, with the name of whom it came from where that one did wrong.
+/// The planner's error about an output; where the output is wrong, with the worker that it came from.
 fn refused(core: &Core, node: NodeId, error: PlanError) -> Stop {
     if !matches!(error, PlanError::NotVerified { .. } | PlanError::WrongOutput { .. }) {
         return Stop::Plan(error);
@@ -145,7 +145,7 @@ fn refused(core: &Core, node: NodeId, error: PlanError) -> Stop {
     Stop::WrongResult { name: Box::new(core.name(node)), site, error }
 }
 
-/// Complete a node from what an earlier coordinator of this run has left. Whether there was something.
+/// Complete a node from the output of an earlier coordinator of this run. Returns whether there was one.
 fn complete_from_past(core: &mut Core, node: NodeId, outbox: &mut Outbox) -> bool {
     let Some(key) = core.graph.key(node) else { return false };
     let Some(memory) = core.past_outputs.as_mut().map(|past| past.of(key)) else { return false };
@@ -191,7 +191,7 @@ fn make_ready(core: &mut Core, planner: &impl Planner, node: NodeId, now: Durati
     }
 }
 
-/// Work without a worker: remind the user, and give up after a while.
+/// Work but no worker: remind the user, and end the run after the limit.
 fn watch_starvation(core: &mut Core, now: Duration, outbox: &mut Outbox) -> Result<(), Stop> {
     if core.waiting.is_empty() || !core.members.is_empty() {
         core.starving = None;

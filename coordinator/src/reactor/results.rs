@@ -1,4 +1,4 @@
-//! Outputs that count: a node is completed, its other leases end, an answer that differs is told.
+//! Accepted outputs: the node is completed, its other leases end, a different answer is reported.
 
 use std::time::Duration;
 
@@ -40,7 +40,7 @@ pub(super) fn accept(
             core.summary.duplicate_results += 1;
             outbox.tell(RunEvent::DuplicateResult { node, site });
         }
-        // The node has failed before; the planner knows it, and nothing can be taken back.
+        // The node has failed before, and the planner has acted upon it.
         Completion::Refused => {
             if let Some(NodeState::Failed(FailureReason::Node(failure))) = core.graph.state(node) {
                 let error = failure.to_string();
@@ -65,7 +65,7 @@ pub(super) fn differ(core: &Core, node: NodeId, (first_site, first): (Site, Blob
     }
 }
 
-/// Nobody needs to run this node any more.
+/// The node need not run any more: cancel its executions and end its leases.
 pub(super) fn retract(core: &mut Core, node: NodeId, now: Duration, outbox: &mut Outbox) {
     core.put(node, Place::Nowhere);
     let Some(record) = core.record(node) else { return };
@@ -78,7 +78,7 @@ pub(super) fn retract(core: &mut Core, node: NodeId, now: Duration, outbox: &mut
     }
 }
 
-/// A node has an output and an error. Whoever acted upon the first one cannot take that back.
+/// A node has an output and an error. The first answer stays, because the planner has acted upon it.
 pub(super) fn tell_difference(core: &Core, node: NodeId, second: Site, error: String, outbox: &mut Outbox) {
     let first = core.look(node).and_then(|record| record.finished_by).unwrap_or(Site::Coordinator);
     outbox.tell(RunEvent::AnswersDiffer { name: core.name(node), first, second, error });

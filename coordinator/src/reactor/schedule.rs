@@ -1,5 +1,5 @@
-//! Who gets what: suspects first, then second runs of outputs to be verified, then the queue; with nothing left there, work
-//! is moved to workers that have none.
+//! The order of leases: suspects first, then second computations for verification, then the queue; when it is empty, waiting leases move
+//! to idle workers.
 
 use std::time::Duration;
 
@@ -10,8 +10,8 @@ use super::speculation;
 use crate::actions::Outbox;
 use crate::state::Core;
 
-/// How many nodes are looked at to find one that a worker may check. More are only more of the same: outputs of this very
-/// worker, which another one will check.
+/// How many nodes are tried to find one that a worker may verify. The rest are most likely outputs of the same worker, which another
+/// worker will verify.
 const CHECKS_LOOKED_AT: usize = 8;
 
 /// Give out leases as long as there are both nodes and places.
@@ -29,8 +29,8 @@ pub(super) fn schedule(core: &mut Core, now: Duration, outbox: &mut Outbox) {
     speculation::speculate(core, now, outbox);
 }
 
-/// Give every suspect a worker for itself: a fresh one, or after a while any that holds nothing; if there is none, one after
-/// the other gets no more leases until it holds nothing.
+/// Give every suspect a worker of its own: a fresh one, or after a while any that holds no lease. If there is none, clear one worker
+/// after the other: it gets no more leases until it holds none.
 fn isolate_suspects(core: &mut Core, now: Duration, outbox: &mut Outbox) {
     core.next_patience = None;
     while let Some((since, node)) = core.waiting.suspect() {
@@ -46,7 +46,7 @@ fn isolate_suspects(core: &mut Core, now: Duration, outbox: &mut Outbox) {
             return;
         }
     }
-    // Nobody waits for it any more.
+    // No suspect waits for it any more.
     if let Some(worker) = core.clearing.take() {
         core.members.change(worker, |member| member.is_clearing = false);
     }
@@ -83,7 +83,7 @@ fn isolate(core: &mut Core, worker: WorkerId, node: NodeId, now: Duration, outbo
     assign(core, worker, node, now, outbox);
 }
 
-/// Give nodes whose output is to be verified to another worker than the one it came from, if there is another.
+/// Give nodes to be verified to another worker than the one that the first output came from, if there is one.
 fn give_checks(core: &mut Core, now: Duration, outbox: &mut Outbox) {
     loop {
         let is_only_one = core.members.accepting() == 1;

@@ -58,12 +58,12 @@ pub(super) async fn serve<W: World>(greeted: Greeted<W::Stream>, worker: WorkerI
     let writer = Patient::new(writer, gate.policy.lost_after);
     let departure = tokio::select! {
         biased;
-        // Thrown out: whoever did it knows.
+        // Closed by the reactor, which knows why.
         () = closed => return,
         () = overflowing => Departure::TooSlow,
         departure = &mut reading => departure,
         written = write(writer, postman, gate.policy.heartbeat, &pending_blobs) => match written {
-            // We have said our last word: let the worker say its own, so that closing does not destroy ours.
+            // All is sent: wait for the worker to close, because closing over unread bytes would destroy our last message.
             Ok(()) => timeout(gate.limits.farewell_time, reading).await.unwrap_or(Departure::Lost),
             Err(WireError::Stream(error)) if error.kind() == io::ErrorKind::TimedOut => Departure::TooSlow,
             Err(error) => departure_of(&error),
@@ -82,7 +82,7 @@ async fn write(
     pending_blobs: &AtomicUsize,
 ) -> Result<(), WireError> {
     let (mut together, mut parcel) = (Vec::new(), Parcel::default());
-    // So that a worker notices when nobody is there any more, whatever it waits for.
+    // So that a worker notices a dead coordinator, whatever it waits for.
     let mut heart = interval_at(Instant::now() + heartbeat, heartbeat);
     heart.set_missed_tick_behavior(MissedTickBehavior::Delay);
     loop {
@@ -135,7 +135,7 @@ struct Reader<R> {
     pending_blobs: Arc<AtomicUsize>,
     max_pending_blobs: usize,
     heartbeat: Duration,
-    /// When the reactor was told of a sign of life: what came no later is known.
+    /// When the reactor was last told of a sign of life.
     told: Instant,
     inbound: Sender<Inbound>,
 }
@@ -248,8 +248,8 @@ impl<R: AsyncRead + Unpin> Reader<R> {
         Event::Heartbeat { worker: self.worker, executing: Vec::new() }
     }
 
-    /// Before much is received, ask whether anybody wants it. The answer also tells that what came before has been taken: at most
-    /// one large output of a worker is in memory without being kept. What fits into one frame is here already.
+    /// Before a large output is received, ask the reactor whether its lease was given out. The answer also says that the outputs before it
+    /// were processed, so at most one large output of a worker waits in memory. An output of one frame is here already.
     async fn ask_before(&mut self, lease: LeaseName, length: u64) -> Result<(), WireError> {
         self.unasked_bytes = self.unasked_bytes.saturating_add(length);
         if length <= PART_BYTES as u64 && self.unasked_bytes <= UNASKED_BYTES {

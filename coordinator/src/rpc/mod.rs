@@ -1,4 +1,4 @@
-//! The sockets: strangers come in, workers that know the secret come through, their messages become events.
+//! The sockets: connections are accepted, workers that know the secret are admitted, their messages become events.
 //!
 //! A stranger gets little: a place that the next one may need, a short time, a TLS handshake, fixed lengths, no decoder. A worker
 //! gets two tasks, one that reads and one that writes, so that a large blob in one direction never blocks the other. What either
@@ -39,7 +39,7 @@ use crate::tls::accept;
 /// The pause after the system refuses to accept a connection, such as for want of file descriptors.
 const ACCEPT_PAUSE: Duration = Duration::from_millis(100);
 
-/// Let workers in until `stop`, then give the connected ones a moment to take their leave.
+/// Accept workers until `stop`, then give the connected ones a moment to close.
 pub(crate) async fn serve_forever<W: World>(listener: W::Listener, gate: Gate<W>, stop: CancellationToken) {
     let limits = gate.limits;
     let gate = Arc::new(gate);
@@ -83,7 +83,7 @@ pub(crate) async fn serve_forever<W: World>(listener: W::Listener, gate: Gate<W>
     connections.shutdown().await;
 }
 
-/// A wrong secret or version is worth a word to the user: somebody means us. Anything else is noise of the network.
+/// A wrong secret or version comes from a Lookalike and is a warning to the user. Anything else is noise of the network.
 fn report_stranger(peer: SocketAddr, error: &WireError) {
     if means_us(error) {
         warn!(%peer, "refused: {error}");
@@ -97,7 +97,7 @@ fn means_us(error: &WireError) -> bool {
     matches!(error, WireError::Handshake(why) if *why != HandshakeError::Magic)
 }
 
-/// Make a worker of a stranger, in the time that it may take and as long as nobody else needs its place.
+/// Do the handshake with a stranger, within its time and as long as no newer stranger needs its place.
 async fn greet<W: World>(stream: W::Stream, place: Place, gate: &Gate<W>) -> Result<Greeted<W::Stream>, WireError> {
     tokio::select! {
         biased;

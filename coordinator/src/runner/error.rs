@@ -24,7 +24,7 @@ pub enum RunError {
         "no worker can ever join: expected at least one local worker, or an address to listen on for others, found neither; use --workers N or --listen ADDR"
     )]
     NoWorkersPossible,
-    /// The address to listen on is every address of the machine, and nobody knows what the others call it.
+    /// The address to listen on is every address of the machine, so workers cannot be told which one to connect to.
     #[error("listening on {listen} tells workers no host name to connect to; add --advertise HOST[:PORT]")]
     NothingToAdvertise {
         /// The address to listen on.
@@ -48,7 +48,7 @@ pub enum RunError {
         /// What the system says.
         source: io::Error,
     },
-    /// The run cannot be written down, or not gone on with.
+    /// The journal cannot be written, or the run in it cannot be resumed.
     #[error(transparent)]
     Journal(#[from] JournalError),
     /// There is no usable access file, or none can be written.
@@ -57,7 +57,7 @@ pub enum RunError {
     /// The coordinator's key is not that of its certificate.
     #[error("the coordinator's key file is not usable: {0}; make a new access file with `lookalike access new`")]
     Tls(#[source] rustls::Error),
-    /// The access file made beforehand says where workers connect to, but not where that arrives.
+    /// The access file made beforehand has an address of another machine, so `--listen` has to say where to listen.
     #[error(
         "workers with this access file connect to {address}; say on which address of this machine they arrive with --listen IP:PORT"
     )]
@@ -68,7 +68,7 @@ pub enum RunError {
     /// The operating system gives no random bytes.
     #[error("the system gives no random bytes for the name of the run: {0}")]
     Randomness(io::Error),
-    /// Nobody can be told to stop.
+    /// The system does not let us handle signals.
     #[error("cannot listen for Ctrl-C and SIGTERM")]
     Signals(#[source] io::Error),
     /// A local worker process cannot be started at all.
@@ -83,8 +83,8 @@ pub enum RunError {
 }
 
 impl RunError {
-    /// The exit code of the program (design section 10): 2 for bad input or usage, 130 when interrupted, else 3: the
-    /// cluster failed.
+    /// The exit code of the program (design section 10): 2 for bad input or usage, 130 when interrupted, else 3: the run
+    /// failed.
     #[must_use]
     pub fn exit_code(&self) -> u8 {
         match self {
@@ -97,7 +97,7 @@ impl RunError {
             | Self::Tls(_) => 2,
             Self::Credentials(error) => error.exit_code(),
             Self::Journal(error) => error.exit_code(),
-            // What a node says of its inputs is about the user's; a panic or an unknown kind is our own mistake.
+            // A node's error is about the user's input; a panic or an unknown kind is an error of this program.
             Self::Stop(Stop::Plan(PlanError::NodeFailed {
                 reason: FailureReason::Node(NodeFailure::Application { .. }),
                 ..

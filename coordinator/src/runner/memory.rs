@@ -10,7 +10,7 @@ use crate::journal::{Batch, Journal};
 /// as much as many events, and a node that begins and ends within one is written once.
 const WAITING_GROUPS: usize = 1;
 
-/// What a group of events has led to: done once it is written down.
+/// The actions of a group of events: performed once it is committed.
 #[derive(Debug, Default)]
 pub(super) struct Group {
     pub(super) actions: Vec<Action>,
@@ -18,7 +18,7 @@ pub(super) struct Group {
     pub(super) batch: Batch,
 }
 
-/// What the run has written down, and what waits for that.
+/// The journal of the run, and the groups that wait for their transactions.
 #[derive(Debug)]
 pub(super) struct Memory {
     journal: Option<Journal>,
@@ -46,7 +46,7 @@ impl Memory {
         self.waiting.is_empty()
     }
 
-    /// Write a group down; it comes back from [`Self::written`]. One that needs no writing comes back at once, if it is its turn.
+    /// Commit a group; it comes back from [`Self::written`]. One that needs no commit comes back at once, if it is its turn.
     pub(super) fn submit(&mut self, mut group: Group) -> Option<Group> {
         let Some(journal) = &mut self.journal else { return Some(group) };
         let batch = std::mem::take(&mut group.batch);
@@ -61,7 +61,7 @@ impl Memory {
         None
     }
 
-    /// The next group that is written down. Waits for ever if none is on its way.
+    /// The next committed group. Waits for ever if none is on its way.
     pub(super) async fn written(&mut self) -> Result<Group, RunError> {
         let (Some(journal), false) = (&mut self.journal, self.waiting.is_empty()) else {
             return std::future::pending().await;

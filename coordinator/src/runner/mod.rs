@@ -5,8 +5,8 @@
 //!   nodes run here --Event------------+--> reactor::handle --Outbox--> sockets, nodes run here, observer
 //!   the next deadline ----------------+
 //! ```
-//! Events that have come together are one group. With a journal, a group is written down as one transaction before anything of it
-//! is done; what comes while it is being written is the next.
+//! Events that arrive together form a group. With a journal, a group is committed as one transaction before its actions are performed;
+//! events that arrive meanwhile form the next group.
 //!
 //! One task owns the state; everything else talks to it through channels. Stopping is a message to every worker and then
 //! waiting for what was started: when [`run`] returns, there is no process and no connection left.
@@ -59,8 +59,8 @@ const EVENTS_PER_GROUP: usize = 1024;
 /// has seen every output, when no node is open any more. `observer` is told what happens, as it happens; it should be
 /// quick, for the run waits for it.
 ///
-/// With a [journal](RunnerOptions::journal) everything is written down before it is acknowledged, and a run that is there is gone
-/// on with, if the journal's options allow it. When nothing is left to run, nobody is listened for and no worker is started.
+/// With a [journal](RunnerOptions::journal) everything is committed before it is acknowledged, and an unfinished run is resumed if the
+/// journal's options allow it. When nothing is left to run, the coordinator does not listen and starts no worker.
 ///
 /// Needs a tokio runtime with time and I/O; a multi-threaded one keeps connections alive while the planner is busy.
 ///
@@ -123,7 +123,7 @@ pub async fn run_in<W: World, P: Planner>(
         cluster.stop(reason).await;
     }
     let closed = driver.memory.close(outcome.as_ref().err().map(with_causes));
-    // What ended the run first is the one to tell.
+    // The first error is the one to report.
     outcome.and(closed).map(|()| (driver.planner, driver.core.summary()))
 }
 
@@ -172,7 +172,7 @@ impl<W: World, P: Planner, O: FnMut(&RunEvent)> Driver<W, P, O> {
             let may_act = !is_over && self.memory.has_room();
             let deadline = self.core.next_deadline().map(|deadline| self.began + deadline);
             tokio::select! {
-                // What has come is looked at before the time is: a late look must not make a worker late.
+                // Events before deadlines: a late coordinator must not make a worker late.
                 biased;
                 () = interrupted.cancelled() => return Err(RunError::Interrupted),
                 written = self.memory.written() => {
@@ -191,7 +191,7 @@ impl<W: World, P: Planner, O: FnMut(&RunEvent)> Driver<W, P, O> {
                 () = sleep_or_wait(deadline), if may_act => {}
             }
             more(&mut inbound, &mut events);
-            // Where events never cease to come, the time is looked at after them.
+            // If events never cease, deadlines are checked after each group.
             if deadline.is_some_and(|deadline| deadline <= Instant::now()) {
                 events.push(Inbound::Event(Event::DeadlinePassed));
             }
@@ -199,8 +199,8 @@ impl<W: World, P: Planner, O: FnMut(&RunEvent)> Driver<W, P, O> {
         }
     }
 
-    /// Let the planner begin, and everything follow that is known already; then, if something is left to do, listen and start
-    /// workers. What the planner cannot do is not an error of this function: what was said before shall be heard.
+    /// Start the planner and complete what the journal has; then, if something is left to do, listen and start workers. An error of the
+    /// planner is returned as a value, so that the events before it are still reported.
     async fn begin(
         &mut self,
         Begin { options, run, resumed }: Begin,
@@ -256,7 +256,7 @@ impl<W: World, P: Planner, O: FnMut(&RunEvent)> Driver<W, P, O> {
             Ok(())
         };
         let outcome = handle_all();
-        // Also after an error: what was said before it shall be heard.
+        // Also after an error, so that the events before it are reported.
         self.submit(group);
         outcome
     }
@@ -273,7 +273,7 @@ impl<W: World, P: Planner, O: FnMut(&RunEvent)> Driver<W, P, O> {
         outcome
     }
 
-    /// Move what the reactor has said into the group, and tell the journal.
+    /// Move the reactor's actions into the group, and note them for the journal.
     fn collect(&mut self, group: &mut Group, now: Duration) {
         let actions = self.outbox.take();
         if self.memory.is_kept() {
@@ -282,7 +282,7 @@ impl<W: World, P: Planner, O: FnMut(&RunEvent)> Driver<W, P, O> {
         group.actions.extend(actions);
     }
 
-    /// A result that is wrong, or one of two that differ, must not be there when the run is gone on with.
+    /// A result that is wrong, or one of two that differ, must not be in the journal when the run is resumed.
     fn forget_if_wrong(&self, error: Option<&Stop>, group: &mut Group) {
         if let Some(Stop::WrongResult { name, .. } | Stop::ResultsDiffer { name, .. }) = error {
             let index = usize::try_from(name.node.0).unwrap_or(usize::MAX);
@@ -313,7 +313,7 @@ impl<W: World, P: Planner, O: FnMut(&RunEvent)> Driver<W, P, O> {
                 Some(Event::WorkerJoined { worker, threads, process })
             }
             Inbound::Ask { lease, answer } => {
-                // Whoever asked may be gone.
+                // The connection that asked may be gone.
                 let _ = answer.send(self.core.was_given_out(NodeId(lease.node), lease.attempt));
                 None
             }
@@ -325,7 +325,7 @@ impl<W: World, P: Planner, O: FnMut(&RunEvent)> Driver<W, P, O> {
         }
     }
 
-    /// Do what a group asks for.
+    /// Perform the actions of a group.
     fn perform(&mut self, group: Group) {
         for action in group.actions {
             match action {
@@ -387,7 +387,7 @@ fn name_of(lease: Lease) -> LeaseName {
     LeaseName { node: lease.node.0, attempt: lease.attempt, epoch: lease.epoch }
 }
 
-/// Take what else has come, as far as there is room in the group.
+/// Add the events that have arrived, as far as the group has room.
 fn more(inbound: &mut Receiver<Inbound>, events: &mut Vec<Inbound>) {
     while events.len() < EVENTS_PER_GROUP {
         let Ok(event) = inbound.try_recv() else { return };
@@ -406,7 +406,7 @@ fn with_causes(error: &RunError) -> String {
     text
 }
 
-/// How often to look how far the nodes are that run here.
+/// How often to read the progress of the nodes that run here.
 const GLANCE: Duration = Duration::from_millis(250);
 
 /// More threads than this on one worker are a mistake or a lie.

@@ -1,7 +1,7 @@
-//! Local worker processes: started with the run, started again when they die, gone when the run ends.
+//! Local worker processes: started with the run, restarted when they die, ended with the run.
 //!
-//! Each one is on a leash: a pipe to its stdin. One byte in it means that the run is over, its end without that byte that the
-//! coordinator was killed, by whatever means. In both cases the worker ends itself at once. Each one is in a process group of its
+//! Each one has a leash: a pipe to its stdin. A byte in it means that the run is over; its end without that byte means that the
+//! coordinator was killed. In both cases the worker ends at once. Each one is in a process group of its
 //! own, so that a Ctrl-C at the terminal reaches the coordinator alone, which ends its workers in order.
 
 mod worked;
@@ -27,8 +27,8 @@ use crate::events::RunEvent;
 use crate::reactor::Event;
 use crate::rpc::Inbound;
 
-/// A worker that lived for this long was well; its death starts the count again, and so does that of one that has executed
-/// something: it may have died of a node, and then the node fails in the end.
+/// A death after this long, or of a worker that has executed a node, resets the count of quick deaths: if a node kills workers, that node
+/// fails in the end.
 const HEALTHY_LIFE: Duration = Duration::from_secs(10);
 /// After this many deaths in a row, each soon after the start, a worker is not started again.
 const MAX_QUICK_DEATHS: u32 = 8;
@@ -138,7 +138,7 @@ impl LocalWorkers {
                 Err(error) => (0, format!("an error at its start: {error}"), false),
             };
             if !is_hopeless {
-                // Its last words may still be on their way.
+                // Its last messages may still be on their way.
                 tokio::select! {
                     () = sleep(FIRST_PAUSE) => {}
                     () = stop.cancelled() => return None,

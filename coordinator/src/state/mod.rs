@@ -1,5 +1,4 @@
-//! The coordinator's state: the graph, who holds which node, who is a member. Data and questions; what changes it is in
-//! [`reactor`](crate::reactor).
+//! The coordinator's state: the graph, the leases, the members. Data and queries; [`reactor`](crate::reactor) changes it.
 
 mod deaths;
 mod departed;
@@ -24,7 +23,7 @@ pub(crate) use self::waiting::{Place, Waiting};
 use crate::events::{NodeName, Site};
 pub use crate::policy::Policy;
 
-/// What a run has cost, for people: nothing of it may reach a result.
+/// Counts of a run, for people: none of them may reach a result.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct RunSummary {
     /// How many nodes were completed.
@@ -75,7 +74,7 @@ pub struct Core {
     pub(crate) pace: Pace,
     /// When a node will be slow for which a worker has nothing else to do.
     pub(crate) next_slow: Option<Duration>,
-    /// When a worker whose short nodes were left to it has not got on with them for too long.
+    /// When a worker that was left its short nodes counts as stalled.
     pub(crate) next_move: Option<Duration>,
     /// When a suspect's patience ends.
     pub(crate) next_patience: Option<Duration>,
@@ -209,8 +208,8 @@ impl Core {
         delays.into_iter().flatten().chain(starvation).min()
     }
 
-    /// Whether an answer to this attempt may come: it was given out. Any worker may bring it, because one that has lost its
-    /// connection comes back under another number.
+    /// Whether this attempt was given out. Any worker may answer for it, because a worker that has lost its connection comes back under
+    /// another number.
     pub(crate) fn was_given_out(&self, node: NodeId, attempt: u32) -> bool {
         self.look(node).is_some_and(|record| (1..=record.attempts).contains(&attempt))
     }
@@ -232,7 +231,7 @@ impl Core {
         self.records.get_mut(usize::try_from(node.0).ok()?)
     }
 
-    /// The same, to look at.
+    /// The same, read-only.
     pub(crate) fn look(&self, node: NodeId) -> Option<&Record> {
         self.records.get(usize::try_from(node.0).ok()?)
     }
