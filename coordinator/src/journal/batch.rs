@@ -89,13 +89,13 @@ pub(crate) struct Batch {
     pub(super) results: Vec<(NodeKey, Blob)>,
     /// Results that turned out to be wrong.
     pub(super) forgotten: Vec<NodeKey>,
-    /// Results whose bytes nobody needs any more.
+    /// Results whose bytes are not needed any more.
     pub(super) released: BTreeSet<NodeKey>,
     pub(super) listen: Option<String>,
 }
 
 impl Batch {
-    /// Take note of what the reactor has said.
+    /// Note an action of the reactor.
     pub(crate) fn note(&mut self, action: &Action, core: &Core, now: Duration) {
         match action {
             Action::Assign { worker, lease } => self.begin(lease.node, lease.attempt, worker.0, now),
@@ -115,7 +115,7 @@ impl Batch {
         }
     }
 
-    /// Take note of something that was told without the reactor.
+    /// Note an event.
     pub(crate) fn note_event(&mut self, event: &RunEvent, core: &Core, now: Duration) {
         match event {
             RunEvent::NodeAdded { name } => {
@@ -159,7 +159,7 @@ impl Batch {
         }
     }
 
-    /// Keep the result of a node. What was released before is wanted again.
+    /// Keep the result of a node, also if it was released before.
     pub(crate) fn keep(&mut self, key: NodeKey, output: Blob) {
         self.released.remove(&key);
         self.results.push((key, output));
@@ -176,7 +176,7 @@ impl Batch {
         self.listen = Some(address);
     }
 
-    /// Whether nobody may be told of the group before this is written: there is more in it than what people see.
+    /// Whether the actions of the group have to wait for this transaction: it holds more than what people see.
     pub(crate) fn is_urgent(&self) -> bool {
         let Self { nodes, workers, left, results, forgotten, released, listen, .. } = self;
         let rows = nodes.len() + workers.len() + left.len();
@@ -185,7 +185,7 @@ impl Batch {
 
     /// Whether there is nothing to write.
     pub(crate) fn is_empty(&self) -> bool {
-        // What is finished is among the results, and what has stopped among the nodes.
+        // Finished nodes are among the results, stopped ones among the nodes.
         !self.is_urgent() && self.started.is_empty() && self.attempts.is_empty()
     }
 
@@ -217,7 +217,7 @@ impl Batch {
         };
         let new = || NodeRow { added: None, state, attempts, deaths, key, error: None };
         let row = self.nodes.entry(node.0).or_insert_with(new);
-        // What an earlier coordinator completed stays recalled.
+        // A node that an earlier coordinator completed stays recalled.
         let state = if row.state == State::Recalled { State::Recalled } else { state };
         (row.state, row.attempts, row.deaths, row.key) = (state, attempts, deaths, key);
         row

@@ -13,7 +13,7 @@ use super::identity::Difference;
 #[non_exhaustive]
 pub enum JournalError {
     /// The file holds a run, and `--resume` was not given.
-    #[error("{} already holds a run; go on with it with --resume, choose another --out, or remove it first", path.display())]
+    #[error("{} already holds a run; continue it with --resume, choose another --out, or remove it first", path.display())]
     Exists {
         /// The journal.
         path: PathBuf,
@@ -26,7 +26,7 @@ pub enum JournalError {
     },
     /// Another version of this program wrote it in another form.
     #[error(
-        "{} has journal format {found}, expected {expected}; go on with the version of lookalike that began the run, or choose another --out",
+        "{} has journal format {found}, expected {expected}; use the version of lookalike that began the run, or choose another --out",
         path.display()
     )]
     Version {
@@ -56,7 +56,7 @@ pub enum JournalError {
     },
     /// The disk is full.
     #[error(
-        "cannot write the journal {}: the disk is full; free some space there and go on with --resume: nothing that was acknowledged is lost",
+        "cannot write the journal {}: the disk is full; free some space there and continue with --resume: nothing that was acknowledged is lost",
         path.display()
     )]
     DiskFull {
@@ -65,7 +65,7 @@ pub enum JournalError {
     },
     /// The journal cannot be written.
     #[error(
-        "cannot write the journal {}; mend that and go on with --resume: nothing that was acknowledged is lost",
+        "cannot write the journal {}; fix the cause and continue with --resume: nothing that was acknowledged is lost",
         path.display()
     )]
     Write {
@@ -84,7 +84,7 @@ pub enum JournalError {
     },
     /// The thread that writes the journal has panicked: an error of this program.
     #[error(
-        "nothing writes the journal {} any more: its thread has ended with a panic; go on with --resume, and please report this",
+        "the thread that writes the journal {} has panicked; continue with --resume, and please report this",
         path.display()
     )]
     Thread {

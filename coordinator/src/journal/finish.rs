@@ -1,4 +1,4 @@
-//! The end of a run: what it wrote, so that somebody who asks again can be told that it is all there.
+//! The end of a run: the files that it wrote, so that a second call can verify them.
 
 use std::path::Path;
 

@@ -1,4 +1,4 @@
-//! The journal of a run: what was added, given out, answered, in SQLite at `OUT/run.sqlite`.
+//! The journal of a run in SQLite, at `OUT/run.sqlite`: nodes, attempts, workers, results.
 //!
 //! ```text
 //!   reactor --actions of a group of events--> Batch --one transaction--> thread "journal" --committed--> the actions are done
@@ -22,7 +22,7 @@
 //!
 //! What nothing depends on is written about once a second: `deferred.rs`.
 //!
-//! Keys and hashes have no index: they are random, and an index would write one page for each. A coordinator that goes on reads all
+//! Keys and hashes have no index: they are random, and an index would write one page for each. A resuming coordinator reads all
 //! keys once. The secret of the access file is never here; the file is readable by its owner alone all the same.
 //!
 //! On a network file system the journal is locked for this process alone, and others read `status.json`.
@@ -87,7 +87,7 @@ pub(crate) struct Journal {
 }
 
 impl Journal {
-    /// Begin a run, or go on with the one that is there. `disk_time` is that of the [world](lookalike_worker::world::World).
+    /// Begin a run, or resume the one in the file. `disk_time` is that of the [world](lookalike_worker::world::World).
     pub(crate) fn open(
         options: &JournalOptions,
         name: RunName,
@@ -171,7 +171,7 @@ impl Journal {
     }
 }
 
-/// Dropped without [`Journal::close`] where the world decides about disks: the process was killed, and the next one may come at once.
+/// Dropped without [`Journal::close`] in a simulated world: the process was killed, and the next one may start at once.
 impl Drop for Journal {
     fn drop(&mut self) {
         if let (Some(_), Some(thread)) = (&self.disk, self.thread.take()) {

@@ -1,4 +1,4 @@
-//! Where a run is written down, and what it is a run of.
+//! Where the journal of a run is, and which run it is.
 
 use std::fmt;
 use std::path::PathBuf;
@@ -13,7 +13,7 @@ pub const JOURNAL_FILE: &str = "run.sqlite";
 /// Says the best score of a run so far, once there is one; the lowest is the best.
 pub type Score = Arc<dyn Fn() -> Option<f64> + Send + Sync>;
 
-/// Where a run is written down, and what it is a run of.
+/// The journal of a run: its file and the run's identity.
 #[derive(Clone)]
 pub struct JournalOptions {
     /// The file; its folder has to exist. Only one process may use it at a time: see [`RunLock`](super::RunLock).
@@ -24,7 +24,7 @@ pub struct JournalOptions {
     pub resume: bool,
     /// The best score so far, for people who look at the run.
     pub score: Option<Score>,
-    /// What becomes of the parts, in a run of many.
+    /// The states of the parts, in a run of many.
     pub parts: PartLedger,
 }
 

@@ -55,7 +55,7 @@ impl PartLedger {
         std::mem::take(&mut *self.lock()).into_values().collect()
     }
 
-    /// These could not be written: they are to be tried again, unless something newer was told.
+    /// Keep rows that could not be written for the next transaction, unless there are newer ones.
     pub(super) fn put_back(&self, rows: Vec<PartRow>) {
         let mut told = self.lock();
         for row in rows {
@@ -78,7 +78,7 @@ pub struct WrittenParts {
     pub outputs: BTreeMap<String, Vec<(String, String)>>,
 }
 
-/// What the run of a journal has written, after a check that it is one of these inputs and settings.
+/// The files that the run of a journal has written, after a check that it has these inputs and settings.
 pub fn written(path: &Path, identity: &RunIdentity) -> Result<WrittenParts, JournalError> {
     let connection = schema::open(path)?;
     past::check_identity(path, &connection, identity)?;

@@ -1,4 +1,4 @@
-//! The begin of an epoch: a new journal, or what earlier epochs have left in one.
+//! The begin of an epoch: a new journal, or one of earlier epochs.
 
 use std::collections::HashMap;
 use std::net::SocketAddr;
@@ -46,7 +46,7 @@ pub(super) fn begin(path: &Path, identity: &RunIdentity, run: RunName) -> Result
     Ok((connection, Loaded { run, epoch: 1, results: HashMap::new(), past: Past::default() }))
 }
 
-/// Go on with the run of a journal.
+/// Resume the run of a journal.
 pub(super) fn load(path: &Path, identity: &RunIdentity) -> Result<(Connection, Loaded), JournalError> {
     let connection = schema::open(path)?;
     check_identity(path, &connection, identity)?;
@@ -57,7 +57,7 @@ pub(super) fn load(path: &Path, identity: &RunIdentity) -> Result<(Connection, L
     let past = past(&connection, results.len()).map_err(reading)?;
     let epoch = last + 1;
     add_epoch(&connection, epoch).map_err(|source| JournalError::writing(path, source))?;
-    // The run is under way again.
+    // The run is not finished any more.
     let reopened = connection.execute("UPDATE run SET finished_ms = NULL, outputs = NULL", []);
     reopened.map_err(|source| JournalError::writing(path, source))?;
     Ok((connection, Loaded { run, epoch, results, past }))
@@ -99,7 +99,7 @@ fn past(connection: &Connection, results: usize) -> rusqlite::Result<Past> {
     while let Some(row) = rows.next()? {
         let key = NodeKey(row.get(0)?);
         let deaths = Deaths { in_company: row.get(1)?, alone: row.get(2)?, not_counted: row.get(3)? };
-        // Each epoch counts on from the one before.
+        // Each epoch begins with the counts of the one before.
         if deaths.total() > past.deaths.get(&key).map_or(0, |most| most.total()) {
             past.deaths.insert(key, deaths);
         }

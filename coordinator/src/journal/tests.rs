@@ -233,7 +233,7 @@ fn file_that_does_not_fit_is_refused_by_name() {
     begun(&folder).close(None).unwrap();
     let fresh = JournalOptions { resume: false, ..options(&folder) };
     let error = Journal::open(&fresh, NAME, None).unwrap_err().to_string();
-    assert!(error.contains("already holds a run; go on with it with --resume"), "{error}");
+    assert!(error.contains("already holds a run; continue it with --resume"), "{error}");
     let other = JournalOptions { identity: RunIdentity::default().with("--seed", "3"), ..options(&folder) };
     let error = Journal::open(&other, NAME, None).unwrap_err().to_string();
     assert!(error.contains("--seed is 0 there and 3 here"), "{error}");

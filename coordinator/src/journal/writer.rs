@@ -69,7 +69,7 @@ impl Writer {
                 Ok(Command::Commit(batch)) => {
                     let outcome = self.commit(&batch);
                     self.is_news = true;
-                    // When nobody listens any more the run is over.
+                    // An error means that the run is over.
                     let _ = self.committed.send(outcome);
                 }
                 Ok(Command::Note(batch)) => {

@@ -71,7 +71,7 @@ pub(super) async fn serve<W: World>(greeted: Greeted<W::Stream>, worker: WorkerI
     };
     info!(%worker, %departure, "left");
     let left = Event::WorkerLeft { worker, departure };
-    // When nobody listens any more the run is over.
+    // An error means that the run is over.
     let _ = gate.inbound.send(Inbound::Event(left)).await;
 }
 
@@ -150,8 +150,8 @@ impl<R: AsyncRead + Unpin> Reader<R> {
                 Err(error) => Err(error),
             };
             match event {
-                // When nobody listens any more the run is over. Then we still read until the worker has closed its end:
-                // closing over unread bytes would destroy our last word to it.
+                // An error means that the run is over. Then still read until the worker has closed its end:
+                // closing over unread bytes would destroy our last message to it.
                 Ok(Some(event)) => {
                     self.told = self.incoming.heard();
                     _ = self.inbound.send(event).await;
@@ -171,7 +171,7 @@ impl<R: AsyncRead + Unpin> Reader<R> {
             }
             if self.incoming.heard() >= self.told + self.heartbeat {
                 self.told = self.incoming.heard();
-                // When nobody listens any more the run is over.
+                // An error means that the run is over.
                 _ = self.inbound.send(Inbound::Event(self.life())).await;
             }
             if !self.incoming.read().await? {
@@ -263,7 +263,7 @@ impl<R: AsyncRead + Unpin> Reader<R> {
                 let found = format!("one for node {}, attempt {}", lease.node, lease.attempt);
                 Err(unexpected("an output for a lease that was given out", &found))
             }
-            // When nobody answers any more the run is over.
+            // An error means that the run is over.
             Ok(true) | Err(_) => Ok(()),
         }
     }

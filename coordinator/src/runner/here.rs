@@ -43,7 +43,7 @@ impl<P: Pool> Here<P> {
                 Ok(output) => Event::Finished { site, node, attempt, output },
                 Err(failure) => Event::Failed { site, node, attempt, failure },
             };
-            // When nobody listens any more the run is over.
+            // An error means that the run is over.
             let _ = results.send(result);
         });
     }

@@ -243,19 +243,14 @@ impl<W: World, P: Planner, O: FnMut(&RunEvent)> Driver<W, P, O> {
     /// Act upon events, as one group.
     fn handle_all(&mut self, events: &mut Vec<Inbound>) -> Result<(), Stop> {
         let mut group = Group::default();
-        let mut handle_all = || {
-            for inbound in events.drain(..) {
-                let arrived = match &inbound {
-                    Inbound::Timed { arrived, .. } => Some(*arrived),
-                    _ => None,
-                };
-                if let Some(event) = self.event(inbound, &mut group) {
-                    self.handle_arrived(event, arrived, &mut group)?;
-                }
-            }
-            Ok(())
-        };
-        let outcome = handle_all();
+        let outcome = events.drain(..).try_for_each(|inbound| {
+            let arrived = match &inbound {
+                Inbound::Timed { arrived, .. } => Some(*arrived),
+                _ => None,
+            };
+            let event = self.event(inbound, &mut group);
+            event.map_or(Ok(()), |event| self.handle_arrived(event, arrived, &mut group))
+        });
         // Also after an error, so that the events before it are reported.
         self.submit(group);
         outcome

@@ -125,7 +125,7 @@ impl LocalWorkers {
             let (process, status, is_hopeless) = match next {
                 Ok(mut process) => {
                     let started = RunEvent::LocalWorkerStarted { process: process.id };
-                    // When nobody listens any more the run is over, and `stop` will say so.
+                    // An error means that the run is over; then `stop` is cancelled.
                     let _ = inbound.send(Inbound::Tell(started)).await;
                     tokio::select! {
                         ended = process.child.wait() => (process.id, describe(&ended), is_hopeless(&ended)),
@@ -191,12 +191,12 @@ async fn watch(mut keepers: JoinSet<Option<String>>, inbound: Sender<Inbound>, o
     while let Some(ended) = keepers.join_next().await {
         match ended {
             Ok(Some(status)) => last_status = Some(status),
-            // Stopped: nobody waits for workers any more.
+            // Stopped: the run is over.
             Ok(None) | Err(_) => return drain(keepers).await,
         }
     }
     if let Some(last_status) = last_status.filter(|_| !others_may_come) {
-        // When nobody listens any more the run is over.
+        // An error means that the run is over.
         let _ = inbound.send(Inbound::Event(Event::LocalWorkersGivenUp { last_status })).await;
     }
 }

@@ -32,7 +32,7 @@ pub struct RunSummary {
     pub recalled_nodes: usize,
     /// How many nodes failed.
     pub failed_nodes: usize,
-    /// How many nodes were given up because nobody wanted their output any more.
+    /// How many nodes were cancelled because their output was not needed any more.
     pub cancelled_nodes: usize,
     /// How many leases were given out, and how often a node was run by the coordinator.
     pub attempts: u64,

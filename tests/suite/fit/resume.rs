@@ -193,7 +193,7 @@ fn full_disk_ends_the_run_by_name_and_costs_nothing_that_was_acknowledged() {
     fit(folder.path(), "whole", &format!("{FLAGS} --progress none")).done();
     let full = resume(folder.path(), "small/out");
     assert_eq!(full.code, Some(3), "{}", full.stderr);
-    for phrase in ["cannot write the journal small/out/run.sqlite: the disk is full", "go on with --resume"] {
+    for phrase in ["cannot write the journal small/out/run.sqlite: the disk is full", "continue with --resume"] {
         assert!(full.stderr.contains(phrase), "{}", full.stderr);
     }
     disk.grow("64m");
