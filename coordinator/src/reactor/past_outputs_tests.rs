@@ -1,6 +1,6 @@
 //! A resumed run: a node whose output the journal has does not run again.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, VecDeque};
 use std::time::Duration;
 
 use lookalike::graph::{Blob, Graph, Input, NodeId, NodeKey, NodeSpec, Placement, WorkerId};
@@ -104,6 +104,45 @@ fn run_whose_nodes_are_all_remembered_is_finished_at_once() {
     assert!(!bench.core.is_finished(), "the join is not remembered");
     assert_eq!(bench.said(), ["x recalled", "y recalled", "z recalled"]);
     assert_eq!(bench.join(A), ["worker 1 gets 3.1"]);
+}
+
+#[test]
+fn run_resumed_from_any_past_outputs_by_any_number_of_workers_ends() {
+    let leaves = [("x", Placement::Worker), ("y", Placement::Worker), ("z", Placement::Coordinator)];
+    for (mask, workers) in (0..8_u8).flat_map(|mask| (1..=3).map(move |workers| (mask, workers))) {
+        let has_output = |bit: &u8| mask >> bit & 1 == 1;
+        let past = (0..3).filter(has_output).map(|bit| {
+            let (name, placement) = leaves[usize::from(bit)];
+            (name, placement, output(bit))
+        });
+        let mut bench = Bench::new(&past.collect::<Vec<_>>());
+        let joined = |number| Event::WorkerJoined { worker: WorkerId(number), threads: 1, process: process(number) };
+        let mut events: VecDeque<Event> = (1..=workers).map(joined).collect();
+        let answer = |site, node: NodeId, attempt| {
+            let output = Blob::new(vec![node.0.to_le_bytes()[0]]);
+            Event::Finished { site, node, attempt, output }
+        };
+        loop {
+            for action in bench.outbox.take() {
+                match action {
+                    Action::Assign { worker, lease } => {
+                        let (node, attempt) = (lease.node, lease.attempt);
+                        events.push_back(Event::Started { worker, node, attempt });
+                        events.push_back(answer(Site::Worker(worker), node, attempt));
+                    }
+                    Action::RunHere { node, attempt } => events.push_back(answer(Site::Coordinator, node, attempt)),
+                    _ => {}
+                }
+            }
+            let Some(event) = events.pop_front() else { break };
+            handle(&mut bench.core, &mut bench.planner, event, Duration::ZERO, &mut bench.outbox).unwrap();
+        }
+        let mut completed = bench.planner.completed.clone();
+        completed.sort_unstable();
+        assert!(bench.core.is_finished(), "outputs {mask:03b}, {workers} workers");
+        assert_eq!(completed, [0, 1, 2, 3].map(NodeId), "outputs {mask:03b}, {workers} workers");
+        assert_eq!(bench.core.summary().recalled_nodes, mask.count_ones() as usize);
+    }
 }
 
 #[test]
