@@ -3,7 +3,7 @@
 use std::fmt;
 use std::time::Duration;
 
-use lookalike::graph::{BlobHash, NodeFailure, PlanError};
+use lookalike::graph::{BlobHash, FailureReason, NodeFailure, PlanError};
 use thiserror::Error;
 
 use crate::events::{NodeName, Site};
@@ -61,6 +61,20 @@ pub enum Stop {
     /// The planner cannot go on, by default because a node failed.
     #[error(transparent)]
     Plan(#[from] PlanError),
+}
+
+impl Stop {
+    /// The exit code of the program: 2 when a node's own error is about the user's input, else 3.
+    #[must_use]
+    pub fn exit_code(&self) -> u8 {
+        match self {
+            // A panic or an unknown kind is an error of this program.
+            Self::Plan(PlanError::NodeFailed {
+                reason: FailureReason::Node(NodeFailure::Application { .. }), ..
+            }) => 2,
+            _ => 3,
+        }
+    }
 }
 
 /// What a computation of a node came to.

@@ -3,7 +3,6 @@
 use std::io;
 use std::net::SocketAddr;
 
-use lookalike::graph::{FailureReason, NodeFailure, PlanError};
 use thiserror::Error;
 
 use crate::access::CredentialsError;
@@ -97,11 +96,7 @@ impl RunError {
             | Self::Tls(_) => 2,
             Self::Credentials(error) => error.exit_code(),
             Self::Journal(error) => error.exit_code(),
-            // A node's error is about the user's input; a panic or an unknown kind is an error of this program.
-            Self::Stop(Stop::Plan(PlanError::NodeFailed {
-                reason: FailureReason::Node(NodeFailure::Application { .. }),
-                ..
-            })) => 2,
+            Self::Stop(stop) => stop.exit_code(),
             Self::Interrupted => 130,
             _ => 3,
         }
