@@ -2,8 +2,8 @@
 //! run. It knows neither rendering nor a command line: it imports `lookalike`'s graph and protocol only.
 
 pub mod access;
-pub mod comm;
-pub mod core;
+pub mod actions;
+pub mod events;
 pub mod journal;
 pub mod limits;
 pub mod metrics;
@@ -12,4 +12,5 @@ pub mod reactor;
 mod rpc;
 pub mod runner;
 pub mod spawn;
+pub mod state;
 pub mod tls;

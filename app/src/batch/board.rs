@@ -18,8 +18,8 @@ use lookalike::{
     graph::split_label,
 };
 use lookalike_coordinator::{
-    comm::RunEvent,
-    journal::{FitLedger, FitRow, FitStatus},
+    events::RunEvent,
+    journal::{PartLedger, PartRow, PartStatus},
     metrics::Metrics,
 };
 use std::{
@@ -72,20 +72,20 @@ impl State {
 
 impl Row {
     /// As the journal has it.
-    fn for_the_journal(&self, number: u32) -> FitRow {
+    fn journal_row(&self, number: u32) -> PartRow {
         let (scores, error) = match &self.state {
             State::Done(scores) => (Some(scores), None),
             State::Failed(error) => (None, Some(error.clone())),
             State::Waiting | State::Running | State::Stopped => (None, None),
         };
-        let status = FitStatus {
+        let status = PartStatus {
             name: self.name.clone(),
             state: self.state.name().to_owned(),
-            cssim: scores.map(|scores| scores.cssim),
+            score: scores.map(|scores| scores.cssim),
             seconds: self.seconds,
             error,
         };
-        FitRow { number, status, outputs: scores.map(|scores| scores.files.clone()).unwrap_or_default() }
+        PartRow { number, status, outputs: scores.map(|scores| scores.files.clone()).unwrap_or_default() }
     }
 }
 
@@ -105,7 +105,7 @@ pub(super) struct Watchers {
     pub(super) display: Box<dyn Display>,
     pub(super) metrics: Option<Metrics>,
     /// The journal.
-    pub(super) ledger: FitLedger,
+    pub(super) ledger: PartLedger,
 }
 
 struct Inner {
@@ -160,7 +160,7 @@ impl Board {
             is_stopped: false,
             began: Instant::now(),
         };
-        (0..).zip(&inner.rows).for_each(|(number, row)| inner.watchers.ledger.tell(row.for_the_journal(number)));
+        (0..).zip(&inner.rows).for_each(|(number, row)| inner.watchers.ledger.tell(row.journal_row(number)));
         inner.show_metrics();
         let board = Self { inner: Mutex::new(inner), out, writing: Mutex::new(()) };
         board.write_summaries()?;
@@ -361,7 +361,7 @@ impl Inner {
     /// Tells everybody of a change of a fit.
     fn show(&mut self, number: u32, event: &FitEvent) {
         if let Some(row) = self.rows.get(number as usize) {
-            self.watchers.ledger.tell(row.for_the_journal(number));
+            self.watchers.ledger.tell(row.journal_row(number));
         }
         self.show_metrics();
         let count = self.count();

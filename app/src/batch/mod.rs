@@ -35,7 +35,7 @@ use anyhow::Context;
 use board::{Board, Watchers};
 use lights::Lights;
 use lookalike::graph::Many;
-use lookalike_coordinator::journal::{self, Finished, FitLedger, JOURNAL_FILE, JournalOptions};
+use lookalike_coordinator::journal::{self, Finished, JOURNAL_FILE, JournalOptions, PartLedger};
 use std::{process::ExitCode, sync::Arc};
 use supply::{Supply, SupplyOptions};
 use tokio::sync::Notify;
@@ -63,7 +63,7 @@ pub(crate) fn run(settings: BatchSettings) -> anyhow::Result<ExitCode> {
     }
     remark.iter().for_each(|text| display.say(text));
     metrics.iter().for_each(|metrics| display.say(&format!("metrics at {}", metrics.url())));
-    let ledger = FitLedger::default();
+    let ledger = PartLedger::default();
     let watchers = Watchers { display, metrics: metrics.clone(), ledger: ledger.clone() };
     let board = Arc::new(Board::new(&fits, complete, watchers, out.clone()).context(Exit::ClusterFailed)?);
     if is_finished {
@@ -92,9 +92,8 @@ pub(crate) fn run(settings: BatchSettings) -> anyhow::Result<ExitCode> {
         path: out.file(JOURNAL_FILE),
         identity,
         resume: settings.resume,
-        survivors: true,
-        best: None,
-        fits: ledger.clone(),
+        score: None,
+        parts: ledger.clone(),
     });
     let run = run_to_end(options, Many::new(supply), metrics.as_ref(), |event| {
         demand.note(event);
@@ -108,7 +107,7 @@ pub(crate) fn run(settings: BatchSettings) -> anyhow::Result<ExitCode> {
 }
 
 /// Tells the journal what has come after it was closed: fits whose results were written last, and how all of it ended.
-fn close(out: &OutFolder, board: &Board, ledger: &FitLedger, is_whole: bool, fits: &[BatchFit]) -> anyhow::Result<()> {
+fn close(out: &OutFolder, board: &Board, ledger: &PartLedger, is_whole: bool, fits: &[BatchFit]) -> anyhow::Result<()> {
     let path = out.file(JOURNAL_FILE);
     if !path.exists() {
         // The run could not begin.

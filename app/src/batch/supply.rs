@@ -180,13 +180,13 @@ mod tests {
         progress::display_of_many,
         settings::ProgressKind,
     };
-    use lookalike_coordinator::journal::FitLedger;
+    use lookalike_coordinator::journal::PartLedger;
     use serde_json::Value;
 
     /// A supply whose next fit has so many pixels, for one worker of one thread.
     fn supply(out: &OutFolder, pixels: usize) -> Supply {
         let watchers =
-            Watchers { display: display_of_many(ProgressKind::None, 0), metrics: None, ledger: FitLedger::default() };
+            Watchers { display: display_of_many(ProgressKind::None, 0), metrics: None, ledger: PartLedger::default() };
         let board = Arc::new(Board::new(&[], Vec::new(), watchers, out.clone()).unwrap());
         let options = SupplyOptions {
             fits: Arc::new([]),

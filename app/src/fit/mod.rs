@@ -24,7 +24,7 @@ use lookalike::{
     scene::Capture,
 };
 use lookalike_coordinator::{
-    journal::{self, FitLedger, JOURNAL_FILE, JournalOptions},
+    journal::{self, JOURNAL_FILE, JournalOptions, PartLedger},
     metrics::Metrics,
 };
 use serde_json::Value;
@@ -115,14 +115,14 @@ fn run_shown(
         return Ok(None);
     }
     let mut clock = Clock::start();
+    let best = planner.best();
     let mut options = runner_options(&job.cluster, &job.out, job.settings.seed);
     options.journal = Some(JournalOptions {
         path: job.out.file(JOURNAL_FILE),
         identity,
         resume: job.resume,
-        survivors: job.is_resumable,
-        best: Some(planner.best()),
-        fits: FitLedger::default(),
+        score: Some(Arc::new(move || best.get())),
+        parts: PartLedger::default(),
     });
     let (planner, summary) = run_to_end(options, planner, metrics, |event| {
         clock.note(event);

@@ -3,7 +3,7 @@
 use super::{Display, Ending, print_line, remark, stage::Tally};
 use crate::progress::stage::Stage;
 use lookalike::fit::BestScore;
-use lookalike_coordinator::comm::RunEvent;
+use lookalike_coordinator::events::RunEvent;
 use std::{sync::Arc, time::Instant};
 
 pub(super) struct Lines {

@@ -1,7 +1,7 @@
 //! The stages of a fit as a user sees them, counted from the events of its nodes.
 
 use lookalike::graph::{NodeId, split_label};
-use lookalike_coordinator::comm::{NodeName, RunEvent};
+use lookalike_coordinator::events::{NodeName, RunEvent};
 use std::collections::BTreeMap;
 
 /// One line of the display.

@@ -1,6 +1,6 @@
 //! Seconds per stage and per process, for people: nothing of it reaches a result.
 
-use lookalike_coordinator::comm::RunEvent;
+use lookalike_coordinator::events::RunEvent;
 use nix::sys::{
     resource::{Usage, UsageWho, getrusage},
     time::TimeVal,

@@ -4,10 +4,10 @@ use crate::{exit::Exit, outputs::OutFolder, settings::ClusterSettings};
 use anyhow::Context;
 use lookalike::{graph::Planner, nodes};
 use lookalike_coordinator::{
-    comm::RunEvent,
-    core::RunSummary,
+    events::RunEvent,
     metrics::Metrics,
     runner::{self, RunnerOptions},
+    state::RunSummary,
 };
 use std::sync::Arc;
 

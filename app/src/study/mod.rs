@@ -41,8 +41,8 @@ use lookalike::{
     plan::encode_light,
 };
 use lookalike_coordinator::{
-    comm::RunEvent,
-    journal::{self, Finished, FitLedger, JOURNAL_FILE, JournalOptions, RunIdentity},
+    events::RunEvent,
+    journal::{self, Finished, JOURNAL_FILE, JournalOptions, PartLedger, RunIdentity},
     metrics::Metrics,
 };
 use lookalike_report::measured::{About, StudyData};
@@ -125,9 +125,8 @@ fn run_cells(
         path: inputs.out.file(JOURNAL_FILE),
         identity: identity(inputs)?,
         resume: settings.resume,
-        survivors: true,
-        best: None,
-        fits: FitLedger::default(),
+        score: None,
+        parts: PartLedger::default(),
     });
     let mut workers = 0;
     let run = run_to_end(options, Many::new(supply), metrics, |event| {
@@ -158,7 +157,7 @@ fn end(out: &OutFolder, failed: usize) -> anyhow::Result<()> {
     let path = out.file(JOURNAL_FILE);
     if failed > 0 {
         let ended = format!("{failed} cells of the study failed");
-        return journal::settle(&path, &FitLedger::default(), Some(&ended)).map_err(journal_failed);
+        return journal::settle(&path, &PartLedger::default(), Some(&ended)).map_err(journal_failed);
     }
     let names = ["results.md", "results.json", "report.html"];
     let outputs = names.into_iter().filter_map(|name| Some((name.to_owned(), out.hash(name).transpose()?)));

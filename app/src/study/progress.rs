@@ -5,7 +5,7 @@ use crate::{
     settings::ProgressKind,
 };
 use indicatif::{ProgressBar, ProgressStyle};
-use lookalike_coordinator::comm::RunEvent;
+use lookalike_coordinator::events::RunEvent;
 use std::{
     io::{self, IsTerminal},
     time::{Duration, Instant},

@@ -13,6 +13,7 @@ use subtle::ConstantTimeEq;
 use thiserror::Error;
 
 use super::certificate::CertificatePin;
+use super::hex::{from_hex, to_hex};
 
 /// The secret of a run: 32 random bytes. Compared in constant time, never printed.
 #[derive(Clone)]
@@ -127,22 +128,4 @@ impl Access {
 /// Kind and place of an error, without serde's quotation of the text, which might be the secret.
 fn without_values(error: &serde_json::Error) -> String {
     format!("{:?} error in line {}, column {}", error.classify(), error.line(), error.column()).to_lowercase()
-}
-
-/// 32 bytes of 64 hexadecimal digits.
-pub(super) fn from_hex(digits: &str) -> Option<[u8; 32]> {
-    let mut bytes = [0; 32];
-    let pairs = digits.as_bytes().chunks_exact(2);
-    if digits.len() != 64 {
-        return None;
-    }
-    for (byte, pair) in bytes.iter_mut().zip(pairs) {
-        let [high, low] = [pair[0], pair[1]].map(|digit| char::from(digit).to_digit(16));
-        *byte = u8::try_from(high? * 16 + low?).ok()?;
-    }
-    Some(bytes)
-}
-
-pub(super) fn to_hex(bytes: &[u8]) -> String {
-    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }

@@ -4,7 +4,7 @@ use std::fmt;
 
 use subtle::ConstantTimeEq;
 
-use super::access::{from_hex, to_hex};
+use super::hex::{from_hex, to_hex};
 
 /// Identifies a certificate: the BLAKE3 hash of its DER form. As text, `blake3:` and 64 hexadecimal digits.
 ///

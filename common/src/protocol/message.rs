@@ -46,7 +46,7 @@ pub struct Hello {
 pub struct Welcome {
     /// The number of this connection in this run, for display.
     pub worker: u64,
-    /// The run. A worker that knew another one forgets its work.
+    /// The run. A worker that comes from another run, or from an earlier epoch of this one, drops its work.
     pub run: RunName,
     /// See [`LeaseName::epoch`].
     pub epoch: u64,

@@ -16,6 +16,7 @@ mod certificate;
 mod codec;
 mod frame;
 mod handshake;
+mod hex;
 mod message;
 mod transfer;
 mod version;

@@ -41,7 +41,7 @@ fn remove(path: &Path) {
     let _ = fs::remove_file(path);
 }
 
-/// A name beside `path` that nobody else uses.
+/// A name beside `path` that no other process uses.
 fn draft_path(path: &Path) -> io::Result<PathBuf> {
     let mut salt = [0; 8];
     getrandom::fill(&mut salt).map_err(io::Error::other)?;
