@@ -34,7 +34,7 @@ pub use circle::Circle;
 pub use cluster::{Advertise, ClusterSettings, Workers};
 pub use compare::CompareSettings;
 pub use demo::DemoSettings;
-pub use exposure::{Anchor, DisplayExposure, GainKind};
+pub use exposure::DisplayExposure;
 pub use fit::{FitSettings, MethodSettings};
 pub use gammas::Gammas;
 pub use integrator::Integrator;

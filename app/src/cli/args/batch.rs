@@ -102,7 +102,6 @@ impl EntryArgs {
 
     /// The settings of the fit `name`, which a line of the manifest asks for.
     pub(crate) fn into_settings(self, name: String, line: usize) -> anyhow::Result<BatchFit> {
-        self.photo.check_gain()?;
         self.sphere.check(&self.view)?;
         Ok(BatchFit {
             name,

@@ -59,7 +59,6 @@ pub(crate) struct DiagnosticsArgs {
 
 impl FitArgs {
     pub(crate) fn into_settings(self) -> anyhow::Result<FitSettings> {
-        self.photo.check_gain()?;
         self.sphere.check(&self.view)?;
         Ok(FitSettings {
             photo: self.photo.photo,

@@ -1,14 +1,12 @@
 //! The grammar of the command line, as clap definitions. Each command turns itself into its settings.
 //!
-//! Help texts are part of the contract: one sentence of purpose, units, defaults, and an example in `--help`. What a
-//! version does not have yet stays in the grammar and answers with [`NotThereYet`](crate::exit::NotThereYet), so that nothing is ignored silently.
+//! Help texts are part of the contract: one sentence of purpose, units, defaults, and an example in `--help`.
 
 mod access;
 mod batch;
 mod cluster;
 mod compare;
 mod fit;
-mod later;
 mod method;
 mod policy;
 mod render;
@@ -51,14 +49,8 @@ pub(crate) enum Command {
     Render(render::RenderArgs),
     /// Measure how different two images look
     Compare(compare::CompareArgs),
-    /// Tell what is wrong with the inputs before a fit (not there yet)
-    Check(Box<later::CheckArgs>),
-    /// Write the fitted material in another program's format (not there yet)
-    Export(later::ExportArgs),
     /// Rebuild the paper's tables and figures on measured materials, beside rival methods
     Study(Box<study::StudyArgs>),
-    /// Rebuild the report page of a run (not there yet)
-    Report(later::ReportArgs),
     /// Make an access file before the run it is for
     Access(access::AccessArgs),
     /// Compute for a coordinator: the same as lookalike-worker

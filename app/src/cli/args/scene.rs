@@ -1,8 +1,7 @@
 //! Flags of the scene: light, camera and shape, the object in the photo.
 
 use super::finite;
-use crate::exit::NotThereYet;
-use crate::settings::{Anchor, CameraSpec, Circle, EnvMapping, EnvironmentSettings, GainKind, ViewSettings};
+use crate::settings::{CameraSpec, Circle, EnvMapping, EnvironmentSettings, ViewSettings};
 use anyhow::bail;
 use clap::Args;
 use std::path::PathBuf;
@@ -16,31 +15,6 @@ pub(crate) struct PhotoArgs {
     /// Image that is white where the photo shows the object [default: what the silhouette covers]
     #[arg(long, value_name = "FILE")]
     pub(crate) mask: Option<PathBuf>,
-    /// Fit a gain between photo and map: scalar and rgb need an anchor (not there yet)
-    #[arg(long, value_name = "GAIN", value_enum, default_value_t)]
-    exposure_gain: GainKind,
-    /// What pins the gain down: f0=VALUE, albedo<=1 or a photo of a grey ball (not there yet)
-    #[arg(long, value_name = "ANCHOR")]
-    anchor: Option<Anchor>,
-}
-
-impl PhotoArgs {
-    /// Refuses the gains that this version does not fit.
-    pub(crate) fn check_gain(&self) -> anyhow::Result<()> {
-        match (self.exposure_gain, &self.anchor) {
-            (GainKind::None, None) => Ok(()),
-            (GainKind::None, Some(_)) => bail!("--anchor pins a gain down; give --exposure-gain scalar or rgb with it"),
-            (_, None) => bail!(
-                "a gain between photo and map is degenerate with the colours of the material, which can be scaled by \
-                 its inverse; say what is known with --anchor f0=VALUE, --anchor 'albedo<=1' or --anchor FILE"
-            ),
-            (_, Some(_)) => Err(NotThereYet {
-                what: "--exposure-gain with --anchor",
-                instead: "bring photo and map to one exposure beforehand and use --exposure-gain none",
-            }
-            .into()),
-        }
-    }
 }
 
 #[derive(Debug, Args)]
