@@ -95,7 +95,7 @@ fn bad_usage_is_code_two_and_says_what_is_possible() {
         (format!("{fit} --gammas 3:1:0.1"), &["--gammas", "the last gamma must lie between"]),
         (format!("{fit} --samples 0"), &["--samples", "whole number above 0, or full"]),
         (format!("{fit} --sphere 1,2"), &["--sphere", "CX,CY,R"]),
-        (format!("{fit} --camera perspective:200"), &["--camera", "0 and 180 degrees"]),
+        (format!("{fit} --camera perspective:200"), &["--camera", "between 0.1 and 170 degrees"]),
         (format!("{fit} --grace soon"), &["--grace", "expected number"]),
         (format!("{fit} --listen localhost"), &["--listen", "invalid socket address"]),
         (

@@ -4,7 +4,7 @@ use super::{
     cluster::ClusterArgs,
     fit::{DiagnosticsArgs, score},
     method::MethodArgs,
-    scene::{EnvironmentArgs, PhotoArgs, SphereArgs, ViewArgs},
+    scene::CaptureArgs,
 };
 use crate::settings::{BatchFit, BatchSettings, JobSettings, OnFailure, Preset, StageTwo};
 use clap::{Args, Parser};
@@ -81,13 +81,7 @@ impl BatchArgs {
 #[command(name = "fit", no_binary_name = true, args_override_self = true, disable_help_flag = true)]
 pub(crate) struct EntryArgs {
     #[command(flatten)]
-    photo: PhotoArgs,
-    #[command(flatten)]
-    environment: EnvironmentArgs,
-    #[command(flatten)]
-    view: ViewArgs,
-    #[command(flatten)]
-    sphere: SphereArgs,
+    capture: CaptureArgs,
     #[command(flatten)]
     method: MethodArgs,
     /// Count the fit as missed if the final CSSIM lies above this
@@ -102,17 +96,12 @@ impl EntryArgs {
 
     /// The settings of the fit `name`, which a line of the manifest asks for.
     pub(crate) fn into_settings(self, name: String, line: usize) -> anyhow::Result<BatchFit> {
-        self.sphere.check(&self.view)?;
         Ok(BatchFit {
             name,
             line,
-            photo: self.photo.photo,
-            mask: self.photo.mask,
-            environment: self.environment.into_settings(),
-            view: self.view.into_settings(),
-            sphere: self.sphere.sphere,
+            capture: self.capture.into_settings()?,
             display_exposure: self.method.display_exposure.clone(),
-            method: self.method.into_settings(),
+            method: self.method.into_method()?,
             max_cssim: self.max_cssim,
         })
     }

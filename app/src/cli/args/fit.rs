@@ -1,10 +1,6 @@
 //! `lookalike fit`.
 
-use super::{
-    cluster::ClusterArgs,
-    method::MethodArgs,
-    scene::{EnvironmentArgs, PhotoArgs, SphereArgs, ViewArgs},
-};
+use super::{cluster::ClusterArgs, method::MethodArgs, scene::CaptureArgs};
 use crate::settings::{FitSettings, MetricsAddress, ProgressKind};
 use anyhow::bail;
 use clap::Args;
@@ -14,13 +10,7 @@ use std::path::PathBuf;
 #[command(args_override_self = true, after_long_help = EXAMPLES)]
 pub(crate) struct FitArgs {
     #[command(flatten)]
-    photo: PhotoArgs,
-    #[command(flatten)]
-    environment: EnvironmentArgs,
-    #[command(flatten)]
-    view: ViewArgs,
-    #[command(flatten)]
-    sphere: SphereArgs,
+    capture: CaptureArgs,
     #[command(flatten)]
     pub(crate) method: MethodArgs,
     #[command(flatten)]
@@ -59,15 +49,10 @@ pub(crate) struct DiagnosticsArgs {
 
 impl FitArgs {
     pub(crate) fn into_settings(self) -> anyhow::Result<FitSettings> {
-        self.sphere.check(&self.view)?;
         Ok(FitSettings {
-            photo: self.photo.photo,
-            mask: self.photo.mask,
-            environment: self.environment.into_settings(),
-            view: self.view.into_settings(),
-            sphere: self.sphere.sphere,
+            capture: self.capture.into_settings()?,
             display_exposure: self.method.display_exposure.clone(),
-            method: self.method.into_settings(),
+            method: self.method.into_method()?,
             max_cssim: self.output.max_cssim,
             out: self.output.out,
             resume: self.output.resume,

@@ -1,11 +1,14 @@
 //! Flags of the method.
 
-use super::super::preset;
-use crate::settings::{
-    DisplayExposure, Gammas, Integrator, Judge, MethodSettings, ModelName, Preset, Samples, Sampling, SearchKind,
-};
+use super::{super::preset, choice::choice};
+use crate::settings::{DisplayExposure, ModelName, Preset};
 use clap::{Args, ValueEnum};
-use std::num::NonZeroUsize;
+use lookalike::{
+    brdf,
+    fit::{Gammas, Integration, JudgedBy, Method, SearchKind},
+    render::subset::{SampleCount, Sampling},
+};
+use std::num::NonZeroU32;
 
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Method")]
@@ -22,26 +25,26 @@ pub(crate) struct MethodArgs {
     gammas: Gammas,
     /// Pixels that the searches look at: a number of draws, or full
     #[arg(long, value_name = "N|full", default_value_t, allow_negative_numbers = true)]
-    samples: Samples,
+    samples: SampleCount,
     /// How these pixels are drawn
-    #[arg(long, value_name = "SAMPLING", value_enum, default_value_t)]
+    #[arg(long, value_name = "SAMPLING", value_parser = choice::<Sampling>(), default_value_t)]
     sampling: Sampling,
     /// Independent subsets of pixels to search; more candidates for proportionally more time
     #[arg(long, value_name = "K", default_value = "1", allow_negative_numbers = true)]
-    subsets: NonZeroUsize,
+    subsets: NonZeroU32,
     /// How the cost is minimised
-    #[arg(long, value_name = "SEARCH", value_enum, default_value_t)]
+    #[arg(long, value_name = "SEARCH", value_parser = choice::<SearchKind>(), default_value_t)]
     search: SearchKind,
     /// How the searches render their pixels: by transport tables, or direct[:SAMPLES], by Monte Carlo integration in every
     /// evaluation as in the paper, which takes thousands of times longer and needs --search pattern
     #[arg(long, value_name = "INTEGRATOR", default_value_t)]
-    integrator: Integrator,
+    integrator: Integration,
     /// Whether the winner is refined on the metric itself; its result is reported apart
     #[arg(long, value_name = "on|off", value_enum, default_value_t = Switch::On)]
     polish: Switch,
     /// Which CSSIM selects and polishes
-    #[arg(long, value_name = "JUDGE", value_enum, default_value_t)]
-    judge: Judge,
+    #[arg(long, value_name = "JUDGE", value_parser = choice::<JudgedBy>(), default_value_t)]
+    judge: JudgedBy,
     /// Exposure before the metric: auto (97th percentile of the object's largest channel to 0.9), a factor, or from:FILE
     #[arg(long, value_name = "E", default_value = "auto", allow_negative_numbers = true)]
     pub(crate) display_exposure: DisplayExposure,
@@ -51,22 +54,21 @@ pub(crate) struct MethodArgs {
 }
 
 impl MethodArgs {
-    pub(crate) fn into_settings(self) -> MethodSettings {
-        MethodSettings {
-            preset: self.preset,
-            model: self.model,
-            gammas: self.gammas,
+    pub(crate) fn into_method(self) -> anyhow::Result<Method> {
+        Ok(Method {
+            model: brdf::model(self.model.as_str())?,
+            gammas: self.gammas.values(),
             samples: self.samples,
             sampling: self.sampling,
-            subsets: self.subsets,
+            subsets: self.subsets.get(),
             search: self.search,
-            integrator: self.integrator,
+            integration: self.integrator,
             start: preset::start(self.preset),
-            compress_at_zero: preset::compress_at_zero(self.preset),
+            compress: preset::compress(self.preset),
             polish: matches!(self.polish, Switch::On),
             judge: self.judge,
             seed: self.seed,
-        }
+        })
     }
 }
 

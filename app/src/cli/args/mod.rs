@@ -4,6 +4,7 @@
 
 mod access;
 mod batch;
+mod choice;
 mod cluster;
 mod compare;
 mod fit;

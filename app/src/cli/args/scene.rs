@@ -1,20 +1,53 @@
 //! Flags of the scene: light, camera and shape, the object in the photo.
 
-use super::finite;
-use crate::settings::{CameraSpec, Circle, EnvMapping, EnvironmentSettings, ViewSettings};
+use super::{choice::choice, finite};
+use crate::settings::{CaptureSettings, EnvironmentSettings, ViewSettings};
 use anyhow::bail;
 use clap::Args;
+use lookalike::{
+    light::Mapping,
+    scene::{Camera, Circle},
+};
 use std::path::PathBuf;
+
+/// A photo with its scene.
+#[derive(Debug, Args)]
+pub(crate) struct CaptureArgs {
+    #[command(flatten)]
+    photo: PhotoArgs,
+    #[command(flatten)]
+    environment: EnvironmentArgs,
+    #[command(flatten)]
+    view: ViewArgs,
+    #[command(flatten)]
+    sphere: SphereArgs,
+}
+
+impl CaptureArgs {
+    pub(crate) fn into_settings(self) -> anyhow::Result<CaptureSettings> {
+        let sphere = self.sphere.sphere;
+        if sphere.is_some() && self.view.normals.is_some() {
+            bail!("--sphere places the built-in sphere, --normals replaces it; give one of them");
+        }
+        Ok(CaptureSettings {
+            photo: self.photo.photo,
+            mask: self.photo.mask,
+            environment: self.environment.into_settings(),
+            view: self.view.into_settings(),
+            sphere,
+        })
+    }
+}
 
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Input")]
-pub(crate) struct PhotoArgs {
+struct PhotoArgs {
     /// Photo of the object (.exr, .hdr, .png, .jpg), or a TOML file of settings
     #[arg(value_name = "PHOTO", help_heading = None)]
-    pub(crate) photo: PathBuf,
+    photo: PathBuf,
     /// Image that is white where the photo shows the object [default: what the silhouette covers]
     #[arg(long, value_name = "FILE")]
-    pub(crate) mask: Option<PathBuf>,
+    mask: Option<PathBuf>,
 }
 
 #[derive(Debug, Args)]
@@ -24,8 +57,8 @@ pub(crate) struct EnvironmentArgs {
     #[arg(long, value_name = "MAP")]
     env: PathBuf,
     /// Layout of the map [default: latlong if it is 2:1, cross if it is 3:4]
-    #[arg(long, value_name = "MAPPING", value_enum)]
-    env_mapping: Option<EnvMapping>,
+    #[arg(long, value_name = "MAPPING", value_parser = choice::<Mapping>())]
+    env_mapping: Option<Mapping>,
     /// Turn the map about +Y, in degrees
     #[arg(long, value_name = "DEG", default_value = "0", value_parser = finite, allow_negative_numbers = true)]
     env_rotation: f64,
@@ -42,7 +75,7 @@ impl EnvironmentArgs {
 pub(crate) struct ViewArgs {
     /// Projection: orthographic, or perspective:FOV_DEG with the vertical field of view in degrees
     #[arg(long, value_name = "CAMERA", default_value_t)]
-    camera: CameraSpec,
+    camera: Camera,
     /// World-space unit normals (.exr) of a shape other than the built-in sphere; length 0 is background
     #[arg(long, value_name = "FILE")]
     normals: Option<PathBuf>,
@@ -56,19 +89,9 @@ impl ViewArgs {
 
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Geometry")]
-pub(crate) struct SphereArgs {
+struct SphereArgs {
     /// Centre and radius of the sphere in the photo, in pixels from its top left corner [default: fitted to the mask,
     /// else the inscribed circle]
     #[arg(long, value_name = "CX,CY,R", allow_hyphen_values = true)]
-    pub(crate) sphere: Option<Circle>,
-}
-
-impl SphereArgs {
-    /// Refuses a sphere beside a map of normals.
-    pub(crate) fn check(&self, view: &ViewArgs) -> anyhow::Result<()> {
-        if self.sphere.is_some() && view.normals.is_some() {
-            bail!("--sphere places the built-in sphere, --normals replaces it; give one of them");
-        }
-        Ok(())
-    }
+    sphere: Option<Circle>,
 }

@@ -294,7 +294,8 @@ impl<'a> Reader<'a> {
         fit.name = match draft.name {
             Some(name) => name,
             None => {
-                names::of_inputs(draft.prefix.as_deref(), &fit.photo, &fit.environment.path, fit.method.model.as_str())
+                let (photo, light) = (&fit.capture.photo, &fit.capture.environment.path);
+                names::of_inputs(draft.prefix.as_deref(), photo, light, fit.method.model.name())
             }
         };
         names::check(&fit.name, names::MADE)?;

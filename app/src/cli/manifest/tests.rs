@@ -1,7 +1,7 @@
 //! Manifests and what they ask for; every kind of mistake, with its line.
 
 use super::*;
-use crate::settings::SearchKind;
+use lookalike::fit::SearchKind;
 use std::path::PathBuf;
 use tempfile::TempDir;
 
@@ -46,9 +46,9 @@ fn product_is_every_photo_under_every_light_with_every_model() {
         "b-n-cook-torrance",
     ];
     assert_eq!(names(&fits), expected);
-    assert_eq!(fits[7].photo, folder.path().join("in/b.exr"));
-    assert_eq!(fits[7].environment.path, folder.path().join("n.hdr"));
-    assert_eq!((fits[7].method.model.as_str(), fits[7].line), ("cook-torrance", 1));
+    assert_eq!(fits[7].capture.photo, folder.path().join("in/b.exr"));
+    assert_eq!(fits[7].capture.environment.path, folder.path().join("n.hdr"));
+    assert_eq!((fits[7].method.model.name(), fits[7].line), ("cook-torrance", 1));
 }
 
 #[test]
@@ -70,10 +70,10 @@ fn later_settings_win_defaults_then_set_or_fit_then_the_command_line() {
     assert_eq!(names(&fits), ["a-m-ggx", "other"]);
     assert_eq!((fits[0].method.seed, fits[1].method.seed), (2, 3));
     assert_eq!((fits[0].method.samples, fits[1].method.samples), (fits[0].method.samples, "64".parse().unwrap()));
-    assert_eq!((fits[0].environment.rotation_deg, fits[1].environment.rotation_deg), (10.0, 10.0));
-    assert_eq!((fits[0].mask.clone(), fits[1].mask.clone()), (Some(folder.path().join("mask.png")), None));
+    assert_eq!([0, 1].map(|i: usize| fits[i].capture.environment.rotation_deg), [10.0, 10.0]);
+    assert_eq!([0, 1].map(|i: usize| fits[i].capture.mask.clone()), [Some(folder.path().join("mask.png")), None]);
     assert_eq!((fits[0].max_cssim, fits[1].max_cssim), (None, Some(0.1)));
-    assert_eq!(fits[1].sphere.unwrap().to_string(), "1,2,3");
+    assert_eq!(fits[1].capture.sphere.unwrap().to_string(), "1,2,3");
     assert_eq!((fits[0].line, fits[1].line), (6, 10));
     let fits = of(&["--seed=9", "--model=cook-torrance"]);
     assert_eq!(names(&fits), ["a-m-cook-torrance", "other"]);
