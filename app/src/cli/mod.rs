@@ -65,7 +65,7 @@ fn start_tracing(filter: &str) -> anyhow::Result<()> {
         .with_env_filter(EnvFilter::try_new(filter).context("--log")?)
         .with_writer(io::stderr)
         .with_ansi(io::stderr().is_terminal())
-        // A worker may outlive whoever reads its stderr, and must not die of that.
+        // A worker may outlive the reader of its stderr: a write to the closed pipe must not end it.
         .log_internal_errors(false)
         .try_init()
         .map_err(anyhow::Error::from_boxed)

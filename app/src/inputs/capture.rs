@@ -1,4 +1,4 @@
-//! Everything a fit knows about its photo.
+//! The photo of a fit with its mask, shape and light.
 
 use super::{
     InputFile, LoadedEnvironment, LoadedGeometry, LoadedMask, LoadedPhoto, file::cannot_use, load_environment,
@@ -85,7 +85,7 @@ pub fn load_capture_under(
     let (mask_source, mask) = mask.map(|loaded| (loaded.source, loaded.mask)).unzip();
     let input = CaptureInput { photo: image, clipped, mask, geometry: shape.geometry, environment };
     let capture = Capture::new(input).with_context(|| cannot_use(&files.photo, "photo"))?;
-    // Those of the normal map are there already, with its name.
+    // The warnings of the normal map are in the list already, with its name.
     let of_normals = capture.geometry().normal_map().map_or(&[][..], |map| map.warnings());
     warnings.extend(capture.warnings().iter().filter(|text| !of_normals.contains(text)).cloned());
     Ok(LoadedCapture {

@@ -13,7 +13,7 @@ pub struct BatchSettings {
     pub fits: Vec<BatchFit>,
     /// The folder of results.
     pub out: PathBuf,
-    /// Go on with the run that is in the folder, if there is one.
+    /// Resume the run in the folder, if there is one.
     pub resume: bool,
     /// Where candidates are judged and polished.
     pub stage_two: StageTwo,
@@ -21,7 +21,7 @@ pub struct BatchSettings {
     pub on_failure: OnFailure,
     /// Where metrics are served.
     pub metrics: Option<MetricsAddress>,
-    /// Who computes.
+    /// Where workers come from.
     pub cluster: ClusterSettings,
     /// How progress is shown.
     pub progress: ProgressKind,
@@ -56,19 +56,19 @@ pub struct BatchFit {
 /// Where what follows the searches of a fit runs: judging its candidates, polish, pictures.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, clap::ValueEnum)]
 pub enum StageTwo {
-    /// In the coordinator's own process
+    /// In the coordinator's process
     #[default]
     Coordinator,
-    /// On workers, each fit on one at a time
+    /// On workers, each fit on one of them at a time
     Workers,
 }
 
 /// What a batch does when one of its fits fails.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum OnFailure {
-    /// It goes on with the others.
+    /// The others continue.
     #[default]
     KeepGoing,
-    /// It ends.
+    /// The batch stops.
     FailFast,
 }

@@ -5,29 +5,29 @@ use clap::ValueEnum;
 /// A colour-image-difference metric.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
 pub enum MetricKind {
-    /// CSSIM, single scale, five features
+    /// CSSIM, single scale, five features, as in the paper
     #[default]
     Cssim,
-    /// iCID
+    /// iCID (Preiss et al. 2014), a later metric of CSSIM's authors
     Icid,
 }
 
 /// A named bundle of settings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Preset {
-    /// The method of the paper, to the letter
+    /// The paper's 256 samples, pattern search, 21 gammas and no polish; the paper names no model, start or bounds: they are ours
     Paper,
 }
 
 /// How progress is shown, on stderr.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
 pub enum ProgressKind {
-    /// Bars on a terminal, a line per stage elsewhere
+    /// Bars on a terminal, one line per stage elsewhere
     #[default]
     Auto,
-    /// A bar
+    /// Bars, whatever stderr is
     Bar,
-    /// One JSON object a line
+    /// One JSON object per line; docs/progress.md describes them
     Json,
     /// Nothing
     None,

@@ -17,9 +17,9 @@ pub struct FitSettings {
     pub max_cssim: Option<f64>,
     /// The folder of results.
     pub out: PathBuf,
-    /// Go on with the run that is in the folder, if there is one.
+    /// Resume the run in the folder, if there is one.
     pub resume: bool,
-    /// Who computes.
+    /// Where workers come from.
     pub cluster: ClusterSettings,
     /// How progress is shown.
     pub progress: ProgressKind,

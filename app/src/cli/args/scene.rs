@@ -1,6 +1,6 @@
 //! Flags of the scene: light, camera and shape, the object in the photo.
 
-use super::{choice::choice, finite};
+use super::choice::choice;
 use crate::settings::{CaptureSettings, EnvironmentSettings, ViewSettings};
 use anyhow::bail;
 use clap::Args;
@@ -45,7 +45,7 @@ struct PhotoArgs {
     /// Photo of the object (.exr, .hdr, .png, .jpg), or a TOML file of settings
     #[arg(value_name = "PHOTO", help_heading = None)]
     photo: PathBuf,
-    /// Image that is white where the photo shows the object [default: what the silhouette covers]
+    /// Image that is white where the photo shows the object [default: all of the silhouette]
     #[arg(long, value_name = "FILE")]
     mask: Option<PathBuf>,
 }
@@ -53,13 +53,13 @@ struct PhotoArgs {
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Input")]
 pub(crate) struct EnvironmentArgs {
-    /// Environment map of the light (.exr, .hdr), linear Rec. 709
+    /// Environment map of the light, linear Rec. 709 (.exr, .hdr, .pfm)
     #[arg(long, value_name = "MAP")]
     env: PathBuf,
-    /// Layout of the map [default: latlong if it is 2:1, cross if it is 3:4]
+    /// Layout of the map; needed unless it is 2:1 or 3:4 [default: latlong if it is 2:1, cross if it is 3:4]
     #[arg(long, value_name = "MAPPING", value_parser = choice::<Mapping>())]
     env_mapping: Option<Mapping>,
-    /// Turn the map about +Y, in degrees
+    /// Turn the map about +Y, in degrees; 90 brings the light at +Z to +X
     #[arg(long, value_name = "DEG", default_value = "0", value_parser = finite, allow_negative_numbers = true)]
     env_rotation: f64,
 }
@@ -73,10 +73,11 @@ impl EnvironmentArgs {
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Geometry")]
 pub(crate) struct ViewArgs {
-    /// Projection: orthographic, or perspective:FOV_DEG with the vertical field of view in degrees
+    /// Projection: orthographic, or perspective:FOV_DEG with the vertical field of view of the whole photo in degrees, for
+    /// example perspective:30
     #[arg(long, value_name = "CAMERA", default_value_t)]
     camera: Camera,
-    /// World-space unit normals (.exr) of a shape other than the built-in sphere; length 0 is background
+    /// World-space unit normals (.exr) of a shape other than the built-in sphere; length 0 marks the background
     #[arg(long, value_name = "FILE")]
     normals: Option<PathBuf>,
 }
@@ -90,8 +91,16 @@ impl ViewArgs {
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Geometry")]
 struct SphereArgs {
-    /// Centre and radius of the sphere in the photo, in pixels from its top left corner [default: fitted to the mask,
-    /// else the inscribed circle]
+    /// Centre and radius of the sphere in the photo, in pixels from the top left corner, for example 128,128,100
+    /// [default: fitted to the mask, else the largest circle in the photo]
     #[arg(long, value_name = "CX,CY,R", allow_hyphen_values = true)]
     sphere: Option<Circle>,
+}
+
+/// Accepts a finite number.
+fn finite(text: &str) -> anyhow::Result<f64> {
+    match text.parse::<f64>() {
+        Ok(number) if number.is_finite() => Ok(number),
+        _ => bail!("expected a finite number"),
+    }
 }

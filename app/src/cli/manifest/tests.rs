@@ -108,11 +108,11 @@ fn mistakes_are_told_by_line_and_key() {
         ("", "batch.toml: it lists no fit"),
         ("photos = ", "batch.toml:1: "),
         ("\nfotos = 'a.exr'", "batch.toml:2: unknown field `fotos`, expected one of `photos`"),
-        ("environments = 'm.hdr'", "batch.toml:1: \"environments\" at the top is for photos at the top"),
+        ("environments = 'm.hdr'", "batch.toml:1: \"environments\" at the top needs \"photos\" at the top"),
         (
             "models = ['ggx']\n[[set]]\nphotos = 'a.exr'\nenv = 'm.hdr'",
-            "batch.toml:1: \"models\" at the top is for photos at the top, and there are no photos there; give them, or move it into \
-             each [[set]], or one of it into [defaults] as \"model\"",
+            "batch.toml:1: \"models\" at the top needs \"photos\" at the top; add them, move \"models\" into each [[set]], or give one \
+             of them in [defaults] as \"model\"",
         ),
         ("[[set]]\nmodels = 'ggx'", "batch.toml:1: there are no photos"),
         ("photos = []\nenvironments = 'm.hdr'", "batch.toml:1: \"photos\" is an empty list"),
@@ -131,7 +131,7 @@ fn mistakes_are_told_by_line_and_key() {
             "[defaults]\nsampels = 3\n[[fit]]\nphoto = 'a.exr'\nenv = 'm.hdr'",
             "batch.toml:2: unknown key \"sampels\"; the nearest one is \"samples\"",
         ),
-        ("[defaults]\nphoto = 'a.exr'", "batch.toml:2: [defaults] holds settings of all fits"),
+        ("[defaults]\nphoto = 'a.exr'", "batch.toml:2: a photo belongs to one fit: move it from [defaults]"),
         ("[defaults]\nworkers = 3", "batch.toml:2: \"workers\" is a setting of the whole batch: give it as --workers"),
         ("[[fit]]\nphoto = 'a.exr'\nenv = 'm.hdr'\nout = 'x'", "batch.toml:4: \"out\" is a setting of the whole batch"),
         ("[[fit]]\nenv = 'm.hdr'", "batch.toml:1: this fit has no photo"),
@@ -142,7 +142,7 @@ fn mistakes_are_told_by_line_and_key() {
         ),
         (
             "[[fit]]\nphoto = 'a.exr'\nenv = 'm.hdr'\nname = 'a/b'",
-            "batch.toml:4: the name \"a/b\" would not do for a folder",
+            "batch.toml:4: the name \"a/b\" is not a valid folder name on every system",
         ),
         ("[[fit]]\nphoto = 'a.exr'\nenv = 'm.hdr'\nname = 3", "batch.toml:4: \"name\" must be text"),
         (
