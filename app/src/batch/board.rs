@@ -143,9 +143,9 @@ impl Board {
             let (scores, seconds) = complete.unzip();
             Ok::<_, brdf::ParameterError>(Row {
                 name: fit.name.clone(),
-                photo: fit.photo.to_string_lossy().into_owned(),
-                env: fit.environment.path.to_string_lossy().into_owned(),
-                model: brdf::model(fit.method.model.as_str())?,
+                photo: fit.capture.photo.to_string_lossy().into_owned(),
+                env: fit.capture.environment.path.to_string_lossy().into_owned(),
+                model: fit.method.model,
                 state: scores.map_or(State::Waiting, State::Done),
                 seconds,
             })

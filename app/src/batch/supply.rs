@@ -92,8 +92,7 @@ impl Supply {
         let pixels = prepared.pixels();
         let Prepared { capture, method, exposure, inputs, planner, seconds, .. } = prepared;
         self.options.board.started(number, planner.best(), seconds);
-        let settings = fit.method.clone();
-        let inputs = Inputs { capture, settings, method, exposure, inputs, max_cssim: fit.max_cssim };
+        let inputs = Inputs { capture, method, exposure, inputs, max_cssim: fit.max_cssim };
         self.active.insert(number, Active { inputs, pixels });
         Ok(Some(Part { number, name: fit.name.clone(), planner, stays: false }))
     }

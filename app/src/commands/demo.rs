@@ -4,10 +4,11 @@ use crate::{
     demo::{environment, material, photo},
     fit::{self, FitJob},
     outputs::{OutFolder, Panel, Pictures, print_result, strip},
-    settings::{ClusterSettings, DemoSettings, MethodSettings},
+    settings::{ClusterSettings, DemoSettings},
 };
 use anyhow::Context;
 use lookalike::{
+    fit::Method,
     image::{Image, content_hash, openexr, png},
     light::Environment,
     metric::auto_exposure,
@@ -41,7 +42,7 @@ pub(crate) fn run(settings: DemoSettings) -> anyhow::Result<ExitCode> {
     let out_name = settings.out.display().to_string();
     let job = FitJob {
         capture: Arc::clone(&capture),
-        settings: MethodSettings::default(),
+        method: Method::default(),
         exposure,
         inputs,
         cluster: ClusterSettings { workers: settings.workers, log: settings.log, ..ClusterSettings::default() },

@@ -12,14 +12,14 @@ pub(crate) fn run(settings: FitSettings) -> anyhow::Result<ExitCode> {
     let began = Instant::now();
     // Whatever can fail fails before any work is done.
     let out = OutFolder::create(&settings.out, settings.resume)?;
-    let loaded = load_capture(&(&settings).into())?;
+    let loaded = load_capture(&settings.capture)?;
     show_warnings(&loaded.warnings);
     let coverage = loaded.capture.scoring_coverage();
     let exposure = resolve_display_exposure(&settings.display_exposure, loaded.capture.photo(), &coverage)?;
     let job = FitJob {
         inputs: loaded.to_json(),
         capture: Arc::new(loaded.capture),
-        settings: settings.method,
+        method: settings.method,
         exposure,
         cluster: settings.cluster,
         progress: settings.progress,

@@ -9,7 +9,7 @@ mod strip;
 mod summary;
 
 pub(crate) use conventions::conventions;
-pub(crate) use fit_json::{FitRecord, Timing, name_of, parameters_json};
+pub(crate) use fit_json::{FitRecord, Timing, parameters_json};
 pub(crate) use folder::{FIT_FILES, MARK, OutFolder};
 pub(crate) use pictures::{Pictures, write_pictures};
 pub(crate) use strip::{Panel, strip};

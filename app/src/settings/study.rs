@@ -10,11 +10,11 @@ pub struct StudySettings {
     pub study: PathBuf,
     /// The folder of results.
     pub out: PathBuf,
-    /// Go on with the run that is in the folder, if there is one.
+    /// Resume the run in the folder, if there is one.
     pub resume: bool,
     /// Where metrics are served.
     pub metrics: Option<MetricsAddress>,
-    /// Who computes.
+    /// Where workers come from.
     pub cluster: ClusterSettings,
     /// How progress is shown.
     pub progress: ProgressKind,

@@ -12,6 +12,7 @@ mod brute_force;
 mod candidate;
 mod direct;
 pub(crate) mod explore;
+mod gammas;
 mod method;
 mod objective;
 pub(crate) mod polish;
@@ -24,7 +25,11 @@ pub use best::BestScore;
 pub use brute_force::brute_force;
 pub use candidate::{Candidate, SAME, distinct, needed_span};
 pub use direct::DirectPixels;
-pub use method::{Compress, Integration, JudgedBy, MOST_SEARCHES, Method, MethodError, SearchKind, Start, gamma_range};
+pub use gammas::{Gammas, GammasError};
+pub use method::{
+    Compress, Integration, JudgedBy, MOST_SEARCHES, Method, MethodError, SearchKind, Start, UnknownIntegration,
+    gamma_range,
+};
 pub use objective::Objective;
 pub use polish::{MAX_EVALUATIONS, Polished, polish};
 pub use stage_one::{SearchFailure, search_gamma};
