@@ -10,7 +10,7 @@ the light turned, and with `lookalike render` at every multiple of 10 degrees. T
 the one that the table gives, and the mirrored image must agree far less. `column` checks the rule for a panorama without axes:
 a spot is painted into one column, and the sphere must reflect it from its middle.
 
-Prints one row per case; ends with an error if one disagrees.
+Prints a line per case; ends with an error if one disagrees. About 3 minutes on two cores.
 """
 import argparse
 import math
@@ -27,8 +27,8 @@ SIZE = 128
 HEIGHT = 256
 # Of the axes +X, -X, +Y, -Y, +Z, -Z of the map as lookalike and OpenEXR place them.
 COLOURS = [(1, 0.1, 0.1), (0.1, 1, 1), (1, 1, 1), (0.05, 0.05, 0.05), (0.1, 0.1, 1), (1, 1, 0.1)]
-# An image differs from itself in another renderer by the edges of the regions: 2 to 4 %. A wrong turn of 10 degrees gives 28 % and more.
-AGREES = 0.06
+# Noise and the edges of the regions make 4 to 5.5 % between two renderers; a wrong turn of 10 degrees makes 29 % and more.
+AGREES = 0.1
 
 
 def directions(height):
