@@ -86,49 +86,45 @@ pub trait Lobe: Debug + Sync {
         width
     }
 
-    /// `f cos(theta_i)` in 1/sr, without Fresnel term; zero for light from below the horizon.
-    fn eval(&self, angles: &Angles, width: f64) -> f64;
+    /// `f cos(theta_i)` in 1/sr, without Fresnel term, averaged over the spread of the light to second order; zero for light from below
+    /// the horizon. Mark it `#[inline(always)]`, or the loop over the widths is not vectorised.
+    fn kernel(&self, angles: &Angles, spread: &Spread, width: f64) -> f64;
+
+    /// [`Self::kernel`] of light without spread.
+    fn eval(&self, angles: &Angles, width: f64) -> f64 {
+        self.kernel(angles, &Spread::default(), width)
+    }
 
     /// Adds the lobe's basis integrals over `incident`, for every width.
     ///
     /// `sums` has shape `term x channel x width` and grows by `sum over incident of energy * split_t * lobe(width)`.
     /// `cos_o` is that of all `incident`; it is apart so that the terms that depend on it alone leave the loop.
-    fn accumulate(&self, incident: &[Incident], cos_o: f64, widths: &[f64], sums: &mut [f64]);
+    fn accumulate(&self, incident: &[Incident], cos_o: f64, widths: &[f64], sums: &mut [f64]) {
+        simd::dispatch(Accumulate { lobe: self, incident, cos_o, widths, sums });
+    }
 }
 
 /// Widths handled in one pass; longer lists go through in chunks.
 const LANES: usize = 8;
 
-/// The generic loop behind every [`Lobe::accumulate`]: directions outside, widths inside, so that the widths fill SIMD lanes.
+/// The loop of [`Lobe::accumulate`]: directions outside, widths inside, so that the widths fill SIMD lanes.
 ///
 /// Runs under run-time dispatch. Every operation is a plain IEEE one without contraction and each sum runs over directions in
 /// order, so all SIMD levels give the same bits.
-pub(super) fn accumulate(
-    split: Split,
-    incident: &[Incident],
-    cos_o: f64,
-    widths: &[f64],
-    sums: &mut [f64],
-    kernel: impl Fn(&Angles, &Spread, f64) -> f64 + Copy,
-) {
-    simd::dispatch(Accumulate { split, incident, cos_o, widths, sums, kernel });
-}
-
-struct Accumulate<'a, K> {
-    split: Split,
+struct Accumulate<'a, L: ?Sized> {
+    lobe: &'a L,
     incident: &'a [Incident],
     cos_o: f64,
     widths: &'a [f64],
     sums: &'a mut [f64],
-    kernel: K,
 }
 
-impl<K: Fn(&Angles, &Spread, f64) -> f64 + Copy> pulp::NullaryFnOnce for Accumulate<'_, K> {
+impl<L: Lobe + ?Sized> pulp::NullaryFnOnce for Accumulate<'_, L> {
     type Output = ();
 
     #[inline(always)]
     fn call(self) {
-        let count = self.widths.len();
+        let (count, split) = (self.widths.len(), self.lobe.split());
         for first in (0..count).step_by(LANES) {
             let lanes = LANES.min(count - first);
             // Unused lanes repeat the last width; their sums are dropped.
@@ -138,11 +134,11 @@ impl<K: Fn(&Angles, &Spread, f64) -> f64 + Copy> pulp::NullaryFnOnce for Accumul
                 let mut value = [0.0; LANES];
                 let angles = Angles { cos_o: self.cos_o, ..light.angles };
                 for (v, &width) in value.iter_mut().zip(&widths) {
-                    *v = (self.kernel)(&angles, &light.spread, width);
+                    *v = self.lobe.kernel(&angles, &light.spread, width);
                 }
-                add(self.split, light, &value, &mut total);
+                add(split, light, &value, &mut total);
             }
-            let terms = if self.split == Split::Whole { 1 } else { 2 };
+            let terms = if split == Split::Whole { 1 } else { 2 };
             for (row, lane_sums) in total[..terms].iter().flatten().enumerate() {
                 let out = &mut self.sums[row * count + first..][..lanes];
                 out.iter_mut().zip(lane_sums).for_each(|(s, t)| *s += t);

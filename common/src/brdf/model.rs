@@ -14,6 +14,18 @@ pub struct BasisLobe {
 }
 
 impl BasisLobe {
+    /// A lobe of fixed shape.
+    #[must_use]
+    pub const fn fixed(lobe: &'static dyn Lobe) -> Self {
+        Self { lobe, width: None }
+    }
+
+    /// A lobe whose width follows from a parameter.
+    #[must_use]
+    pub const fn with_width(lobe: &'static dyn Lobe, width: Width) -> Self {
+        Self { lobe, width: Some(width) }
+    }
+
     /// The lobe's width at a flat parameter vector; `None` for a lobe of fixed shape.
     #[must_use]
     pub fn width_at(&self, parameters: &[f64]) -> Option<f64> {

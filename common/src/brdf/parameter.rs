@@ -69,6 +69,27 @@ pub struct Parameter {
     pub scale: Scale,
 }
 
+impl Parameter {
+    /// A colour from 0 to 1 that the weights are affine in.
+    #[must_use]
+    pub const fn colour(name: &'static str, meaning: &'static str) -> Self {
+        Self { channels: Channels::Rgb, ..Self::scalar(name, meaning, Role::Linear) }
+    }
+
+    /// A scalar from 0 to 1.
+    #[must_use]
+    pub const fn scalar(name: &'static str, meaning: &'static str, role: Role) -> Self {
+        let (channels, scale) = (Channels::Scalar, Scale::Linear);
+        Self { name, meaning, channels, lower: 0.0, upper: 1.0, start: 0.3, role, scale }
+    }
+
+    /// The width of the main lobe, from 0.005 to 1.
+    #[must_use]
+    pub const fn width(name: &'static str, meaning: &'static str) -> Self {
+        Self { lower: 0.005, ..Self::scalar(name, meaning, Role::Width) }
+    }
+}
+
 /// What is wrong with a set of parameters.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]

@@ -1,7 +1,19 @@
 //! The cosine of the half vector's angle to a power, the lobe of Blinn-Phong and Ashikhmin-Shirley.
 
-use super::{Angles, Spread, Width, lobe::second_order};
+use super::{Angles, Channels, Parameter, Role, Scale, Spread, Width, lobe::second_order};
 use crate::math::elementary::{exp_nonpositive, ln_positive};
+
+/// The exponent as a parameter.
+pub(super) const EXPONENT: Parameter = Parameter {
+    name: "n",
+    meaning: "exponent of the cosine between normal and half vector",
+    channels: Channels::Scalar,
+    lower: 1.0,
+    upper: 1e5,
+    start: 20.0,
+    role: Role::Width,
+    scale: Scale::Logarithmic,
+};
 
 /// The width that an exponent in the flat parameter vector stands for: `alpha = sqrt(2 / (n + 2))`, as curved at its peak as GGX.
 pub(super) const fn width(entry: usize) -> Width {

@@ -6,7 +6,7 @@
 //!
 //! (Burley 2012, section 5.3). Each factor is `(1 - s FL) + e r FL`, so that either lobe is a polynomial in `r`.
 
-use super::super::{Angles, Incident, Lobe, Split, Spread, lobe::accumulate};
+use super::super::{Angles, Lobe, Split, Spread};
 use crate::math::elementary::fifth_power;
 use std::f64::consts::FRAC_1_PI;
 
@@ -37,25 +37,6 @@ fn coefficient<const POWER: u8>(fl: f64, fv: f64, s: f64, e: f64) -> f64 {
 fn rims(g: &Angles) -> (f64, f64, f64) {
     let cos_i = g.cos_i.max(0.0);
     (cos_i, fifth_power(1.0 - cos_i.min(1.0)), fifth_power(1.0 - g.cos_o.min(1.0)))
-}
-
-#[inline(always)]
-fn diffuse<const POWER: u8>(g: &Angles, _spread: &Spread, _width: f64) -> f64 {
-    let (cos_i, fl, fv) = rims(g);
-    FRAC_1_PI * coefficient::<POWER>(fl, fv, 0.5, 2.0 * g.cos_d * g.cos_d) * cos_i
-}
-
-#[inline(always)]
-fn subsurface<const POWER: u8>(g: &Angles, _spread: &Spread, _width: f64) -> f64 {
-    let (cos_i, fl, fv) = rims(g);
-    let scale = 1.0 / (cos_i + g.cos_o) - 0.5;
-    let constant = if POWER == 0 { 0.5 } else { 0.0 };
-    1.25 * FRAC_1_PI * (coefficient::<POWER>(fl, fv, 1.0, g.cos_d * g.cos_d) * scale + constant) * cos_i
-}
-
-#[inline(always)]
-fn sheen(g: &Angles, _spread: &Spread, _width: f64) -> f64 {
-    g.f5() * g.cos_i.max(0.0)
 }
 
 /// Errors of a cut have one sign from the normal to the rim, and add up.
@@ -92,12 +73,10 @@ impl<const POWER: u8> Lobe for Diffuse<POWER> {
         rim_footprint(width, cos_o)
     }
 
-    fn eval(&self, angles: &Angles, width: f64) -> f64 {
-        diffuse::<POWER>(angles, &Spread::default(), width)
-    }
-
-    fn accumulate(&self, incident: &[Incident], cos_o: f64, widths: &[f64], sums: &mut [f64]) {
-        accumulate(self.split(), incident, cos_o, widths, sums, diffuse::<POWER>);
+    #[inline(always)]
+    fn kernel(&self, g: &Angles, _spread: &Spread, _width: f64) -> f64 {
+        let (cos_i, fl, fv) = rims(g);
+        FRAC_1_PI * coefficient::<POWER>(fl, fv, 0.5, 2.0 * g.cos_d * g.cos_d) * cos_i
     }
 }
 
@@ -127,12 +106,12 @@ impl<const POWER: u8> Lobe for Subsurface<POWER> {
         width.min(cos_o)
     }
 
-    fn eval(&self, angles: &Angles, width: f64) -> f64 {
-        subsurface::<POWER>(angles, &Spread::default(), width)
-    }
-
-    fn accumulate(&self, incident: &[Incident], cos_o: f64, widths: &[f64], sums: &mut [f64]) {
-        accumulate(self.split(), incident, cos_o, widths, sums, subsurface::<POWER>);
+    #[inline(always)]
+    fn kernel(&self, g: &Angles, _spread: &Spread, _width: f64) -> f64 {
+        let (cos_i, fl, fv) = rims(g);
+        let scale = 1.0 / (cos_i + g.cos_o) - 0.5;
+        let constant = if POWER == 0 { 0.5 } else { 0.0 };
+        1.25 * FRAC_1_PI * (coefficient::<POWER>(fl, fv, 1.0, g.cos_d * g.cos_d) * scale + constant) * cos_i
     }
 }
 
@@ -161,11 +140,8 @@ impl Lobe for Sheen {
         rim_footprint(width, cos_o)
     }
 
-    fn eval(&self, angles: &Angles, width: f64) -> f64 {
-        sheen(angles, &Spread::default(), width)
-    }
-
-    fn accumulate(&self, incident: &[Incident], cos_o: f64, widths: &[f64], sums: &mut [f64]) {
-        accumulate(self.split(), incident, cos_o, widths, sums, sheen);
+    #[inline(always)]
+    fn kernel(&self, g: &Angles, _spread: &Spread, _width: f64) -> f64 {
+        g.f5() * g.cos_i.max(0.0)
     }
 }

@@ -30,7 +30,7 @@
 mod diffuse;
 mod specular;
 
-use super::{BasisLobe, Channels, Model, Parameter, Role, Scale};
+use super::{BasisLobe, Model, Parameter, Role};
 use crate::math::Rgb;
 use diffuse::{Diffuse, Sheen, Subsurface};
 use specular::{Clearcoat, Specular};
@@ -62,41 +62,37 @@ const SHEEN_TERM: usize = 6;
 const SPECULAR_TERM: usize = 7;
 const COAT_TERM: usize = 9;
 
-const fn scalar(name: &'static str, meaning: &'static str, role: Role) -> Parameter {
-    let (channels, scale) = (Channels::Scalar, Scale::Linear);
-    Parameter { name, meaning, channels, lower: 0.0, upper: 1.0, start: 0.3, role, scale }
-}
-
 static PARAMETERS: [Parameter; 8] = [
-    Parameter {
-        channels: Channels::Rgb,
-        ..scalar("base_color", "colour of the surface, linear Rec. 709: diffuse, and specular of a metal", Role::Linear)
-    },
-    scalar("subsurface", "from diffuse to light that travels below the surface", Role::Blend(&[0.0, 1.0])),
-    scalar("metallic", "from a dielectric to a metal", Role::Blend(&[0.0, 0.5, 1.0])),
-    scalar("specular", "of a dielectric: 0.08 times this is its reflectance at normal incidence", Role::Linear),
+    Parameter::colour("base_color", "colour of the surface, linear Rec. 709: diffuse, and specular of a metal"),
+    Parameter::scalar("subsurface", "from diffuse to light that travels below the surface", Role::Blend(&[0.0, 1.0])),
+    Parameter::scalar("metallic", "from a dielectric to a metal", Role::Blend(&[0.0, 0.5, 1.0])),
+    Parameter::scalar(
+        "specular",
+        "of a dielectric: 0.08 times this is its reflectance at normal incidence",
+        Role::Linear,
+    ),
     Parameter {
         lower: specular::LEAST_ROUGHNESS,
-        ..scalar("roughness", "square root of the width of the specular lobe", Role::Width)
+        ..Parameter::scalar("roughness", "square root of the width of the specular lobe", Role::Width)
     },
-    scalar("sheen", "weight of a white rim", Role::Linear),
-    scalar("clearcoat", "weight of the clear coat", Role::Linear),
+    Parameter::scalar("sheen", "weight of a white rim", Role::Linear),
+    Parameter::scalar("clearcoat", "weight of the clear coat", Role::Linear),
     Parameter {
         upper: specular::MOST_GLOSS,
-        ..scalar("clearcoat_gloss", "from a satin coat to a glossy one", Role::Scanned(&[0.0, 0.5, 0.9]))
+        ..Parameter::scalar("clearcoat_gloss", "from a satin coat to a glossy one", Role::Scanned(&[0.0, 0.5, 0.9]))
     },
 ];
 
 static LOBES: [BasisLobe; 9] = [
-    BasisLobe { lobe: &Diffuse::<0>, width: None },
-    BasisLobe { lobe: &Diffuse::<1>, width: None },
-    BasisLobe { lobe: &Diffuse::<2>, width: None },
-    BasisLobe { lobe: &Subsurface::<0>, width: None },
-    BasisLobe { lobe: &Subsurface::<1>, width: None },
-    BasisLobe { lobe: &Subsurface::<2>, width: None },
-    BasisLobe { lobe: &Sheen, width: None },
-    BasisLobe { lobe: &Specular, width: Some(specular::roughness(ROUGHNESS)) },
-    BasisLobe { lobe: &Clearcoat, width: Some(specular::gloss(GLOSS)) },
+    BasisLobe::fixed(&Diffuse::<0>),
+    BasisLobe::fixed(&Diffuse::<1>),
+    BasisLobe::fixed(&Diffuse::<2>),
+    BasisLobe::fixed(&Subsurface::<0>),
+    BasisLobe::fixed(&Subsurface::<1>),
+    BasisLobe::fixed(&Subsurface::<2>),
+    BasisLobe::fixed(&Sheen),
+    BasisLobe::with_width(&Specular, specular::roughness(ROUGHNESS)),
+    BasisLobe::with_width(&Clearcoat, specular::gloss(GLOSS)),
 ];
 
 impl Model for Disney {
