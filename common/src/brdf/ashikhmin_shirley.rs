@@ -16,7 +16,7 @@
 //! | `f0` | specular reflectance at normal incidence, linear Rec. 709 | [0, 1] |
 //! | `n` | exponent of the cosine between normal and half vector | [1, 1e5] |
 
-use super::{Angles, BasisLobe, LinearModel, Lobe, Parameter, Split, Spread, Weight, power};
+use super::{Angles, BasisLobe, Expected, LinearModel, Lobe, Parameter, Split, Spread, Weight, power};
 use crate::math::elementary::fifth_power;
 use std::f64::consts::PI;
 
@@ -103,6 +103,11 @@ impl Lobe for SpecularLobe {
     /// Off the mirror direction `1/(v.h)` and the larger cosine vary as much as the distribution of a wide lobe.
     fn care(&self) -> f64 {
         2.0
+    }
+
+    fn expected(&self) -> Expected {
+        let sharp_albedo = |width, cos_o| (1.0, power::beyond_kink(width, cos_o));
+        Expected { sharp_albedo, is_kinked: true, ..Expected::default() }
     }
 
     /// Zero below the horizon of the light; there `v.h` may be as small as it likes.

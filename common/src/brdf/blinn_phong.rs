@@ -15,7 +15,7 @@
 //! | `ks` | specular colour, linear Rec. 709: about the albedo of a sharp lobe | [0, 1] |
 //! | `n` | exponent of the cosine between normal and half vector | [1, 1e5] |
 
-use super::{Angles, BasisLobe, Lambert, LinearModel, Lobe, Parameter, Split, Spread, Weight, power};
+use super::{Angles, BasisLobe, Expected, Lambert, LinearModel, Lobe, Parameter, Split, Spread, Weight, power};
 use std::f64::consts::PI;
 
 /// The model `blinn-phong`.
@@ -54,6 +54,12 @@ impl Lobe for BlinnPhongLobe {
 
     fn equivalent_alpha(&self, width: f64) -> Option<f64> {
         Some(width)
+    }
+
+    /// Without the `1/(v.h)` of microfacets a sharp lobe reflects `n.v`.
+    fn expected(&self) -> Expected {
+        let sharp_albedo = |width, cos_o| (cos_o, power::beyond_kink(width, cos_o));
+        Expected { sharp_albedo, is_kinked: true, ..Expected::default() }
     }
 
     /// Zero below the horizon of the light.

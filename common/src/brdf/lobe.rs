@@ -86,6 +86,11 @@ pub trait Lobe: Debug + Sync {
         width
     }
 
+    /// What the tests hold the lobe to.
+    fn expected(&self) -> Expected {
+        Expected::default()
+    }
+
     /// `f cos(theta_i)` in 1/sr, without Fresnel term, averaged over the spread of the light to second order; zero for light from below
     /// the horizon. Mark it `#[inline(always)]`, or the loop over the widths is not vectorised.
     fn kernel(&self, angles: &Angles, spread: &Spread, width: f64) -> f64;
@@ -101,6 +106,26 @@ pub trait Lobe: Debug + Sync {
     /// `cos_o` is that of all `incident`; it is apart so that the terms that depend on it alone leave the loop.
     fn accumulate(&self, incident: &[Incident], cos_o: f64, widths: &[f64], sums: &mut [f64]) {
         simd::dispatch(Accumulate { lobe: self, incident, cos_o, widths, sums });
+    }
+}
+
+/// What the tests hold a lobe to. The defaults suit a lobe of microfacets that conserves energy; others state what their formula gives.
+#[derive(Debug, Clone, Copy)]
+pub struct Expected {
+    /// Largest directional albedo without Fresnel term.
+    pub most_albedo: f64,
+    /// From width and viewer's cosine, for a width of at most 0.02 and a cosine of at least 0.5: the directional albedo of a mirror,
+    /// and how far below it the lobe may stay.
+    pub sharp_albedo: fn(f64, f64) -> (f64, f64),
+    /// Whether `f` has a kink in the mirror direction, where `n.l = n.v`.
+    pub is_kinked: bool,
+    /// The lobe of the same model that this one only adjusts: the error of a table is a share of the sum of the two.
+    pub adjusts: Option<&'static str>,
+}
+
+impl Default for Expected {
+    fn default() -> Self {
+        Self { most_albedo: 1.0, sharp_albedo: |_, _| (1.0, 0.01), is_kinked: false, adjusts: None }
     }
 }
 

@@ -40,15 +40,21 @@ pub use ggx::Ggx;
 pub use ggx_f90::GgxF90;
 pub use lambert::Lambert;
 pub use linear::{LinearModel, Weight};
-pub use lobe::{Incident, Lobe, Split, Spread, Tail};
+pub use lobe::{Expected, Incident, Lobe, Split, Spread, Tail};
 pub use model::{BasisLobe, Model, lobe_terms, term_count};
 pub use parameter::{Channels, Parameter, ParameterError, Role, Scale, flat_bounds, flat_len, flat_names, offset_of};
 pub use reflectance::{Material, Reflectance};
 pub use ward::Ward;
 pub use width::Width;
 
-/// Every model, by the name users give it. The first is the default.
+/// Every model, in the order in which lists show them.
 pub static MODELS: &[&dyn Model] = &[&Ggx, &GgxF90, &CookTorrance, &Ward, &BlinnPhong, &AshikhminShirley, &Disney];
+
+/// The model of a fit that names none.
+pub static DEFAULT_MODEL: &dyn Model = &Ggx;
+
+/// The model of the papers' results and of `--preset paper`.
+pub static PAPER_MODEL: &dyn Model = &CookTorrance;
 
 /// Looks a model up by name.
 ///

@@ -30,6 +30,11 @@ pub(super) fn exponent(alpha: f64) -> f64 {
     2.0 / (alpha * alpha) - 2.0
 }
 
+/// Of a sharp lobe divided by the larger of `n.l` and `n.v`: the albedo that half of it, beyond the kink at `n.l = n.v`, may lack.
+pub(super) fn beyond_kink(width: f64, cos_o: f64) -> f64 {
+    width * (1.0 - cos_o * cos_o).sqrt() / cos_o + 0.002
+}
+
 /// `(n.h)^n`, and the factor that its mean over the spread of light has.
 ///
 /// Spread: with `u = sin^2(th)` and `k = n/2` it is `(1 - u)^k`; its first derivative by `u`, as a share of it, is `-k / (1 - u)`, its

@@ -1,7 +1,7 @@
 //! The settings of the method, with their defaults (design sections 1, 2 and 10).
 
 use crate::{
-    brdf::{MODELS, Model},
+    brdf::{DEFAULT_MODEL, Model},
     render::subset::{SampleCount, Sampling},
 };
 use thiserror::Error;
@@ -93,7 +93,7 @@ pub struct Method {
 impl Default for Method {
     fn default() -> Self {
         Self {
-            model: MODELS[0],
+            model: DEFAULT_MODEL,
             gammas: (10..=30).map(|tenth| f64::from(tenth) / 10.0).collect(),
             samples: SampleCount::Draws(256),
             sampling: Sampling::Importance,

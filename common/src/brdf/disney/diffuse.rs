@@ -6,7 +6,7 @@
 //!
 //! (Burley 2012, section 5.3). Each factor is `(1 - s FL) + e r FL`, so that either lobe is a polynomial in `r`.
 
-use super::super::{Angles, Lobe, Split, Spread};
+use super::super::{Angles, Expected, Lobe, Split, Spread};
 use crate::math::elementary::fifth_power;
 use std::f64::consts::FRAC_1_PI;
 
@@ -39,6 +39,10 @@ fn rims(g: &Angles) -> (f64, f64, f64) {
     (cos_i, fifth_power(1.0 - cos_i.min(1.0)), fifth_power(1.0 - g.cos_o.min(1.0)))
 }
 
+/// Names of the lobes that stand alone; the others of each family adjust them by the roughness.
+const DIFFUSE: &str = "disney diffuse";
+const SUBSURFACE: &str = "disney subsurface";
+
 /// Errors of a cut have one sign from the normal to the rim, and add up.
 const CARE: f64 = 4.0;
 
@@ -49,7 +53,7 @@ fn rim_footprint(width: f64, cos_o: f64) -> f64 {
 
 impl<const POWER: u8> Lobe for Diffuse<POWER> {
     fn name(&self) -> &'static str {
-        ["disney diffuse", "disney diffuse, by roughness", "disney diffuse, by its square"][usize::from(POWER)]
+        [DIFFUSE, "disney diffuse, by roughness", "disney diffuse, by its square"][usize::from(POWER)]
     }
 
     fn split(&self) -> Split {
@@ -73,6 +77,10 @@ impl<const POWER: u8> Lobe for Diffuse<POWER> {
         rim_footprint(width, cos_o)
     }
 
+    fn expected(&self) -> Expected {
+        Expected { adjusts: (POWER > 0).then_some(DIFFUSE), ..Expected::default() }
+    }
+
     #[inline(always)]
     fn kernel(&self, g: &Angles, _spread: &Spread, _width: f64) -> f64 {
         let (cos_i, fl, fv) = rims(g);
@@ -82,7 +90,7 @@ impl<const POWER: u8> Lobe for Diffuse<POWER> {
 
 impl<const POWER: u8> Lobe for Subsurface<POWER> {
     fn name(&self) -> &'static str {
-        ["disney subsurface", "disney subsurface, by roughness", "disney subsurface, by its square"][usize::from(POWER)]
+        [SUBSURFACE, "disney subsurface, by roughness", "disney subsurface, by its square"][usize::from(POWER)]
     }
 
     fn split(&self) -> Split {
@@ -104,6 +112,12 @@ impl<const POWER: u8> Lobe for Subsurface<POWER> {
 
     fn footprint(&self, width: f64, cos_o: f64) -> f64 {
         width.min(cos_o)
+    }
+
+    /// Its formula reflects up to 1.205 of what it receives (computed in NumPy).
+    fn expected(&self) -> Expected {
+        let most_albedo = if POWER == 0 { 1.21 } else { 1.0 };
+        Expected { most_albedo, adjusts: (POWER > 0).then_some(SUBSURFACE), ..Expected::default() }
     }
 
     #[inline(always)]
