@@ -3,9 +3,9 @@
 //! `f = 28/(23 pi) kd (1 - f0) (1 - (1 - n.l/2)^5) (1 - (1 - n.v/2)^5) + F (n + 1)/(8 pi) (n.h)^n / (v.h max(n.l, n.v))` with
 //! `F = f0 + (1 - f0) F5`, `F5 = (1 - v.h)^5`
 //!
-//! (Ashikhmin & Shirley 2000, with both of their exponents equal; Fresnel's term of Schlick 1994.) What the specular lobe reflects is
-//! taken from the diffuse one, so that both together never reflect more than they receive. Split: the weights are `kd (1 - f0)`, `f0`
-//! and 1. The first is a product of parameters: the scan solves for it instead of `kd`.
+//! (Ashikhmin & Shirley 2000, with both exponents equal; Fresnel term of Schlick 1994.) The diffuse lobe loses what the specular lobe
+//! reflects, so that both together conserve energy. Split: the weights are `kd (1 - f0)`, `f0` and 1. The first is a product of two
+//! parameters; the scan solves for the product instead of `kd`.
 //!
 //! The lobe gets narrower as `n` grows: its width is `alpha = sqrt(2/(n + 2))`, from 0.0045 to 0.82 within the bounds. Searches move
 //! `n` by its logarithm.
@@ -40,6 +40,7 @@ impl LinearModel for AshikhminShirley {
     const LOBES: &'static [BasisLobe] =
         &[BasisLobe::fixed(&DiffuseLobe), BasisLobe::with_width(&SpecularLobe, power::width(N))];
     const WEIGHTS: &'static [Weight] = &[Weight::Remainder(KD, F0), Weight::Colour(F0), Weight::One];
+    /// `1 - (1 - n.v/2)^5` at `n.v = 1`.
     const DIFFUSE_ALBEDO: f64 = 1.0 - 1.0 / 32.0;
 }
 
@@ -60,17 +61,17 @@ impl Lobe for DiffuseLobe {
         None
     }
 
-    /// It is bent the same way from the normal to the horizon, so that the errors of a cut add up.
+    /// Its curvature has one sign from the normal to the horizon, so the errors of a cut add up.
     fn care(&self) -> f64 {
         4.0
     }
 
-    /// `28/23 (1 - (1 - n.l/2)^5) (1 - (1 - n.v/2)^5) n.l` is most bent at the horizon of the light: by 5 times 28/23.
+    /// The second derivative of `28/23 (1 - (1 - n.l/2)^5) (1 - (1 - n.v/2)^5) n.l` is largest at the horizon: 5 times 28/23.
     fn bend(&self) -> f64 {
         6.1
     }
 
-    /// It falls to nothing with the viewer's cosine.
+    /// It falls to 0 with the viewer's cosine.
     fn footprint(&self, width: f64, cos_o: f64) -> f64 {
         width.min(cos_o)
     }
@@ -110,7 +111,7 @@ impl Lobe for SpecularLobe {
         Expected { sharp_albedo, is_kinked: true, ..Expected::default() }
     }
 
-    /// Zero below the horizon of the light; there `v.h` may be as small as it likes.
+    /// Zero for light below the horizon, where `v.h` may be 0.
     #[inline(always)]
     fn kernel(&self, g: &Angles, spread: &Spread, alpha: f64) -> f64 {
         let cos_i = g.cos_i.max(0.0);

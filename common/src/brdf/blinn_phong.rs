@@ -3,8 +3,8 @@
 //! `f = kd/pi + ks D / (4 max(n.l, n.v))`, `D = (n + 2)/(2 pi) (n.h)^n`
 //!
 //! (Blinn 1977; `D` is normalised as a distribution of microfacets, and the division by the larger cosine is that of Neumann, Neumann &
-//! Szirmay-Kalos 1999.) There is no Fresnel term: the lobe has one weight, `ks`. The lobe reflects no more than it receives: a sharp one
-//! all of it at normal incidence and, as it lacks the `1/(v.h)` of microfacets, `n.v` of it at any other angle.
+//! Szirmay-Kalos 1999.) There is no Fresnel term: the lobe has one weight, `ks`. The albedo of the lobe is at most 1.
+//! That of a sharp lobe is `n.v`, because the `1/(v.h)` of microfacets is missing.
 //!
 //! The lobe gets narrower as `n` grows: its width is `alpha = sqrt(2/(n + 2))`, for which `D` has the peak of GGX and Beckmann,
 //! `1/(pi alpha^2)`; from 0.0045 to 0.82 within the bounds. Searches move `n` by its logarithm.
@@ -56,13 +56,13 @@ impl Lobe for BlinnPhongLobe {
         Some(width)
     }
 
-    /// Without the `1/(v.h)` of microfacets a sharp lobe reflects `n.v`.
+    /// The albedo of a sharp lobe is `n.v`, because the `1/(v.h)` of microfacets is missing.
     fn expected(&self) -> Expected {
         let sharp_albedo = |width, cos_o| (cos_o, power::beyond_kink(width, cos_o));
         Expected { sharp_albedo, is_kinked: true, ..Expected::default() }
     }
 
-    /// Zero below the horizon of the light.
+    /// Zero for light below the horizon.
     #[inline(always)]
     fn kernel(&self, g: &Angles, spread: &Spread, alpha: f64) -> f64 {
         let cos_i = g.cos_i.max(0.0);

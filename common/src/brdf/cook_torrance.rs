@@ -1,4 +1,4 @@
-//! `cook-torrance`: diffuse plus Cook & Torrance's microfacet lobe, the paper's model.
+//! `cook-torrance`: diffuse plus Cook & Torrance's microfacet lobe, the model of the papers.
 //!
 //! `f = kd/pi + ks (f0 + (1 - f0) F5) D G / (4 n.l n.v)` with
 //! - `D = exp(-tan^2(th) / m^2) / (pi m^2 cos^4(th))` (Beckmann),
@@ -14,7 +14,7 @@
 //! | `f0` | Fresnel reflectance at normal incidence, one for all channels | [0, 1] |
 //! | `m` | root mean square slope of the microfacets (Beckmann's width) | [0.005, 1] |
 //!
-//! `ks` and `f0` trade against each other: only `ks f0`, the specular colour at normal incidence, is well determined.
+//! A photo determines the product `ks f0`, the specular colour at normal incidence, well, and its factors poorly.
 
 use super::{
     Angles, BasisLobe, Lambert, LinearModel, Lobe, Parameter, Role, Split, Spread, Weight, Width, beckmann::beckmann,
@@ -61,13 +61,13 @@ impl Lobe for CookTorranceLobe {
         Split::Schlick
     }
 
-    /// Beckmann and GGX of equal width have the same curvature at their peak up to a factor of two; GGX has the longer tail, which
-    /// is the safe side for sampling and refinement.
+    /// At equal width the curvatures of Beckmann and GGX at the peak differ by at most a factor of two. The longer tail of GGX is safe for
+    /// sampling and refinement.
     fn equivalent_alpha(&self, width: f64) -> Option<f64> {
         Some(width)
     }
 
-    /// `D G / (4 n.v)`; zero below the horizon of the light and for half vectors below the surface.
+    /// `D G / (4 n.v)`; zero for light below the horizon and for half vectors below the surface.
     #[inline(always)]
     fn kernel(&self, g: &Angles, spread: &Spread, m: f64) -> f64 {
         let cos_i = g.cos_i.max(0.0);

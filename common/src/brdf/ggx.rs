@@ -1,4 +1,4 @@
-//! `ggx`: diffuse plus a GGX microfacet lobe. The default model.
+//! `ggx`: diffuse plus a GGX microfacet lobe.
 //!
 //! `f = kd/pi + F D V` with
 //! - `D = a^2 / (pi ((n.h)^2 (a^2 - 1) + 1)^2)` (Walter et al. 2007; Trowbridge & Reitz 1975),

@@ -2,9 +2,9 @@
 //!
 //! `f = kd/pi + F D V` with `D` and `V` of `ggx` and `F = f0 + (f90 - f0) F5`, `F5 = (1 - v.h)^5` (Schlick 1994, with his 1 replaced).
 //!
-//! A smooth interface reflects everything at grazing incidence. The measured materials of docs/results.md do not: they darken towards the
-//! rim, whether by their roughness or by how they were measured and fitted, and `ggx` must give them a rim that they have not.
-//! In MaterialX it is the generalized Schlick BSDF with a grey `color90`.
+//! A smooth interface reflects all light at grazing incidence. The measured materials of docs/results.md darken towards the rim, either
+//! by their roughness or by the way they were measured and fitted; `ggx` renders them with a rim that is too bright.
+//! MaterialX has this model as the generalized Schlick BSDF with a grey `color90`.
 //!
 //! Split: `F = f0 (1 - F5) + f90 F5`, so the weights are `kd`, `f0` and `f90`.
 //!

@@ -1,10 +1,10 @@
-//! Models whose weights are parameters or simple products of them: the weights and their derivatives, once for all such models.
+//! Models whose weights are parameters or simple products of them. The weights and their derivatives are implemented once, here.
 
 use super::{BasisLobe, Model, Parameter};
 use crate::math::Rgb;
 use std::fmt::Debug;
 
-/// The weight of one term as a function of the flat parameter vector. The numbers are the first entries of parameters.
+/// The weight of one term as a function of the flat parameter vector. A `usize` is the first entry of a parameter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Weight {
     /// 1 in every channel.
@@ -15,7 +15,7 @@ pub enum Weight {
     Scalar(usize),
     /// A colour times a scalar.
     Scaled(usize, usize),
-    /// The first colour times 1 minus the second. The scan solves for this product in the place of the first colour.
+    /// The first colour times 1 minus the second. The scan solves for this product instead of the first colour.
     Remainder(usize, usize),
 }
 
@@ -57,7 +57,7 @@ impl Weight {
     }
 }
 
-/// A model declared by constants alone. Its first term is the diffuse lobe; its second is the specular lobe at normal incidence.
+/// A model declared by constants. Its first term must be the diffuse lobe, its second the specular lobe at normal incidence.
 pub trait LinearModel: Debug + Sync {
     /// [`Model::name`].
     const NAME: &'static str;

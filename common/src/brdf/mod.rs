@@ -1,13 +1,13 @@
 //! Reflectance models, one file each, and the registry that names them.
 //!
 //! A model is a sum of *basis lobes* with weights. For fixed lobe widths the radiance of a pixel is linear in the
-//! weights, which is what makes transport tables possible (design: "transport tables"):
+//! weights, so a transport table per lobe replaces rendering (design section 5):
 //!
 //! `f(wi, wo) cos(theta_i) = sum_t weight_t(parameters) * basis_t(wi, wo; width)`
 //!
-//! A [`Model`] therefore declares its [`Parameter`]s, its [`BasisLobe`]s, and the map (with derivative) from the former
-//! to the weights of the latter. Adding a model is one file and one line in [`MODELS`]; the tests of reciprocity, energy
-//! and derivatives below cover it from then on.
+//! A [`Model`] therefore declares its [`Parameter`]s, its [`BasisLobe`]s, and the map (with derivative) from parameters to
+//! weights of lobes. A new model is one file and one line in [`MODELS`]; help, tests of physics, agreement and recovery iterate
+//! [`MODELS`].
 //!
 //! Conventions: directions point away from the surface; `f` is in 1/sr; `alpha` is the microfacet width, not an artist's
 //! roughness.
@@ -59,7 +59,7 @@ pub static PAPER_MODEL: &dyn Model = &CookTorrance;
 /// Looks a model up by name.
 ///
 /// # Errors
-/// Names the known models when there is none of that name.
+/// [`ParameterError::UnknownModel`], which lists the known models.
 pub fn model(name: &str) -> Result<&'static dyn Model, ParameterError> {
     MODELS.iter().copied().find(|m| m.name() == name).ok_or_else(|| ParameterError::UnknownModel {
         name: name.to_owned(),

@@ -1,4 +1,4 @@
-//! The parameters of a model: names, bounds, units, and the part each plays in a search.
+//! The parameters of a model: names, bounds, units, and roles in a search.
 //!
 //! A parameter vector is flat: colours take three consecutive entries (red, green, blue), scalars one, in the order of
 //! [`Model::parameters`](super::Model::parameters).
@@ -25,17 +25,17 @@ impl Channels {
     }
 }
 
-/// How a search should see the parameter.
+/// How a search treats the parameter.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Role {
     /// The weights are affine in it while all other parameters are held.
     Linear,
     /// The width of the main lobe: radiance depends on it through the table's knots.
     Width,
-    /// It multiplies other parameters, or is the width of a lobe that is not the main one: the scan tries these values and solves for the
-    /// linear ones.
+    /// It multiplies other parameters, or is the width of a lobe other than the main one. The scan tries these values and solves for the
+    /// linear parameters.
     Scanned(&'static [f64]),
-    /// As `Scanned`: the share of one kind of surface in a mixture of two, whose ends are kinds and no limits.
+    /// Like `Scanned`, for a mixture of two kinds of surface: 0 and 1 are the pure kinds, not limits of the model.
     Blend(&'static [f64]),
 }
 
@@ -63,9 +63,9 @@ pub struct Parameter {
     pub upper: f64,
     /// Start of the paper's pattern search (design section 10, `--preset paper`).
     pub start: f64,
-    /// The part it plays in a search.
+    /// How a search treats it.
     pub role: Role,
-    /// The coordinate pattern search moves in. Least squares always moves the width of the main lobe by its logarithm.
+    /// The coordinate of pattern search. Least squares always uses the logarithm of the main lobe's width.
     pub scale: Scale,
 }
 
@@ -90,7 +90,7 @@ impl Parameter {
     }
 }
 
-/// What is wrong with a set of parameters.
+/// Invalid parameters of a model.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum ParameterError {
@@ -99,7 +99,7 @@ pub enum ParameterError {
     UnknownModel {
         /// As given.
         name: String,
-        /// The names there are.
+        /// The known names, separated by commas.
         known: String,
     },
     /// The model has no such parameter.
@@ -109,7 +109,7 @@ pub enum ParameterError {
         model: &'static str,
         /// As given.
         name: String,
-        /// The names there are.
+        /// The known names, separated by commas.
         known: String,
     },
     /// A parameter was left out.
@@ -119,10 +119,10 @@ pub enum ParameterError {
         model: &'static str,
         /// The parameter.
         name: &'static str,
-        /// How it is written.
+        /// An example of its value.
         example: &'static str,
     },
-    /// One number for a scalar, three (or one for grey) for a colour.
+    /// A wrong number of values: a scalar takes one, a colour three, or one for grey.
     #[error("parameter '{name}' takes {expected} number(s), found {found}")]
     Count {
         /// The parameter.
@@ -152,7 +152,7 @@ pub fn flat_len(parameters: &[Parameter]) -> usize {
     parameters.iter().map(|p| p.channels.count()).sum()
 }
 
-/// Where a named parameter starts in the flat vector.
+/// The first entry of a named parameter in the flat vector.
 #[must_use]
 pub fn offset_of(parameters: &[Parameter], name: &str) -> Option<usize> {
     let index = parameters.iter().position(|p| p.name == name)?;

@@ -1,4 +1,4 @@
-//! Physics every model must obey; a model added to the registry is covered from then on.
+//! Physics of every model in the registry.
 
 use super::*;
 use crate::math::{
@@ -38,7 +38,7 @@ fn every_model_is_reciprocal() {
     }
 }
 
-/// A direction whose half vector is drawn from `D n.h` of a distribution of long tail (Burley 2012, section B.2.3), with its density.
+/// A direction whose half vector is drawn from `D n.h` of the long-tailed distribution (Burley 2012, section B.2.3), and its density.
 fn long_tailed(wo: Vec3, width: f64, [u, v]: [f64; 2]) -> (Vec3, f64) {
     let a2 = width * width;
     let sin2 = (a2.powf(1.0 - u) - a2) / (1.0 - a2);
@@ -104,7 +104,7 @@ fn lambert_reflects_its_albedo() {
     assert!((albedo(&Lambert, 0.0, 0.7) - 1.0).abs() < 1e-12);
 }
 
-/// D and V of the design's table, written out naively.
+/// D and V of design section 4, written out naively.
 fn ggx_by_the_book(g: &Angles, a: f64) -> (f64, f64) {
     let d = a * a / (PI * (g.cos_h * g.cos_h * (a * a - 1.0) + 1.0).powi(2));
     let lambda = |c: f64| 0.5 * ((1.0 + a * a * (1.0 / (c * c) - 1.0)).sqrt() - 1.0);
@@ -123,7 +123,7 @@ fn the_ggx_lobe_is_d_v_cos() {
     }
 }
 
-/// Weak white furnace (Heitz 2014, eq. 85): masked by G1 alone, the distribution reflects exactly everything.
+/// Weak white furnace (Heitz 2014, eq. 85): masked by G1 alone, the distribution has an albedo of exactly 1.
 #[test]
 fn ggx_passes_the_weak_white_furnace() {
     for alpha in [0.02_f64, 0.1, 0.3, 0.6, 1.0] {
@@ -212,7 +212,7 @@ fn parameters_called_linear_are_affine_in_the_weights() {
                 assert!((half[t] - (zero[t] + one[t]) * 0.5).length() < 1e-12, "{} scan {scan}", model.name());
             }
         };
-        // One at a time while all others are held; in the coordinates of the scan all at once.
+        // One entry at a time with all others held; in the coordinates of the scan all entries at once.
         for &one in &entries {
             affine(false, &|e| if e == one { 0.0 } else { base[e] }, &|e| if e == one { 1.0 } else { base[e] });
         }
@@ -238,12 +238,12 @@ fn the_scan_ends_at_parameters_of_the_weights_that_it_found() {
             model.scan_weights(&solution, &mut scanned);
             model.weights(&p, &mut mapped);
             let same = scanned.iter().zip(&mapped).all(|(a, b)| (*a - *b).length() < 1e-12);
-            // What is not the same stands at a bound.
+            // Where the weights differ, a parameter is at a bound.
             let at_bound = linear_entries(*model).iter().any(|&i| p[i] == lower[i] || p[i] == upper[i]);
             assert!(same || at_bound, "{} {solution:?} {p:?}", model.name());
             if same { within += 1 } else { outside += 1 }
         }
-        // Only coordinates of the scan's own can lead to a bound.
+        // Only a model with separate coordinates of the scan may end at a bound.
         assert!(within > 0 && (outside == 0 || has_coordinates), "{}", model.name());
     }
 }
@@ -281,7 +281,7 @@ fn accumulation_has_the_bits_of_a_scalar_loop() {
     }
 }
 
-/// Every lobe that has a width has a grid of its own, and so an entry of its own.
+/// Every lobe with a width has its own grid, and so needs its own entry.
 #[test]
 fn no_two_lobes_of_a_model_share_a_width() {
     for model in MODELS {

@@ -1,10 +1,10 @@
-//! What of `disney` has no width: the diffuse lobe, the one of light below the surface, and the sheen.
+//! The lobes of `disney` without a width: diffuse, subsurface and sheen.
 //!
 //! With `FL = (1 - n.l)^5`, `FV = (1 - n.v)^5`, `c = v.h` and the roughness `r`
 //! - `f_d = 1/pi (1 + (F90 - 1) FL) (1 + (F90 - 1) FV)`, `F90 = 0.5 + 2 c^2 r`,
 //! - `f_ss = 1.25/pi (F (1/(n.l + n.v) - 0.5) + 0.5)`, `F` as above with `F90 = c^2 r`
 //!
-//! (Burley 2012, section 5.3). Each factor is `(1 - s FL) + e r FL`, so that either lobe is a polynomial in `r`.
+//! (Burley 2012, section 5.3). Each factor is `(1 - s FL) + e r FL`, so both lobes are polynomials in `r`.
 
 use super::super::{Angles, Expected, Lobe, Split, Spread};
 use crate::math::elementary::fifth_power;
@@ -14,11 +14,11 @@ use std::f64::consts::FRAC_1_PI;
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Diffuse<const POWER: u8>;
 
-/// The coefficient of `roughness^POWER` in the lobe of light below the surface.
+/// The coefficient of `roughness^POWER` in the subsurface lobe.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Subsurface<const POWER: u8>;
 
-/// `F5`: a rim.
+/// The sheen, `F5`.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Sheen;
 
@@ -39,14 +39,14 @@ fn rims(g: &Angles) -> (f64, f64, f64) {
     (cos_i, fifth_power(1.0 - cos_i.min(1.0)), fifth_power(1.0 - g.cos_o.min(1.0)))
 }
 
-/// Names of the lobes that stand alone; the others of each family adjust them by the roughness.
+/// Names of the lobes at roughness 0; the others of each family adjust them.
 const DIFFUSE: &str = "disney diffuse";
 const SUBSURFACE: &str = "disney subsurface";
 
-/// Errors of a cut have one sign from the normal to the rim, and add up.
+/// The errors of a cut have one sign from the normal to the rim, so they add up.
 const CARE: f64 = 4.0;
 
-/// `(1 - x)^5` changes within a fifth at the rim, and hardly at the centre.
+/// `(1 - x)^5` changes over a fifth of the range at the rim, and hardly at the centre.
 fn rim_footprint(width: f64, cos_o: f64) -> f64 {
     width.min(0.2 + cos_o)
 }
@@ -68,7 +68,7 @@ impl<const POWER: u8> Lobe for Diffuse<POWER> {
         CARE
     }
 
-    /// `g(x) x` is bent by `2 g'` at the horizon: 5 for `1 - FL/2`, 10 for `FL`.
+    /// The second derivative of `g(x) x` at the horizon is `2 g'`: 5 for `1 - FL/2`, 10 for `FL`.
     fn bend(&self) -> f64 {
         [5.0, 20.0, 40.0][usize::from(POWER)]
     }
@@ -105,7 +105,7 @@ impl<const POWER: u8> Lobe for Subsurface<POWER> {
         CARE
     }
 
-    /// At grazing views `1/(n.l + n.v)` bends it, over a few times `n.v`.
+    /// At grazing views it is that of `1/(n.l + n.v)`, over a few times `n.v`.
     fn bend(&self) -> f64 {
         60.0
     }
@@ -114,7 +114,7 @@ impl<const POWER: u8> Lobe for Subsurface<POWER> {
         width.min(cos_o)
     }
 
-    /// Its formula reflects up to 1.205 of what it receives (computed in NumPy).
+    /// The formula has an albedo of up to 1.205 (computed in NumPy).
     fn expected(&self) -> Expected {
         let most_albedo = if POWER == 0 { 1.21 } else { 1.0 };
         Expected { most_albedo, adjusts: (POWER > 0).then_some(SUBSURFACE), ..Expected::default() }

@@ -1,18 +1,18 @@
-//! What of `disney` has a width: the specular lobe and the clear coat (Burley 2012, sections 5.4 to 5.6).
+//! The lobes of `disney` with a width: the specular lobe and the clear coat (Burley 2012, sections 5.4 to 5.6).
 //!
-//! Both are `D G / (4 n.l n.v)` with Smith's masking of light and view each for itself, `G1(c) / (2 c) = 1/(c + sqrt(g^2 + (1 - g^2) c^2))`.
+//! Both are `D G / (4 n.l n.v)` with separable Smith masking, `G1(c) / (2 c) = 1/(c + sqrt(g^2 + (1 - g^2) c^2))`.
 
 use super::super::{Angles, Expected, Lobe, Split, Spread, Tail, Width, lobe::second_order};
 use crate::math::elementary::ln_positive;
 use std::f64::consts::FRAC_1_PI;
 
-/// Smallest roughness: of a width of 0.005.
+/// Smallest roughness, for a width of 0.005.
 pub(super) const LEAST_ROUGHNESS: f64 = 0.071;
 
-/// Largest gloss of a coat: of a width of 0.005.
+/// Largest gloss of the coat, for a width of 0.005.
 pub(super) const MOST_GLOSS: f64 = 0.9595;
 
-/// Width of a coat of gloss 0, and how much narrower it is at gloss 1.
+/// Width of a coat of gloss 0, and the difference to that of gloss 1.
 const SATIN: f64 = 0.1;
 const GLOSS_RANGE: f64 = 0.099;
 
@@ -31,7 +31,7 @@ pub(super) const fn gloss(entry: usize) -> Width {
     }
 }
 
-/// `G1(c) / (2 c)` of Smith's masking of the squared width `g2`.
+/// `G1(c) / (2 c)` of Smith's masking with the squared width `g2`.
 #[inline(always)]
 fn masked(cos: f64, g2: f64) -> f64 {
     1.0 / (cos + (g2 + (1.0 - g2) * cos * cos).sqrt())
@@ -54,7 +54,7 @@ impl Lobe for Specular {
         Some(width)
     }
 
-    /// Masked by a distribution wider than its own.
+    /// The masking is that of a wider distribution.
     fn expected(&self) -> Expected {
         Expected { sharp_albedo: |_, _| (1.0, 0.15), ..Expected::default() }
     }
@@ -78,7 +78,7 @@ impl Lobe for Specular {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Clearcoat;
 
-/// Square of the width of the coat's masking.
+/// Squared width of the coat's masking.
 const COAT_MASKING: f64 = 0.25 * 0.25;
 
 impl Lobe for Clearcoat {
@@ -98,12 +98,12 @@ impl Lobe for Clearcoat {
         Tail::Long
     }
 
-    /// No more than a quarter of it is seen.
+    /// Its weight is at most a quarter.
     fn care(&self) -> f64 {
         0.5
     }
 
-    /// Its formula reflects up to 1.251 of what it receives (computed in NumPy). The horizon cuts its long tail.
+    /// The formula has an albedo of up to 1.251 (computed in NumPy). The horizon cuts the long tail of a sharp coat.
     fn expected(&self) -> Expected {
         Expected { most_albedo: 1.255, sharp_albedo: |_, _| (1.0, 0.13), ..Expected::default() }
     }
