@@ -9,7 +9,7 @@ use crate::{
     settings::{BatchFit, BatchSettings, Judge},
 };
 use anyhow::bail;
-use lookalike::brdf::{self, Channels, Model};
+use lookalike::brdf::{Channels, Model};
 use lookalike_coordinator::journal::{self, JOURNAL_FILE, RunIdentity};
 use serde_json::Value;
 use std::{fs, path::Path};
@@ -115,7 +115,7 @@ fn complete_fit(out: &OutFolder, fit: &BatchFit, files: &[(String, String)]) -> 
         Judge::Image => cssim,
         Judge::Object => cssim_object,
     };
-    let model = brdf::model(fit.method.model.as_str()).ok()?;
+    let model = fit.method.model.model();
     let scores = Scores {
         cssim,
         cssim_object,
@@ -151,7 +151,7 @@ mod tests {
 
     #[test]
     fn parameters_come_back_from_their_names() {
-        let model = brdf::model("cook-torrance").unwrap();
+        let model = lookalike::brdf::model("cook-torrance").unwrap();
         let vector: Vec<f64> = (1..=8).map(f64::from).collect();
         let mut json = parameters_json(model, &vector);
         assert_eq!(flat(model, &json), Some(vector));

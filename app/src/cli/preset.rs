@@ -1,12 +1,16 @@
 //! `--preset`: named bundles of flags.
 
 use crate::settings::{CompressAtZero, Preset, Start};
+use lookalike::brdf::PAPER_MODEL;
 use std::ffi::OsString;
 
 /// The flags a preset stands for. They precede all others, so that a flag given explicitly wins.
 pub(crate) fn flags(preset: Preset) -> Vec<OsString> {
     match preset {
-        Preset::Paper => PAPER.iter().map(Into::into).collect(),
+        Preset::Paper => {
+            let model = format!("--model={}", PAPER_MODEL.name()).into();
+            std::iter::once(model).chain(PAPER.iter().map(Into::into)).collect()
+        }
     }
 }
 
@@ -26,9 +30,8 @@ pub(crate) fn compress_at_zero(preset: Option<Preset>) -> CompressAtZero {
     }
 }
 
-/// \[BP20b\] section 3, with the start of design section 10 and one pixel subset.
-const PAPER: [&str; 8] = [
-    "--model=cook-torrance",
+/// \[BP20b\] section 3 but for the model, with the start of design section 10 and one pixel subset.
+const PAPER: [&str; 7] = [
     "--gammas=1:3:0.1",
     "--samples=256",
     "--sampling=importance",

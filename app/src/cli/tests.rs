@@ -6,6 +6,7 @@ use crate::settings::{
     Start, Workers,
 };
 use clap::CommandFactory;
+use lookalike::brdf::DEFAULT_MODEL;
 use lookalike_coordinator::policy::{Policy, Speculation};
 use std::{ffi::OsString, fs, path::PathBuf, time::Duration};
 
@@ -72,7 +73,10 @@ fn a_plain_fit_has_the_defaults_of_the_design() {
     assert_eq!(settings.view.camera, CameraSpec::Orthographic);
     assert_eq!(settings.display_exposure, DisplayExposure::Auto);
     let method = settings.method;
-    assert_eq!((method.model.as_str(), method.gammas, method.samples), ("ggx", Gammas::default(), Samples::default()));
+    assert_eq!(
+        (method.model.as_str(), method.gammas, method.samples),
+        (DEFAULT_MODEL.name(), Gammas::default(), Samples::default())
+    );
     assert_eq!((method.search, method.polish, method.seed), (SearchKind::LeastSquares, true, 0));
     assert_eq!((method.start, method.compress_at_zero), (Start::Scan, CompressAtZero::Tangent));
     assert_eq!(settings.cluster.workers, Workers::PerCore);

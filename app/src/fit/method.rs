@@ -3,7 +3,6 @@
 use crate::settings::{self, MethodSettings};
 use anyhow::Context;
 use lookalike::{
-    brdf,
     fit::{Compress, Integration, JudgedBy, Method, SearchKind, Start},
     render::subset::{SampleCount, Sampling},
 };
@@ -11,7 +10,7 @@ use lookalike::{
 /// The method that the settings ask for.
 pub(crate) fn method(settings: &MethodSettings) -> anyhow::Result<Method> {
     Ok(Method {
-        model: brdf::model(settings.model.as_str())?,
+        model: settings.model.model(),
         gammas: settings.gammas.values(),
         samples: match settings.samples {
             settings::Samples::Count(n) => {

@@ -10,12 +10,12 @@ use std::num::NonZeroUsize;
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Method")]
 pub(crate) struct MethodArgs {
-    /// A bundle of settings; flags given as well win over it. paper: cook-torrance, 256 samples, pattern search from the
-    /// paper's one start, 21 gammas, no polish
+    /// A bundle of settings; flags given as well win over it. paper: the papers' model, 256 samples, pattern search from the
+    /// papers' one start, 21 gammas, no polish
     #[arg(long, value_name = "PRESET", value_enum)]
     pub(crate) preset: Option<Preset>,
-    /// BRDF model: ggx, ggx-f90, cook-torrance, ward, blinn-phong, ashikhmin-shirley, disney
-    #[arg(long, value_name = "NAME", default_value_t)]
+    /// BRDF model
+    #[arg(long, value_name = "NAME", value_enum, default_value_t)]
     model: ModelName,
     /// Exponents of the cost that are tried: START:STOP:STEP, or one number
     #[arg(long, value_name = "A:B:STEP", default_value_t, allow_negative_numbers = true)]
