@@ -32,7 +32,11 @@ impl LinearModel for GgxF90 {
     const PARAMETERS: &'static [Parameter] = &[
         Parameter::colour("kd", "diffuse albedo, linear Rec. 709"),
         Parameter::colour("f0", "specular reflectance at normal incidence, linear Rec. 709"),
-        Parameter::scalar("f90", "specular reflectance at grazing incidence, of all colours", Role::Linear),
+        // 1 is a smooth interface.
+        Parameter {
+            upper_is_kind: true,
+            ..Parameter::scalar("f90", "specular reflectance at grazing incidence, of all colours", Role::Linear)
+        },
         Parameter::width("alpha", "microfacet width of GGX; an artist's roughness is its square root"),
     ];
     const LOBES: &'static [BasisLobe] =

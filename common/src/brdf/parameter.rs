@@ -35,8 +35,6 @@ pub enum Role {
     /// It multiplies other parameters, or is the width of a lobe other than the main one. The scan tries these values and solves for the
     /// linear parameters.
     Scanned(&'static [f64]),
-    /// Like `Scanned`, for a mixture of two kinds of surface: 0 and 1 are the pure kinds, not limits of the model.
-    Blend(&'static [f64]),
 }
 
 /// The coordinate in which a search moves.
@@ -65,6 +63,8 @@ pub struct Parameter {
     pub start: f64,
     /// How a search treats it.
     pub role: Role,
+    /// Whether the upper bound is a kind of surface, such as a metal or a smooth interface, and not a limit of the model.
+    pub upper_is_kind: bool,
     /// The coordinate of pattern search. Least squares always uses the logarithm of the main lobe's width.
     pub scale: Scale,
 }
@@ -80,7 +80,13 @@ impl Parameter {
     #[must_use]
     pub const fn scalar(name: &'static str, meaning: &'static str, role: Role) -> Self {
         let (channels, scale) = (Channels::Scalar, Scale::Linear);
-        Self { name, meaning, channels, lower: 0.0, upper: 1.0, start: 0.3, role, scale }
+        Self { name, meaning, channels, lower: 0.0, upper: 1.0, start: 0.3, role, upper_is_kind: false, scale }
+    }
+
+    /// The share of one kind of surface in a mixture of two: the scan tries these values.
+    #[must_use]
+    pub const fn blend(name: &'static str, meaning: &'static str, values: &'static [f64]) -> Self {
+        Self { upper_is_kind: true, ..Self::scalar(name, meaning, Role::Scanned(values)) }
     }
 
     /// The width of the main lobe, from 0.005 to 1.

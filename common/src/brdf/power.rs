@@ -12,6 +12,7 @@ pub(super) const EXPONENT: Parameter = Parameter {
     upper: 1e5,
     start: 20.0,
     role: Role::Width,
+    upper_is_kind: false,
     scale: Scale::Logarithmic,
 };
 

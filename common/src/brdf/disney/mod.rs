@@ -64,8 +64,8 @@ const COAT_TERM: usize = 9;
 
 static PARAMETERS: [Parameter; 8] = [
     Parameter::colour("base_color", "colour of the surface, linear Rec. 709: diffuse, and specular of a metal"),
-    Parameter::scalar("subsurface", "from diffuse to light that travels below the surface", Role::Blend(&[0.0, 1.0])),
-    Parameter::scalar("metallic", "from a dielectric to a metal", Role::Blend(&[0.0, 0.5, 1.0])),
+    Parameter::blend("subsurface", "from the diffuse lobe to the subsurface lobe", &[0.0, 1.0]),
+    Parameter::blend("metallic", "from a dielectric to a metal", &[0.0, 0.5, 1.0]),
     Parameter::scalar(
         "specular",
         "of a dielectric: 0.08 times this is its reflectance at normal incidence",
