@@ -91,6 +91,7 @@ impl<M: LinearModel> Model for M {
     }
 
     fn weights(&self, p: &[f64], weights: &mut [Rgb]) {
+        debug_assert_eq!(weights.len(), M::WEIGHTS.len(), "{} has a weight for every term", M::NAME);
         weights.iter_mut().zip(M::WEIGHTS).for_each(|(weight, of)| *weight = of.at(p));
     }
 
