@@ -15,7 +15,7 @@ use anyhow::Context;
 use encode::{Format, Subject};
 use indicatif::{ProgressBar, ProgressStyle};
 use lookalike::{
-    brdf::{self, Material, Reflectance, flat_names},
+    brdf::{Material, Reflectance, flat_names},
     light::LightDistribution,
     math::Rgb,
     render::image::{Noise, Rendering, Shot},
@@ -70,7 +70,7 @@ impl LoadedMaterial {
                 Ok(Self { reflectance: Box::new(table), model: "merl", parameters: None, file: Some(source) })
             }
             settings::Material::Analytic { model, params } => {
-                let model = brdf::model(model.as_str())?;
+                let model = model.model();
                 let flat = flat_parameters(model, params).context("--params")?;
                 let pairs = flat_names(model.parameters()).into_iter().zip(&flat);
                 let parameters = pairs.map(|(name, value)| format!("{name}={value}")).collect::<Vec<_>>().join(",");
