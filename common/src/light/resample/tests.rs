@@ -203,10 +203,8 @@ fn energy_is_kept_on_real_maps() {
             println!("skipped: {name}.hdr is not in {root} (set LOOKALIKE_DATA)");
             continue;
         };
-        let decoded = image::load_from_memory(&bytes).unwrap().into_rgb32f();
-        let (width, height) = (decoded.width() as usize, decoded.height() as usize);
-        let image = Image::from_pixels(width, height, decoded.pixels().map(|p| p.0).collect());
-        assert_eq!(Mapping::recognise(width, height), Ok(Mapping::Cross));
+        let image = crate::image::decode(name, &bytes).unwrap().image;
+        assert_eq!(Mapping::recognise(image.width(), image.height()), Ok(Mapping::Cross));
         let clock = std::time::Instant::now();
         let error = energy_error(&image, Mapping::Cross);
         println!("{name}: energy off by {:.4} %, {:?}", 100.0 * error, clock.elapsed());
