@@ -199,6 +199,6 @@ fn a_photo_with_a_few_faults_is_used_without_them() {
     assert_eq!(loaded.capture.status()[12 * 24 + 12], PixelStatus::NotFinite);
     assert_eq!((loaded.circle_source, loaded.mask.is_none()), (Some(CircleSource::Inscribed), true));
     let said = |phrase: &str| loaded.warnings.iter().filter(|text| text.contains(phrase)).count();
-    assert_eq!((said("1 pixels of the object are not finite"), said("not black around the object")), (1, 1));
+    assert_eq!((said("1 pixel of the object is not finite"), said("not black around the object")), (1, 1));
     assert_eq!(loaded.photo.blake3, lookalike::image::content_hash(&photo).to_hex().to_string());
 }
