@@ -20,7 +20,8 @@ pub struct Decoded {
     pub encoding: Encoding,
     /// The file's format.
     pub format: Format,
-    /// Text that the file carries, in the file's order (OpenEXR: by key). Keys as in [`super::metadata`].
+    /// Text that the file carries, in the file's order (OpenEXR: by key; PNG: Latin-1 before UTF-8). Keys as in
+    /// [`super::metadata`].
     pub metadata: Vec<(String, String)>,
     /// What the reader assumed, ignored or converted. Sentences for people.
     pub warnings: Vec<String>,

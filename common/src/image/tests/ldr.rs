@@ -21,6 +21,10 @@ pub(super) fn jpeg_of(data: &[u8], width: u32, height: u32, colour: Colour) -> V
 
 /// `bytes` with a chunk after the header chunk.
 fn with_chunk(bytes: &[u8], kind: &[u8; 4], data: &[u8]) -> Vec<u8> {
+    with_chunk_at(bytes, 33, kind, data)
+}
+
+fn with_chunk_at(bytes: &[u8], at: usize, kind: &[u8; 4], data: &[u8]) -> Vec<u8> {
     let body = [&kind[..], data].concat();
     let mut crc = u32::MAX;
     for byte in &body {
@@ -30,7 +34,7 @@ fn with_chunk(bytes: &[u8], kind: &[u8; 4], data: &[u8]) -> Vec<u8> {
         }
     }
     let length = u32::try_from(data.len()).unwrap().to_be_bytes();
-    [&bytes[..33], &length, &body, &(!crc).to_be_bytes(), &bytes[33..]].concat()
+    [&bytes[..at], &length, &body, &(!crc).to_be_bytes(), &bytes[at..]].concat()
 }
 
 fn linear(code: u8) -> f32 {
@@ -158,7 +162,20 @@ fn written_codes_are_the_nearest_and_metadata_comes_back() {
 fn what_png_cannot_hold_is_refused() {
     let nan = Image::from_pixels(2, 1, vec![[0.0; 3], [0.0, f32::NAN, 0.0]]);
     assert!(png::write(&nan, &[]).unwrap_err().to_string().contains("column 1, row 0"));
-    let image = Image::new(1, 1);
-    assert!(png::write(&image, &[(String::new(), String::new())]).is_err());
+    let with_text = |key: &str, value: &str| png::write(&Image::new(1, 1), &[(key.to_owned(), value.to_owned())]);
+    for (key, value) in [("", "x"), (" key", "x"), ("\u{e9}", "x"), (&"k".repeat(80), "x"), ("key", "a\0b")] {
+        assert!(with_text(key, value).is_err(), "{key:?} {value:?}");
+    }
+    assert!(with_text("key", "").is_ok());
     assert!(png::write(&Image::new(0, 1), &[]).is_err());
+}
+
+#[test]
+fn text_after_the_pixels_is_read_and_compressed_text_is_not() {
+    let plain = png_of(&[10; 3], 1, 1, Colour::Rgb8);
+    let end = plain.len() - 12;
+    let bytes = with_chunk_at(&plain, end, b"tEXt", b"Comment\0after the pixels");
+    let bytes = with_chunk_at(&bytes, end, b"iTXt", b"note\0\x01\0\0\0not a zlib stream");
+    let text = ("comments".to_owned(), "after the pixels".to_owned());
+    assert_eq!(decode("a.png", &bytes).unwrap().metadata, [text]);
 }
