@@ -8,6 +8,7 @@
 //! Whatever the file holds becomes linear Rec. 709, top left first. What could not be taken over exactly is said in
 //! [`Decoded::warnings`]; what cannot be taken over at all is an [`ImageError`]. Nothing is guessed in silence.
 
+mod decode;
 mod decoded;
 mod error;
 mod hash;
@@ -15,6 +16,7 @@ mod icc;
 mod jpeg;
 mod ldr;
 mod mask;
+mod mask_channels;
 pub mod metadata;
 mod normals;
 pub mod openexr;
@@ -28,11 +30,12 @@ pub mod srgb;
 #[cfg(test)]
 mod tests;
 
+pub use decode::{decode, decode_mask, decode_normals};
 pub use decoded::{Decoded, Encoding, Format};
 pub use error::ImageError;
 pub use hash::content_hash;
 pub use plane::Plane;
-pub use source::{Limits, Source, decode, decode_mask, decode_normals};
+pub use source::{Limits, Source};
 
 /// A colour image: `height x width x 3`, row-major, top left first, linear Rec. 709.
 #[derive(Debug, Clone, PartialEq)]

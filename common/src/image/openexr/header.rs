@@ -3,7 +3,7 @@
 
 use std::ops::Range;
 
-use super::FORMAT;
+use crate::image::decoded::Format;
 use crate::image::error::ImageError;
 use crate::image::source::Source;
 
@@ -128,6 +128,9 @@ fn u32_at(bytes: &[u8], at: usize) -> Option<u32> {
 fn i32_at(bytes: &[u8], at: usize) -> Option<i32> {
     Some(i32::from_le_bytes(*bytes.get(at..)?.first_chunk()?))
 }
+
+/// What errors of this folder name.
+pub(super) const FORMAT: Format = Format::OpenExr;
 
 /// Flags of the version field.
 const DEEP: u32 = 1 << 11;

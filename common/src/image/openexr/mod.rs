@@ -19,12 +19,13 @@ mod write;
 pub use write::write;
 
 use channels::{Layer, Wanted};
+use header::FORMAT;
 use raster::Raster;
 
 use super::Image;
-use super::decoded::{Decoded, Encoding, Format};
+use super::decoded::{Decoded, Encoding};
 use super::error::ImageError;
-use super::mask::Channels;
+use super::mask_channels::Channels;
 use super::primaries::{Primaries, convert};
 use super::source::Source;
 use crate::math::Mat3;
@@ -82,5 +83,3 @@ impl Raster {
         }
     }
 }
-
-const FORMAT: Format = Format::OpenExr;

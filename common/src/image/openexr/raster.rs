@@ -13,7 +13,8 @@ use exr::prelude::f16;
 use rayon::prelude::*;
 
 use super::channels::Layer;
-use super::{FORMAT, block, header};
+use super::header::FORMAT;
+use super::{block, header};
 use crate::image::error::ImageError;
 use crate::image::source::Source;
 

@@ -9,7 +9,7 @@ use exr::prelude::{
     AnyChannel, AnyChannels, Blocks, Compression, Encoding, FlatSamples, Image as ExrImage, Layer, WritableImage,
 };
 
-use super::{FORMAT, header};
+use super::header::{self, FORMAT};
 use crate::image::error::ImageError;
 use crate::image::{Image, metadata as keys};
 
