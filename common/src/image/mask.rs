@@ -1,5 +1,5 @@
-//! Coverage masks: 1 on the object, 0 outside, between on the silhouette. Values are linear as stored: a PNG's code
-//! divided by its maximum, without sRGB decoding.
+//! Coverage masks: 1 on the object, 0 outside, in between on the silhouette. Values are linear as stored: the code of a
+//! PNG or JPEG divided by its maximum, without sRGB decoding.
 
 use super::decoded::Format;
 use super::error::ImageError;

@@ -1,9 +1,9 @@
-//! The bytes of one file, the limits it has to keep, and the errors that every reader raises.
+//! The bytes of one file, its size limits, and the errors common to all readers.
 
 use super::decoded::Format;
 use super::error::ImageError;
 
-/// The bytes of one file, its name for errors, and the limits it has to keep.
+/// The bytes of one file, its name for errors, and its size limits.
 #[derive(Debug, Clone, Copy)]
 pub struct Source<'a> {
     pub(super) name: &'a str,
@@ -11,7 +11,7 @@ pub struct Source<'a> {
     pub(super) limits: Limits,
 }
 
-/// Bounds that are checked before anything is allocated.
+/// Size limits, checked before allocation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Limits {
     /// Pixels per side.
@@ -28,13 +28,13 @@ impl Default for Limits {
 }
 
 impl<'a> Source<'a> {
-    /// The file `name` with content `bytes`, under the default limits.
+    /// The file `name` with content `bytes`, with the default limits.
     #[must_use]
     pub fn new(name: &'a str, bytes: &'a [u8]) -> Self {
         Self { name, bytes, limits: Limits::default() }
     }
 
-    /// The same under other limits.
+    /// The same source with other limits.
     #[must_use]
     pub fn with_limits(self, limits: Limits) -> Self {
         Self { limits, ..self }
@@ -46,7 +46,7 @@ impl<'a> Source<'a> {
             .ok_or_else(|| ImageError::UnknownFormat { name: self.name.to_owned(), found: describe(self.bytes) })
     }
 
-    /// Checks the size that a header claims and returns it.
+    /// Checks the size in a header and returns it.
     pub(super) fn check_size(&self, width: u64, height: u64, format: Format) -> Result<(usize, usize), ImageError> {
         if width == 0 || height == 0 {
             return Err(self.malformed(format, format!("expected at least one pixel, found {width} x {height}")));
@@ -61,12 +61,12 @@ impl<'a> Source<'a> {
         Ok((columns, rows))
     }
 
-    /// The file breaks the rules of `format`.
+    /// The error for a file that violates `format`.
     pub(super) fn malformed(&self, format: Format, detail: impl Into<String>) -> ImageError {
         ImageError::Malformed { name: self.name.to_owned(), format, detail: detail.into() }
     }
 
-    /// The file uses `feature`, which is not read.
+    /// The error for a file with a `feature` that is not supported.
     pub(super) fn unsupported(&self, format: Format, feature: impl Into<String>, advice: &str) -> ImageError {
         ImageError::Unsupported {
             name: self.name.to_owned(),
@@ -77,7 +77,7 @@ impl<'a> Source<'a> {
     }
 }
 
-/// What a file of an unknown format looks like.
+/// A description of a file of unknown format.
 fn describe(bytes: &[u8]) -> String {
     match bytes {
         [] => "an empty file".to_owned(),

@@ -1,6 +1,7 @@
-//! PNG (W3C, *Portable Network Graphics*, third edition): 8 or 16 bits (fewer are widened), grey, colour or palette, with
-//! or without alpha (not premultiplied). The codes are taken as sRGB; what the file says otherwise (`cICP`, `iCCP`,
-//! `sRGB`, `gAMA`, `cHRM`, in that order of weight) becomes a warning. Of an animation, the default image is read.
+//! PNG (W3C, *Portable Network Graphics*, third edition): 8 or 16 bits (fewer are widened), grey, colour or palette,
+//! with or without alpha (not premultiplied). The codes are decoded as sRGB. A warning is given if the file declares
+//! other colours by `cICP`, `iCCP`, `sRGB`, `gAMA` or `cHRM`, in this order of precedence. Of an animation, the default
+//! image is read.
 
 mod keyword;
 mod write;
@@ -44,7 +45,7 @@ fn read_info(source: &Source<'_>) -> Result<Info<'static>, ImageError> {
     let fault = |error: png::DecodingError| source.malformed(FORMAT, error.to_string());
     let limits = png::Limits { bytes: MAX_ANCILLARY_BYTES };
     let mut decoder = png::Decoder::new_with_limits(Cursor::new(source.bytes), limits);
-    // The decoder of the pixels checks them.
+    // The decoder of the pixels checks the checksums.
     decoder.ignore_checksums(true);
     let (width, height) = decoder.read_header_info().map_err(fault)?.size();
     source.check_size(width.into(), height.into(), FORMAT)?;
@@ -53,7 +54,7 @@ fn read_info(source: &Source<'_>) -> Result<Info<'static>, ImageError> {
     Ok(reader.info().clone())
 }
 
-/// What, if anything, in the file contradicts sRGB; the chunk of most weight decides.
+/// The contradiction to sRGB in the file's colour chunks, in words. The chunk of highest precedence decides.
 fn contradiction(info: &Info<'_>) -> Option<String> {
     if let Some(cicp) = info.coding_independent_code_points {
         let code_points = [cicp.color_primaries, cicp.transfer_function, cicp.matrix_coefficients];
@@ -68,7 +69,7 @@ fn contradiction(info: &Info<'_>) -> Option<String> {
     if let Some(gamma) = info.gama_chunk.map(ScaledFloat::into_scaled)
         && gamma.abs_diff(SRGB_GAMMA) > 500
     {
-        return Some(format!("its gAMA chunk says {gamma} / 100000 instead of {SRGB_GAMMA}"));
+        return Some(format!("its gAMA chunk says {gamma} / 100000, expected {SRGB_GAMMA} / 100000"));
     }
     let primaries = info.chrm_chunk.map(|c| [c.white, c.red, c.green, c.blue])?;
     let found = primaries.into_iter().flat_map(|(x, y)| [x.into_scaled(), y.into_scaled()]);
@@ -90,11 +91,11 @@ const FORMAT: Format = Format::Png;
 /// Primaries, transfer function and matrix of sRGB (ITU-T H.273).
 const SRGB_CODE_POINTS: [u8; 3] = [1, 13, 0];
 
-/// 1/2.2, which is how `gAMA` approximates sRGB.
+/// 1/2.2 in units of 1e-5, the `gAMA` value that approximates sRGB.
 const SRGB_GAMMA: u32 = 45455;
 
 /// White, red, green, blue of sRGB in units of 1e-5.
 const SRGB_PRIMARIES: [u32; 8] = [31270, 32900, 64000, 33000, 30000, 60000, 15000, 6000];
 
-/// What the decoder may allocate for profiles and texts (which may be compressed) and rows.
+/// The limit of what the decoders may allocate for profiles and texts (which may be compressed) and rows.
 const MAX_ANCILLARY_BYTES: usize = 64 << 20;

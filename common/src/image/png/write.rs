@@ -1,4 +1,4 @@
-//! Writes display images: 8-bit sRGB with the metadata as text.
+//! Writes display images: 8-bit sRGB with metadata as text.
 
 use png::text_metadata::{ITXtChunk, TEXtChunk};
 use png::{BitDepth, ColorType, Compression, Encoder, Filter, SrgbRenderingIntent};
@@ -7,12 +7,13 @@ use super::keyword;
 use crate::image::error::ImageError;
 use crate::image::{Format, Image, srgb};
 
-/// The bytes of an 8-bit PNG of `image`: values clamped to [0, 1], sRGB-encoded and rounded to the nearest code (apply the
-/// display exposure before). `metadata` becomes text chunks, in order; keys as in [`crate::image::metadata`]. The same
-/// input gives the same bytes.
+/// The bytes of an 8-bit PNG of `image`: values are clamped to [0, 1], sRGB-encoded and rounded to the nearest code.
+/// The caller applies the display exposure. `metadata` becomes text chunks, in order; keys as in
+/// [`crate::image::metadata`]. The same input gives the same bytes.
 ///
 /// # Errors
-/// If a value is NaN, a side is 0 or above 2^31 - 1, or a key is no PNG keyword (1 to 79 printable ASCII characters).
+/// If a value is NaN, a side is 0 or above 2^31 - 1, or a key is not a PNG keyword (1 to 79 printable ASCII
+/// characters).
 pub fn write(image: &Image, metadata: &[(String, String)]) -> Result<Vec<u8>, ImageError> {
     if let Some(at) = image.pixels().iter().position(|pixel| pixel.iter().any(|value| value.is_nan())) {
         let (column, row) = (at % image.width(), at / image.width());
