@@ -13,8 +13,8 @@ fn fits_of_a_batch_are_the_fits_alone_wherever_they_are_judged() {
          [[fit]]\nname = 'again'\nphoto = 'photo.exr'\nenv = 'map.exr'\njudge = 'object'\n"
     );
     let folder = folder(&manifest);
-    batch(&folder, "here", "--workers 2").done();
-    batch(&folder, "there", "--workers 3 --stage-two workers").done();
+    batch(&folder, "here", "--workers 1").done();
+    batch(&folder, "there", "--workers 2 --stage-two workers").done();
     let alone = [
         ("photo-map-ggx", "photo.exr", ""),
         ("photo-map-cook-torrance", "photo.exr", "--model cook-torrance"),

@@ -5,7 +5,7 @@ use std::path::Path;
 use std::process::Command;
 
 use lookalike_tests::journal::{JournalView, damage_an_output, tear};
-use lookalike_tests::process::{Process, signal};
+use lookalike_tests::process::{Process, kill_if_alive};
 
 use super::random::FILES;
 use crate::fit::scene::{fit, folder_of_size, without_timing};
@@ -27,7 +27,7 @@ fn kill_all_after(folder: &Path, out: &str, finished: usize) {
     });
     moment.unwrap_or_else(|| panic!("the fit ended after {count} nodes"));
     process.kill();
-    workers.into_iter().for_each(|worker| signal(worker, "KILL"));
+    workers.into_iter().for_each(kill_if_alive);
 }
 
 fn copy(from: &Path, to: &Path) {

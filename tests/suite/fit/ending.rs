@@ -15,14 +15,14 @@ fn missed_max_cssim_is_exit_code_one_with_all_results() {
     assert_eq!(answer.code, Some(1), "{}", answer.stderr);
     assert!(answer.stderr.contains("more than --max-cssim 0"), "{}", answer.stderr);
     assert!(answer.stdout.contains("polished") && folder.path().join("out/fit.json").exists());
-    fit(folder.path(), "met", &format!("{QUICK} --max-cssim 1")).done();
+    fit(folder.path(), "met", &format!("{QUICK} --gammas 1 --polish off --max-cssim 1")).done();
 }
 
 #[test]
 fn stream_says_finished_when_all_is_written() {
     let folder = folder();
     let mut command = Command::new(env!("CARGO_BIN_EXE_lookalike-under-test"));
-    let line = format!("fit photo.exr --env map.exr --out out {QUICK} --progress json");
+    let line = format!("fit photo.exr --env map.exr --out out {QUICK} --polish off --progress json");
     let process = Process::start(command.args(line.split_whitespace()).current_dir(folder.path()));
     let finished = "SELECT count(*) FROM run WHERE outputs IS NOT NULL";
     let mut is_written = None;
@@ -40,11 +40,12 @@ fn results_that_cannot_be_written_are_code_three_and_come_with_resume() {
     let folder = folder();
     let blocked = folder.path().join("out/match.exr.partial");
     fs::create_dir_all(&blocked).unwrap();
-    let answer = fit(folder.path(), "out", QUICK);
+    let flags = format!("{QUICK} --polish off");
+    let answer = fit(folder.path(), "out", &flags);
     assert_eq!(answer.code, Some(3), "{}", answer.stderr);
     assert!(answer.stderr.contains("cannot write out/match.exr: is the disk full?"), "{}", answer.stderr);
     fs::remove_dir(blocked).unwrap();
-    fit(folder.path(), "out", &format!("{QUICK} --resume")).done();
+    fit(folder.path(), "out", &format!("{flags} --resume")).done();
     assert!(folder.path().join("out/fit.json").exists());
 }
 
@@ -105,8 +106,9 @@ fn interrupt_ends_every_process_with_code_130() {
 fn local_workers_log_as_the_coordinator_is_told_to() {
     let folder = folder();
     let joined = "INFO lookalike_worker::session: joined";
-    let quiet = fit(folder.path(), "quiet", QUICK).done();
+    let flags = format!("{QUICK} --gammas 1 --polish off");
+    let quiet = fit(folder.path(), "quiet", &flags).done();
     assert!(!quiet.stderr.contains(joined), "{}", quiet.stderr);
-    let loud = fit(folder.path(), "loud", &format!("{QUICK} --log lookalike_worker=info")).done();
+    let loud = fit(folder.path(), "loud", &format!("{flags} --log lookalike_worker=info")).done();
     assert!(loud.stderr.contains(joined), "{}", loud.stderr);
 }

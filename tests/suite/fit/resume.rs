@@ -1,6 +1,6 @@
 //! A fit whose coordinator is killed, wherever, and that is gone on with: the same bits, and nothing done twice.
 
-use super::scene::{QUICK, fit, folder, without_timing};
+use super::scene::{Finished, QUICK, QUICK_FIT, fit, folder, without_timing};
 use crate::program::Answer;
 use lookalike_coordinator::journal::RunLock;
 use lookalike_tests::{journal::JournalView, process::Process};
@@ -9,6 +9,12 @@ use std::{fs, path::Path, process::Command};
 
 /// Four shards, the coarse table, six searches, one full table, judging, exploration, polish, pictures: at least 16 nodes.
 const FLAGS: &str = "--samples 128 --gammas 1:2:0.2 --seed 5 --workers 2";
+
+/// The fit of [`FLAGS`] that nothing disturbed.
+static WHOLE: Finished = Finished::new(FLAGS);
+
+/// After how many finished nodes a fit is killed; 0 is when the first worker joins.
+const KILLS: &[usize] = if cfg!(feature = "slow") { &[0, 1, 4, 7, 11, 13] } else { &[1, 11] };
 
 /// Starts a fit and kills it with SIGKILL as soon as so many nodes are told to be finished; 0 is when the first worker joins.
 fn kill_after(folder: &Path, out: &str, finished: usize) {
@@ -39,8 +45,8 @@ fn status(folder: &Path, out: &str) -> Value {
 fn killed_anywhere_and_resumed_a_fit_gives_the_same_bits_and_does_nothing_twice() {
     let folder = folder();
     let out = |name: &str| folder.path().join(name);
-    fit(folder.path(), "whole", &format!("{FLAGS} --progress none")).done();
-    for finished in [0, 1, 4, 7, 11, 13] {
+    WHOLE.copy_to(&folder.path().join("whole"));
+    for &finished in KILLS {
         let name = finished.to_string();
         kill_after(folder.path(), &name, finished);
         let stopped = status(folder.path(), &name);
@@ -66,7 +72,7 @@ fn killed_anywhere_and_resumed_a_fit_gives_the_same_bits_and_does_nothing_twice(
 #[test]
 fn fit_that_is_killed_time_and_again_still_ends() {
     let folder = folder();
-    fit(folder.path(), "whole", &format!("{FLAGS} --progress none")).done();
+    WHOLE.copy_to(&folder.path().join("whole"));
     for _ in 0..3 {
         kill_after(folder.path(), "out", 2);
     }
@@ -81,10 +87,8 @@ fn fit_that_is_killed_time_and_again_still_ends() {
 
 #[test]
 fn finished_fit_is_verified_and_not_done_again() {
-    let folder = folder();
+    let folder = QUICK_FIT.copy();
     let out = folder.path().join("out");
-    // Without a run in the folder, --resume begins one.
-    fit(folder.path(), "out", &format!("{QUICK} --resume")).done();
     let before = fs::read(out.join("fit.json")).unwrap();
     let again = fit(folder.path(), "out", &format!("{QUICK} --resume --workers 2")).done();
     assert!(
@@ -109,14 +113,13 @@ fn finished_fit_is_verified_and_not_done_again() {
 
 #[test]
 fn run_with_other_inputs_or_settings_is_refused_with_what_differs() {
-    let folder = folder();
+    let folder = QUICK_FIT.copy();
     let refused =
         |flags: &str, phrases: &[&str]| fit(folder.path(), "out", &format!("{QUICK} {flags}")).refused(phrases);
     kill_after(folder.path(), "killed", 2);
     fit(folder.path(), "killed", QUICK)
         .refused(&["killed already holds a run that is not finished", "go on with it with --resume"]);
     resume(folder.path(), "killed").done();
-    fit(folder.path(), "out", QUICK).done();
     refused("", &["out already holds a finished fit", "choose another --out"]);
     refused("--resume --seed 3", &["--seed is 0 there and 3 here", "resume with those of that run"]);
     refused("--resume --gammas 1:2:0.25", &["--gammas is 1:2:0.5 there and 1:2:0.25 here"]);
@@ -144,7 +147,7 @@ fn second_coordinator_in_one_folder_is_refused_and_told_who_is_there() {
         fit(folder.path(), "out", &flags).refused(&["another coordinator is at work in out", &who]);
     }
     drop(lock);
-    fit(folder.path(), "out", QUICK).done();
+    fit(folder.path(), "out", &format!("{QUICK} --gammas 1 --polish off")).done();
 }
 
 #[test]
@@ -192,7 +195,7 @@ fn full_disk_ends_the_run_by_name_and_costs_nothing_that_was_acknowledged() {
         println!("skipped: cannot mount a small file system here (needs root)");
         return;
     };
-    fit(folder.path(), "whole", &format!("{FLAGS} --progress none")).done();
+    WHOLE.copy_to(&folder.path().join("whole"));
     let full = resume(folder.path(), "small/out");
     assert_eq!(full.code, Some(3), "{}", full.stderr);
     for phrase in ["cannot write the journal small/out/run.sqlite: the disk is full", "go on with --resume"] {
