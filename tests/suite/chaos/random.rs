@@ -19,7 +19,7 @@ const FLAGS: &str = "--samples 128 --gammas 1:3:0.2 --seed 5";
 pub(super) const FILES: [&str; 5] = ["match.exr", "match.png", "reference.png", "difference.png", "candidates.csv"];
 
 /// Columns and rows of the photo.
-const SIZE: usize = 64;
+const SIZE: usize = if cfg!(feature = "slow") { 64 } else { 32 };
 
 fn setting(name: &str, otherwise: u64) -> u64 {
     let text = std::env::var(name).ok();

@@ -14,7 +14,7 @@ use std::{
 use tempfile::TempDir;
 
 /// Several shards of the subset's table, so that something can die between them.
-const FLAGS: &str = "--samples 128 --gammas 1:2:0.5 --seed 5";
+const FLAGS: &str = "--samples 128 --gammas 1:2:0.5 --seed 5 --polish off";
 
 /// The fit of this machine alone.
 static LOCAL: Finished = Finished::new(FLAGS);
@@ -125,7 +125,7 @@ fn folder_and_address_are_understood_in_all_their_spellings() {
     let taken = TcpListener::bind("127.0.0.1:0").unwrap();
     let port = taken.local_addr().unwrap().port();
     drop(taken);
-    let line = format!("fit photo.exr --env map.exr -o=run --progress json {FLAGS} --polish off");
+    let line = format!("fit photo.exr --env map.exr -o=run --progress json {FLAGS}");
     let (listen, advertise) = (format!("127.0.0.1:{port}"), format!("localhost:{port}"));
     let environment = [("LOOKALIKE_LISTEN", listen.as_str()), ("LOOKALIKE_ADVERTISE", advertise.as_str())];
     let (output, events) = watch(job(site.path(), &line, &environment), |_, _| ());

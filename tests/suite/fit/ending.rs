@@ -1,6 +1,6 @@
 //! How a fit ends when it does not end well: exit codes, messages, no process left behind.
 
-use super::scene::{QUICK, fit, folder};
+use super::scene::{QUICK, QUICK_POLISHED, fit, folder};
 use lookalike_tests::{
     journal::JournalView,
     process::{Process, signal},
@@ -11,18 +11,18 @@ use std::{fs, process::Command};
 #[test]
 fn missed_max_cssim_is_exit_code_one_with_all_results() {
     let folder = folder();
-    let answer = fit(folder.path(), "out", &format!("{QUICK} --max-cssim 0"));
+    let answer = fit(folder.path(), "out", &format!("{QUICK_POLISHED} --max-cssim 0"));
     assert_eq!(answer.code, Some(1), "{}", answer.stderr);
     assert!(answer.stderr.contains("more than --max-cssim 0"), "{}", answer.stderr);
     assert!(answer.stdout.contains("polished") && folder.path().join("out/fit.json").exists());
-    fit(folder.path(), "met", &format!("{QUICK} --gammas 1 --polish off --max-cssim 1")).done();
+    fit(folder.path(), "met", &format!("{QUICK} --gammas 1 --max-cssim 1")).done();
 }
 
 #[test]
 fn stream_says_finished_when_all_is_written() {
     let folder = folder();
     let mut command = Command::new(env!("CARGO_BIN_EXE_lookalike-under-test"));
-    let line = format!("fit photo.exr --env map.exr --out out {QUICK} --polish off --progress json");
+    let line = format!("fit photo.exr --env map.exr --out out {QUICK} --progress json");
     let process = Process::start(command.args(line.split_whitespace()).current_dir(folder.path()));
     let finished = "SELECT count(*) FROM run WHERE outputs IS NOT NULL";
     let mut is_written = None;
@@ -40,12 +40,11 @@ fn results_that_cannot_be_written_are_code_three_and_come_with_resume() {
     let folder = folder();
     let blocked = folder.path().join("out/match.exr.partial");
     fs::create_dir_all(&blocked).unwrap();
-    let flags = format!("{QUICK} --polish off");
-    let answer = fit(folder.path(), "out", &flags);
+    let answer = fit(folder.path(), "out", QUICK);
     assert_eq!(answer.code, Some(3), "{}", answer.stderr);
     assert!(answer.stderr.contains("cannot write out/match.exr: is the disk full?"), "{}", answer.stderr);
     fs::remove_dir(blocked).unwrap();
-    fit(folder.path(), "out", &format!("{flags} --resume")).done();
+    fit(folder.path(), "out", &format!("{QUICK} --resume")).done();
     assert!(folder.path().join("out/fit.json").exists());
 }
 
@@ -106,7 +105,7 @@ fn interrupt_ends_every_process_with_code_130() {
 fn local_workers_log_as_the_coordinator_is_told_to() {
     let folder = folder();
     let joined = "INFO lookalike_worker::session: joined";
-    let flags = format!("{QUICK} --gammas 1 --polish off");
+    let flags = format!("{QUICK} --gammas 1");
     let quiet = fit(folder.path(), "quiet", &flags).done();
     assert!(!quiet.stderr.contains(joined), "{}", quiet.stderr);
     let loud = fit(folder.path(), "loud", &format!("{flags} --log lookalike_worker=info")).done();
