@@ -8,16 +8,15 @@ use std::time::{Duration, Instant};
 
 use lookalike::protocol::Access;
 use lookalike_coordinator::events::RunEvent;
+use lookalike_coordinator::policy::{Policy, Speculation};
 use lookalike_coordinator::runner::{RunError, RunnerOptions, run};
 use lookalike_coordinator::spawn::WorkerCommand;
 use lookalike_coordinator::state::RunSummary;
 use tempfile::TempDir;
 
+use crate::PATIENCE;
 use crate::nodes::registry;
 use crate::plan::{Leaves, TestPlanner};
-
-/// Longer than anything a test waits for on a slow machine; a test that waits longer has failed.
-const PATIENCE: Duration = Duration::from_secs(60);
 
 /// How a run ended: the output of its last node and what it has cost, or its error.
 pub type Outcome = Result<(Option<Vec<u8>>, RunSummary), RunError>;
@@ -38,8 +37,16 @@ pub fn options(program: &str, workers: usize) -> RunnerOptions {
     RunnerOptions {
         worker_command: Some(command),
         handle_signals: false,
+        policy: policy(),
         ..RunnerOptions::new(workers, PathBuf::new())
     }
+}
+
+/// The default policy without speculation: a node at a gate runs for as long as the test holds it there, which is not slow.
+#[must_use]
+pub fn policy() -> Policy {
+    let defaults = Policy::default();
+    Policy { speculation: Speculation { factor: None, ..defaults.speculation }, ..defaults }
 }
 
 impl Cluster {

@@ -1,8 +1,14 @@
 //! The test's end of `gate` nodes.
 
-use std::io::{ErrorKind, Read, Write};
+use std::io::{self, ErrorKind, Read, Write};
 use std::net::{IpAddr, Ipv4Addr, SocketAddr, TcpListener, TcpStream};
+use std::os::fd::AsFd;
 use std::thread::JoinHandle;
+
+use nix::errno::Errno;
+use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
+
+use crate::PATIENCE;
 
 /// Where `gate` nodes wait.
 #[derive(Debug)]
@@ -59,15 +65,47 @@ impl Gate {
 
     /// Wait until the next `gate` node executes.
     ///
+    /// A process may be killed after it has connected and before it has sent its id. Its connection is skipped: the node is re-queued
+    /// and comes again.
+    ///
     /// # Panics
-    /// When it does not say which process it is in.
+    /// When none comes in time.
     #[must_use]
     pub fn next(&self) -> Waiting {
-        let (mut stream, _) = self.listener.accept().expect("a node at the gate");
-        let mut process = [0; 4];
-        stream.read_exact(&mut process).expect("the process id of the node");
-        Waiting { stream, process: u32::from_le_bytes(process) }
+        loop {
+            let mut stream = self.accept();
+            let mut process = [0; 4];
+            match stream.read_exact(&mut process) {
+                Ok(()) => return Waiting { stream, process: u32::from_le_bytes(process) },
+                Err(error) => assert!(is_end(&error), "no process id at the gate: {error}"),
+            }
+        }
     }
+
+    /// The next connection.
+    fn accept(&self) -> TcpStream {
+        let timeout = PollTimeout::try_from(PATIENCE).expect("less than a month");
+        loop {
+            let mut listener = [PollFd::new(self.listener.as_fd(), PollFlags::POLLIN)];
+            match poll(&mut listener, timeout) {
+                Ok(0) => panic!("no node has come to the gate in {PATIENCE:?}"),
+                Ok(_) => {
+                    let (stream, _) = self.listener.accept().expect("a connection");
+                    stream.set_read_timeout(Some(PATIENCE)).expect("a socket of ours");
+                    return stream;
+                }
+                Err(Errno::EINTR) => {}
+                Err(error) => panic!("cannot wait at the gate: {error}"),
+            }
+        }
+    }
+}
+
+/// Whether a read or write failed because the process at the other end has closed the connection or was killed.
+#[must_use]
+pub fn is_end(error: &io::Error) -> bool {
+    let ends = [ErrorKind::UnexpectedEof, ErrorKind::ConnectionReset, ErrorKind::BrokenPipe];
+    ends.contains(&error.kind())
 }
 
 /// Somebody who stands at the gate until told to go.
@@ -97,11 +135,13 @@ impl Keeper {
     /// Let nobody pass any more.
     ///
     /// # Panics
-    /// When the keeper has panicked.
+    /// With the keeper's own panic, if it has panicked.
     pub fn stop(self) {
-        let mut stream = TcpStream::connect(self.address).expect("a keeper");
-        stream.write_all(&LEAVE.to_le_bytes()).expect("a keeper");
-        self.thread.join().expect("a keeper that does not panic");
+        // Nobody listens if the keeper has panicked: its panic is the one to report.
+        let _ = TcpStream::connect(self.address).and_then(|mut stream| stream.write_all(&LEAVE.to_le_bytes()));
+        if let Err(panic) = self.thread.join() {
+            std::panic::resume_unwind(panic);
+        }
     }
 }
 
@@ -118,17 +158,25 @@ impl Waiting {
         self.process
     }
 
-    /// Let the node finish.
+    /// Let the node finish. If its process is gone, the node is re-queued and comes to the gate again.
     ///
     /// # Panics
-    /// When its process is gone.
+    /// When the socket fails for another reason.
     pub fn release(mut self) {
-        self.stream.write_all(&[1]).expect("a node that waits");
+        if let Err(error) = self.stream.write_all(&[1]) {
+            assert!(is_end(&error), "cannot release a node: {error}");
+        }
     }
 
     /// Wait until the process is gone: only its end closes the stream.
+    ///
+    /// # Panics
+    /// When it is not gone in time.
     pub fn wait_for_death(mut self) {
         // An end or a reset, depending on how it died.
-        let _ = self.stream.read(&mut [0]);
+        match self.stream.read(&mut [0]) {
+            Ok(count) => assert_eq!(count, 0, "a node at the gate has nothing more to send"),
+            Err(error) => assert!(is_end(&error), "the process has not ended: {error}"),
+        }
     }
 }

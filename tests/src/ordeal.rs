@@ -9,17 +9,14 @@ use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::mpsc::Receiver;
-use std::time::Duration;
 
 use lookalike::math::sampling::{key, uniform};
 use serde_json::Value;
 
+use crate::PATIENCE;
 use crate::journal::{JournalView, damage_an_output, tear};
 use crate::process::{Process, signal};
 use crate::proxy::Proxy;
-
-/// Longer than anything takes on a slow machine; a fit of which nothing was heard for longer is lost.
-const PATIENCE: Duration = Duration::from_secs(90);
 
 /// How many faults there are in a run, at least and at most.
 const FAULTS: (u64, u64) = (4, 9);

@@ -112,6 +112,16 @@ impl Drop for Process {
     }
 }
 
+/// Kill a process with SIGKILL that may have ended by itself.
+///
+/// # Panics
+/// When the number is not that of a process of ours.
+pub fn kill_if_alive(process: u32) {
+    assert!(process > 1, "not a process of ours: {process}");
+    // An error means that it has ended.
+    let _ = Command::new("kill").args(["-KILL", &process.to_string()]).stderr(Stdio::null()).status();
+}
+
 /// Send a signal, such as `KILL`, to one process.
 ///
 /// # Panics

@@ -18,6 +18,7 @@ use lookalike_coordinator::journal::{JOURNAL_FILE, JournalOptions, RunIdentity};
 use lookalike_coordinator::limits::Limits;
 use lookalike_coordinator::runner::{RunError, RunnerOptions, run};
 
+use crate::cluster::policy;
 use crate::nodes::{lying_registry, registry};
 use crate::plan::{Leaves, TestPlanner};
 
@@ -47,7 +48,7 @@ pub fn main() -> ExitCode {
     if let Some(Ok(strangers)) = strangers.first().map(|strangers| strangers.parse()) {
         limits.strangers = strangers;
     }
-    let mut options = RunnerOptions { limits, ..RunnerOptions::new(workers, access_file.into()) };
+    let mut options = RunnerOptions { limits, policy: policy(), ..RunnerOptions::new(workers, access_file.into()) };
     if command == "resume" {
         let journal = JournalOptions::new(Path::new(access_file).with_file_name(JOURNAL_FILE), RunIdentity::default());
         options.journal = Some(JournalOptions { resume: true, ..journal });

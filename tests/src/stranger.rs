@@ -5,7 +5,7 @@ use std::io::{self, Read, Write};
 use std::net::{SocketAddr, TcpListener, TcpStream};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU8, Ordering};
-use std::time::{Duration, SystemTime};
+use std::time::SystemTime;
 
 use lookalike::protocol::{
     Access, CHALLENGE_BYTES, Challenge, CodecError, FrameReader, FrameTag, Hello, ProcessName, ProofKey,
@@ -18,8 +18,8 @@ use lookalike_worker::tls::{SERVER_NAME, channel_binding, client_config};
 use rustls::pki_types::ServerName;
 use rustls::{ClientConnection, ServerConfig, ServerConnection, StreamOwned};
 
-/// Longer than anything takes; a test that waits longer has failed.
-const PATIENCE: Duration = Duration::from_secs(30);
+use crate::PATIENCE;
+use crate::gate::is_end;
 
 /// The process id that liars give.
 pub const LIAR: u32 = 77;
@@ -49,10 +49,7 @@ pub fn read_to_the_end(mut stream: impl Read) -> Vec<u8> {
     let mut said = Vec::new();
     match stream.read_to_end(&mut said) {
         Ok(_) => {}
-        Err(error) => {
-            let ended = [io::ErrorKind::ConnectionReset, io::ErrorKind::UnexpectedEof, io::ErrorKind::BrokenPipe];
-            assert!(ended.contains(&error.kind()), "{error}");
-        }
+        Err(error) => assert!(is_end(&error), "{error}"),
     }
     said
 }

@@ -17,10 +17,10 @@ use std::{fs, path::Path};
 use tempfile::TempDir;
 
 /// Columns and rows of the photos.
-const SIZE: usize = 32;
+const SIZE: usize = 24;
 
 /// Settings of a cheap fit.
-const QUICK: &str = "samples = 32\ngammas = '1:2:0.5'\n";
+const QUICK: &str = "samples = 32\ngammas = '1:2:0.5'\npolish = false\n";
 
 /// A folder with two photos of one scene (`photo.exr`, and `red.exr`, the same through a red glass), one that is too small to be
 /// judged (`tiny.exr`: its fit fails in the run), the light `map.exr` and a manifest.

@@ -8,8 +8,7 @@ use lookalike_coordinator::events::RunEvent;
 use lookalike_coordinator::reactor::Stop;
 use lookalike_coordinator::runner::{RunError, RunnerOptions};
 use lookalike_coordinator::spawn::WorkerCommand;
-use lookalike_coordinator::state::Policy;
-use lookalike_tests::cluster::{Cluster, options};
+use lookalike_tests::cluster::{Cluster, options, policy};
 use lookalike_tests::gate::{Gate, Waiting};
 use lookalike_tests::plan::{Leaves, TestPlanner};
 use lookalike_tests::process::{Process, signal, stderr};
@@ -169,7 +168,7 @@ fn without_any_worker_the_run_ends_with_a_named_error() {
     let policy = Policy {
         wait_for_workers: Duration::from_millis(300),
         remind_every: Duration::from_millis(100),
-        ..Policy::default()
+        ..policy()
     };
     let leaves = Leaves::Digests { count: 1, shared_bytes: 1 };
     let (events, outcome) = Cluster::start(leaves, RunnerOptions { policy, ..local_listener() }).outcome();

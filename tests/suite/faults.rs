@@ -7,8 +7,7 @@ use std::time::Duration;
 use lookalike::graph::FailureReason;
 use lookalike_coordinator::events::{Departure, RunEvent};
 use lookalike_coordinator::runner::{RunError, RunnerOptions};
-use lookalike_coordinator::state::Policy;
-use lookalike_tests::cluster::{Cluster, options};
+use lookalike_tests::cluster::{Cluster, options, policy};
 use lookalike_tests::gate::Gate;
 use lookalike_tests::plan::{Leaves, TestPlanner};
 use lookalike_tests::process::{Process, signal, stderr};
@@ -31,7 +30,7 @@ fn reference() -> Option<Vec<u8>> {
 
 /// A lease that is short for a worker that was stopped, and long for one that the machine lets wait.
 fn impatient() -> Policy {
-    Policy { heartbeat: Duration::from_millis(100), lost_after: Duration::from_secs(3), ..Policy::default() }
+    Policy { heartbeat: Duration::from_millis(100), lost_after: Duration::from_secs(3), ..policy() }
 }
 
 fn wait_for_drain(cluster: &Cluster) {
@@ -126,7 +125,7 @@ fn worker_that_is_asked_twice_ends_at_once_and_is_not_held_against_its_node() {
 #[test]
 fn worker_whose_time_to_drain_is_over_hands_back_what_it_executes() {
     let gate = Gate::new();
-    let policy = Policy { drain_time: Duration::from_millis(300), ..Policy::default() };
+    let policy = Policy { drain_time: Duration::from_millis(300), ..policy() };
     let cluster = Cluster::start(gates(&gate, 1), RunnerOptions { policy, ..options(PROGRAM, 1) });
     let first = gate.next();
     signal(first.process(), "TERM");
@@ -176,7 +175,7 @@ fn run_whose_every_output_is_verified_gives_the_same_bytes() {
     let leaves = Leaves::Digests { count: 21, shared_bytes: 300_000 };
     let reference = TestPlanner::reference(leaves.clone());
     for workers in [1, 2, 3] {
-        let policy = Policy { verify_fraction: 1.0, ..Policy::default() };
+        let policy = Policy { verify_fraction: 1.0, ..policy() };
         let options = RunnerOptions { policy, ..options(PROGRAM, workers) };
         let (result, summary) = Cluster::start(leaves.clone(), options).finish();
         assert_eq!(result, reference, "{workers} workers");
@@ -187,7 +186,7 @@ fn run_whose_every_output_is_verified_gives_the_same_bytes() {
 
 #[test]
 fn policy_that_makes_no_sense_is_refused_before_anything_is_started() {
-    let policy = Policy { lost_after: Duration::from_secs(1), ..Policy::default() };
+    let policy = Policy { lost_after: Duration::from_secs(1), ..policy() };
     let error = Cluster::start(Leaves::Panic, RunnerOptions { policy, ..options(PROGRAM, 1) }).error();
     assert!(matches!(error, RunError::Policy(_)), "{error}");
     assert_eq!(error.exit_code(), 2);

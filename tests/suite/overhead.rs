@@ -22,9 +22,9 @@ fn nodes_are_given_out_once_but_for_a_few_that_are_moved() {
 
 #[test]
 fn killed_workers_lose_what_they_held_and_killed_coordinators_nothing_that_was_finished() {
-    let worker = measure(&["worker-killed"]);
+    let worker = measure(&["worker-killed", "200"]);
     assert_eq!((&worker["completed"], &worker["finished_nodes_run_twice"]), (&worker["nodes"], &0.into()), "{worker}");
-    let coordinator = measure(&["coordinator-killed"]);
+    let coordinator = measure(&["coordinator-killed", "200"]);
     assert_eq!(coordinator["results"], coordinator["nodes"], "{coordinator}");
     assert_eq!(coordinator["finished_nodes_run_twice"], 0, "{coordinator}");
     assert!(coordinator["finished_before"].as_u64().unwrap() > 0, "{coordinator}");

@@ -11,7 +11,9 @@ pub(super) fn contradiction(profile: &[u8]) -> Option<&'static str> {
         return Some("its ICC profile is not for RGB");
     }
     for (name, expected) in [(b"rXYZ", SRGB_RED), (b"gXYZ", SRGB_GREEN), (b"bXYZ", SRGB_BLUE)] {
-        let Some(found) = tag(profile, name).and_then(xyz) else { return Some("its ICC profile is not a matrix profile") };
+        let Some(found) = tag(profile, name).and_then(xyz) else {
+            return Some("its ICC profile is not a matrix profile");
+        };
         if found.iter().zip(expected).any(|(a, b)| (a - b).abs() > 2e-3) {
             return Some("its ICC profile has other primaries");
         }

@@ -82,7 +82,8 @@ impl Codes {
         let alpha = self.has_alpha.then(|| self.pixels().map(|pixel| self.fraction(pixel[self.colours])).collect());
         let mut warnings = Vec::new();
         if self.is_reoriented {
-            warnings.push("rotated or mirrored by its Exif orientation: pixel coordinates are those after it".to_owned());
+            warnings
+                .push("rotated or mirrored by its Exif orientation: pixel coordinates are those after it".to_owned());
         }
         Decoded {
             image: Image::from_pixels(self.width, self.height, pixels),

@@ -273,7 +273,8 @@ fn bordered_nodes(image: &Image) -> Vec<[f32; 4]> {
             let [r, g, b] = image.pixel(j, i);
             let brightest = |[r, g, b]: [f32; 3]| f64::from(r.max(g).max(b));
             let here = brightest([r, g, b]);
-            let peak = if is_next_to_pole { here.max(brightest(image.pixel((j + width / 2) % width, i))) } else { here };
+            let peak =
+                if is_next_to_pole { here.max(brightest(image.pixel((j + width / 2) % width, i))) } else { here };
             let density = to_f32(peak * sin_theta);
             nodes.push([r, g, b, if is_beyond_pole { -density } else { density }]);
         }

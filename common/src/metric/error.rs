@@ -29,7 +29,9 @@ pub enum MetricError {
         found: (usize, usize),
     },
     /// The coverage, or a pixel buffer, does not have one value per pixel.
-    #[error("the {what} must have one value per pixel: expected {expected} values, found {found}; use one of the same image")]
+    #[error(
+        "the {what} must have one value per pixel: expected {expected} values, found {found}; use one of the same image"
+    )]
     Length {
         /// The buffer.
         what: &'static str,

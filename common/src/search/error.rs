@@ -28,7 +28,9 @@ pub enum SearchError {
         upper: f64,
     },
     /// A range that its scale cannot map to the unit interval.
-    #[error("bounds of parameter {index} are [{lower}, {upper}], expected {expected}: correct them or choose another scale")]
+    #[error(
+        "bounds of parameter {index} are [{lower}, {upper}], expected {expected}: correct them or choose another scale"
+    )]
     UnscalableRange {
         /// Index of the parameter, from 0.
         index: usize,
@@ -60,7 +62,9 @@ pub enum SearchError {
         point: Vec<f64>,
     },
     /// Normal equations that contain NaN or infinity.
-    #[error("the normal equations contain a value that is not finite: check the residuals and their derivatives for NaN")]
+    #[error(
+        "the normal equations contain a value that is not finite: check the residuals and their derivatives for NaN"
+    )]
     NormalNotFinite,
     /// An option outside its range.
     #[error("search option {name} is {found}, expected {expected}")]

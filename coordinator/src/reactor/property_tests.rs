@@ -416,8 +416,11 @@ impl World {
     }
 }
 
+/// How many cases are tried.
+const CASES: u32 = if cfg!(feature = "slow") { 2000 } else { 256 };
+
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 2000, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: CASES, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
     fn every_node_completes_or_fails_by_name(

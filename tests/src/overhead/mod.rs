@@ -4,9 +4,9 @@
 //!   lookalike-overhead                      every measurement below, each in a process of its own; a table on stderr
 //!   lookalike-overhead round-trip [ROUNDS]  21 nodes that do nothing, again and again
 //!   lookalike-overhead throughput [NODES]   so many of them at once
-//!   lookalike-overhead worker-killed        how soon the nodes of a worker that gets SIGKILL run elsewhere
-//!   lookalike-overhead worker-stopped       the same with SIGSTOP
-//!   lookalike-overhead coordinator-killed   how soon a coordinator that gets SIGKILL is replaced
+//!   lookalike-overhead worker-killed [NODES]        how soon the nodes of a worker that gets SIGKILL run elsewhere
+//!   lookalike-overhead worker-stopped [NODES]       the same with SIGSTOP
+//!   lookalike-overhead coordinator-killed [NODES]   how soon a coordinator that gets SIGKILL is replaced
 //! ```
 //! Each measurement is one line of JSON on stdout. There are two workers with one thread each. Measure an optimised build.
 
@@ -28,6 +28,9 @@ const WORKERS: usize = 2;
 /// How many nodes make one round trip: a fit has so many searches.
 const ROUND: usize = 21;
 
+/// Measurements of what happens when a process is killed or stopped.
+const FAULTS: [&str; 3] = ["worker-killed", "worker-stopped", "coordinator-killed"];
+
 /// What can go wrong; the program tells it and ends.
 type Result<T> = std::result::Result<T, Box<dyn std::error::Error>>;
 
@@ -45,11 +48,15 @@ pub fn main() -> ExitCode {
         ["round-trip", rounds] => number(rounds).and_then(run::round_trip).and_then(|found| print(&found)),
         ["throughput"] => run::throughput(10_000).and_then(|found| print(&found)),
         ["throughput", nodes] => number(nodes).and_then(run::throughput).and_then(|found| print(&found)),
-        ["worker-killed"] => recovery::worker_is_sent("KILL").and_then(|found| print(&found)),
-        ["worker-stopped"] => recovery::worker_is_sent("STOP").and_then(|found| print(&found)),
-        ["coordinator-killed"] => recovery::coordinator_is_killed().and_then(|found| print(&found)),
         // What `coordinator-killed` kills.
-        ["coordinate", folder] => recovery::coordinate(folder.as_ref()),
+        ["coordinate", folder, nodes] => number(nodes).and_then(|nodes| recovery::coordinate(folder.as_ref(), nodes)),
+        [fault, ref nodes @ ..] if FAULTS.contains(&fault) => {
+            nodes.first().map_or(Ok(recovery::NODES), |nodes| number(nodes)).and_then(|nodes| match fault {
+                "worker-killed" => recovery::worker_is_sent("KILL", nodes),
+                "worker-stopped" => recovery::worker_is_sent("STOP", nodes),
+                _ => recovery::coordinator_is_killed(nodes),
+            }).and_then(|found| print(&found))
+        }
         _ => Err("expected no argument, or a measurement: round-trip, throughput, worker-killed, worker-stopped, \
                   coordinator-killed"
             .into()),

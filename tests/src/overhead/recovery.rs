@@ -18,18 +18,18 @@ use super::run::{drive, options, rounded};
 use super::{PAUSE, Result, WORKERS};
 use crate::journal::JournalView;
 
-/// How many nodes there are: some seconds of work for two threads.
-const NODES: u64 = 500;
+/// How many nodes there are by default: some seconds of work for two threads.
+pub(super) const NODES: usize = 500;
 
 /// How many are done before something happens.
 const BEFORE: usize = 50;
 
-/// Nodes that take a moment each.
-struct Pauses;
+/// So many nodes that take a moment each.
+struct Pauses(usize);
 
 impl Planner for Pauses {
     fn start(&mut self, graph: &mut GraphEdit<'_>) -> std::result::Result<(), PlanError> {
-        (0..NODES).try_for_each(|number| graph.add_node(node("pause", number)).map(|_| ()))
+        (0..self.0 as u64).try_for_each(|number| graph.add_node(node("pause", number)).map(|_| ()))
     }
 
     fn completed(&mut self, _: NodeId, _: &Blob, _: &mut GraphEdit<'_>) -> std::result::Result<(), PlanError> {
@@ -72,13 +72,13 @@ impl Seen {
 }
 
 /// Send a signal to one of two workers in the middle of a run.
-pub(super) fn worker_is_sent(name: &str) -> Result<Value> {
+pub(super) fn worker_is_sent(name: &str, nodes: usize) -> Result<Value> {
     let signal: Signal = format!("SIG{name}").parse()?;
     let folder = tempfile::tempdir()?;
     let seen = Arc::new(Mutex::new(Seen::default()));
     let observed = Arc::clone(&seen);
     let observer = move |event: &RunEvent| observed.lock().unwrap_or_else(PoisonError::into_inner).note(event, signal);
-    let (_, summary) = drive(options(folder.path(), false)?, Pauses, observer)?;
+    let (_, summary) = drive(options(folder.path(), false)?, Pauses(nodes), observer)?;
     let seen = seen.lock().unwrap_or_else(PoisonError::into_inner);
     if signal == Signal::SIGSTOP {
         // Whom nobody hears cannot be told to end.
@@ -95,7 +95,7 @@ pub(super) fn worker_is_sent(name: &str) -> Result<Value> {
         "noticed_ms": milliseconds(left),
         "noticed_heartbeats": rounded(left.as_secs_f64() / policy.heartbeat.as_secs_f64()),
         "rerun_ms": milliseconds(rerun),
-        "nodes": NODES,
+        "nodes": nodes,
         "completed": summary.completed_nodes,
         "leases_lost": lost,
         "finished_nodes_run_twice": finished_twice(folder.path()),
@@ -110,14 +110,14 @@ fn finished_twice(folder: &Path) -> u64 {
 }
 
 /// Kill a coordinator in the middle of its run, and start the next one.
-pub(super) fn coordinator_is_killed() -> Result<Value> {
+pub(super) fn coordinator_is_killed(nodes: usize) -> Result<Value> {
     let folder = tempfile::tempdir()?;
-    let mut first = Coordinator::start(folder.path())?;
+    let mut first = Coordinator::start(folder.path(), nodes)?;
     first.wait_for("finished", BEFORE)?;
     first.child.kill()?;
     first.child.wait()?;
     let began = Instant::now();
-    let mut second = Coordinator::start(folder.path())?;
+    let mut second = Coordinator::start(folder.path(), nodes)?;
     second.wait_for("joined", WORKERS)?;
     let back = began.elapsed();
     second.wait_for("finished", 1)?;
@@ -134,7 +134,7 @@ pub(super) fn coordinator_is_killed() -> Result<Value> {
         "all_workers_back_ms": milliseconds(back),
         "first_new_result_ms": milliseconds(new),
         "node_ms": milliseconds(PAUSE),
-        "nodes": NODES,
+        "nodes": nodes,
         "results": results,
         "finished_before": journal.number("SELECT count(*) FROM results WHERE epoch = 1"),
         "finished_nodes_run_twice": journal.run_twice() + finished_twice(folder.path()),
@@ -148,9 +148,9 @@ struct Coordinator {
 }
 
 impl Coordinator {
-    fn start(folder: &Path) -> Result<Self> {
+    fn start(folder: &Path, nodes: usize) -> Result<Self> {
         let mut command = Command::new(std::env::current_exe()?);
-        let mut child = command.arg("coordinate").arg(folder).stdout(Stdio::piped()).spawn()?;
+        let mut child = command.arg("coordinate").arg(folder).arg(nodes.to_string()).stdout(Stdio::piped()).spawn()?;
         let stdout = child.stdout.take().ok_or("expected a standard output")?;
         Ok(Self { child, lines: BufReader::new(stdout) })
     }
@@ -178,8 +178,8 @@ impl Drop for Coordinator {
 }
 
 /// Coordinate the run in this folder, and tell what happens.
-pub(super) fn coordinate(folder: &Path) -> Result<()> {
-    drive(options(folder, true)?, Pauses, |event| {
+pub(super) fn coordinate(folder: &Path, nodes: usize) -> Result<()> {
+    drive(options(folder, true)?, Pauses(nodes), |event| {
         let word = match event {
             RunEvent::WorkerJoined { .. } => "joined",
             RunEvent::NodeFinished { .. } => "finished",

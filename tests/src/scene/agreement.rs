@@ -2,7 +2,7 @@
 
 use super::{
     Scene, covered,
-    reference::{Effort, Reference, SplitLobe},
+    reference::{Effort, Reference, SplitLobe, rgb, rounded},
 };
 use lookalike::{
     brdf::{Model, flat_bounds, lobe_terms, term_count},
@@ -14,6 +14,7 @@ use lookalike::{
     },
     scene::{Circle, Geometry},
 };
+use serde_json::{Map, Value, json};
 
 /// Deviations of one term of one lobe at one width. All are shares of the mean radiance over the whole object: of the term's own, but
 /// for what no surface shows alone. The share of the `F5` part is that of a dielectric with F0 = 0.04 and no diffuse part; the share of a
@@ -105,6 +106,49 @@ impl References {
                     level,
                 });
             }
+        }
+        Self { model, pixels: pixels.to_vec(), entries }
+    }
+
+    /// The model whose lobes they are of.
+    #[must_use]
+    pub fn model(&self) -> &'static dyn Model {
+        self.model
+    }
+
+    /// As they are stored, by lobe.
+    #[must_use]
+    pub fn to_json(&self) -> Map<String, Value> {
+        let mut lobes = Map::new();
+        for Entry { lobe, width, reference, level } in &self.entries {
+            let name = self.model.lobes()[*lobe].lobe.name();
+            let entries = lobes.entry(name).or_insert_with(|| json!([])).as_array_mut().expect("a list");
+            entries.push(json!({ "width": width, "level": rounded(*level, 6), "reference": reference.to_json() }));
+        }
+        lobes
+    }
+
+    /// The stored references of every lobe whose name passes `keep`.
+    ///
+    /// # Panics
+    /// When there are none of such a lobe.
+    #[must_use]
+    pub fn from_json(
+        model: &'static dyn Model,
+        pixels: &[Pixel],
+        stored: &Value,
+        keep: impl Fn(&str) -> bool,
+    ) -> Self {
+        let mut entries = Vec::new();
+        for (lobe, basis) in model.lobes().iter().enumerate().filter(|(_, basis)| keep(basis.lobe.name())) {
+            let name = basis.lobe.name();
+            let of_lobe = stored[name].as_array().unwrap_or_else(|| panic!("no stored reference of the lobe {name:?}"));
+            entries.extend(of_lobe.iter().map(|entry| Entry {
+                lobe,
+                width: entry["width"].as_f64().expect("a width"),
+                reference: Reference::from_json(&entry["reference"]),
+                level: rgb(&entry["level"]),
+            }));
         }
         Self { model, pixels: pixels.to_vec(), entries }
     }

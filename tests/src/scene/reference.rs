@@ -7,6 +7,7 @@ use lookalike::{
     render::{integrator::Integrator, transport::Pixel},
 };
 use rayon::prelude::*;
+use serde_json::{Value, json};
 
 /// Independent randomisations behind a standard error.
 pub const RANDOMISATIONS: u32 = 8;
@@ -78,13 +79,43 @@ impl Reference {
                 *current = estimate(pixel, samples);
             }
         });
-        let mean_variance = estimates.iter().map(|e| e.variance).sum::<Rgb>() / pixels.len() as f64;
-        Self {
-            radiance: estimates.iter().map(|e| e.mean).collect(),
-            variance: estimates.iter().map(|e| e.variance).collect(),
-            standard_error: Rgb::from_array(mean_variance.to_array().map(f64::sqrt)),
-        }
+        Self::from_moments(estimates.iter().map(|e| e.mean).collect(), estimates.iter().map(|e| e.variance).collect())
     }
+
+    /// Mean radiance of each pixel, and the variance of that mean.
+    #[must_use]
+    pub fn from_moments(radiance: Vec<Rgb>, variance: Vec<Rgb>) -> Self {
+        let mean_variance = variance.iter().sum::<Rgb>() / variance.len() as f64;
+        Self { radiance, variance, standard_error: Rgb::from_array(mean_variance.to_array().map(f64::sqrt)) }
+    }
+
+    /// As it is stored: mean and variance of each pixel, red, green, blue.
+    #[must_use]
+    pub fn to_json(&self) -> Value {
+        json!({ "mean": self.radiance.iter().map(|rgb| rounded(*rgb, 6)).collect::<Vec<_>>(),
+                "variance": self.variance.iter().map(|rgb| rounded(*rgb, 2)).collect::<Vec<_>>() })
+    }
+
+    /// What [`to_json`](Self::to_json) stored.
+    ///
+    /// # Panics
+    /// When it is something else.
+    #[must_use]
+    pub fn from_json(stored: &Value) -> Self {
+        let list = |name: &str| stored[name].as_array().expect(name).iter().map(rgb).collect();
+        Self::from_moments(list("mean"), list("variance"))
+    }
+}
+
+/// A colour to so many significant digits.
+#[must_use]
+pub(super) fn rounded(colour: Rgb, digits: usize) -> [f64; 3] {
+    colour.to_array().map(|x| format!("{x:.*e}", digits - 1).parse().expect("a number"))
+}
+
+/// What [`rounded`] gave.
+pub(super) fn rgb(stored: &Value) -> Rgb {
+    Rgb::from_array(std::array::from_fn(|channel| stored[channel].as_f64().expect("three numbers")))
 }
 
 /// One pixel: the mean over randomisations and the variance of that mean.

@@ -84,7 +84,7 @@ fn without_summaries(folder: &TempDir, act: impl Fn(u32)) -> (Output, Vec<Value>
 
 #[test]
 fn summaries_that_cannot_be_written_are_code_three_unless_something_was_wrong_before() {
-    let manifest = format!("photos = 'photo.exr'\nenvironments = 'map.exr'\n[defaults]\npolish = false\n{QUICK}");
+    let manifest = format!("photos = 'photo.exr'\nenvironments = 'map.exr'\n[defaults]\n{QUICK}");
     let whole = folder(&manifest);
     let (output, events) = without_summaries(&whole, |_| ());
     assert_eq!(output.status.code(), Some(3), "{events:?}");

@@ -9,7 +9,7 @@ use tempfile::TempDir;
 const NAMES: [&str; 2] = ["photo-map-ggx", "red-map-ggx"];
 
 fn two() -> TempDir {
-    folder(&format!("photos = ['photo.exr', 'red.exr']\nenvironments = 'map.exr'\n[defaults]\npolish = false\n{QUICK}"))
+    folder(&format!("photos = ['photo.exr', 'red.exr']\nenvironments = 'map.exr'\n[defaults]\n{QUICK}"))
 }
 
 /// A fit alone, with settings that the batch does not have.

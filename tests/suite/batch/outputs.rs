@@ -7,7 +7,7 @@ use std::fs;
 #[test]
 fn summaries_have_the_numbers_of_every_fit() {
     let folder = folder(&format!(
-        "photos = 'photo.exr'\nenvironments = 'map.exr'\nmodels = ['ggx', 'cook-torrance']\n[defaults]\n{QUICK}polish = false\n"
+        "photos = 'photo.exr'\nenvironments = 'map.exr'\nmodels = ['ggx', 'cook-torrance']\n[defaults]\n{QUICK}"
     ));
     let answer = batch(&folder, "out", "--workers 2").done();
     let out = folder.path().join("out");

@@ -14,7 +14,7 @@ const NAMES: [&str; 4] = ["photo-map-ggx", "photo-map-cook-torrance", "red-map-g
 
 fn four() -> TempDir {
     let product = "photos = ['photo.exr', 'red.exr']\nenvironments = 'map.exr'\nmodels = ['ggx', 'cook-torrance']\n";
-    folder(&format!("{product}[defaults]\npolish = false\n{QUICK}"))
+    folder(&format!("{product}[defaults]\n{QUICK}"))
 }
 
 /// The fits that the journal of `out` says are written.
@@ -118,7 +118,7 @@ fn changed_settings_inputs_and_fits_are_refused_by_name() {
 #[test]
 fn failed_fits_are_tried_again() {
     let folder = folder(&format!(
-        "photos = ['photo.exr', 'tiny.exr']\nenvironments = 'map.exr'\n[defaults]\npolish = false\n{QUICK}"
+        "photos = ['photo.exr', 'tiny.exr']\nenvironments = 'map.exr'\n[defaults]\n{QUICK}"
     ));
     assert_eq!(batch(&folder, "out", "--workers 1").code, Some(4));
     let (output, events) = start(&folder, "--workers 1").watch_stderr(|_| ());

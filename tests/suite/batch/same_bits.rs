@@ -1,6 +1,6 @@
 //! A fit of a batch is the same fit as alone, bit for bit, wherever its second stage runs and whatever it shares with others.
 
-use super::{QUICK, batch, folder, scene, states, summary};
+use super::{batch, folder, scene, states, summary};
 use crate::program::lookalike;
 use std::fs;
 
@@ -9,12 +9,12 @@ const PICTURES: [&str; 5] = ["match.exr", "match.png", "reference.png", "differe
 #[test]
 fn fits_of_a_batch_are_the_fits_alone_wherever_they_are_judged() {
     let manifest = format!(
-        "photos = ['photo.exr', 'red.exr']\nenvironments = 'map.exr'\nmodels = ['ggx', 'cook-torrance']\n[defaults]\n{QUICK}\
+        "photos = ['photo.exr', 'red.exr']\nenvironments = 'map.exr'\nmodels = ['ggx', 'cook-torrance']\n[defaults]\nsamples = 32\ngammas = '1:2:0.5'\n\
          [[fit]]\nname = 'again'\nphoto = 'photo.exr'\nenv = 'map.exr'\njudge = 'object'\n"
     );
     let folder = folder(&manifest);
-    batch(&folder, "here", "--workers 2").done();
-    batch(&folder, "there", "--workers 3 --stage-two workers").done();
+    batch(&folder, "here", "--workers 1").done();
+    batch(&folder, "there", "--workers 2 --stage-two workers").done();
     let alone = [
         ("photo-map-ggx", "photo.exr", ""),
         ("photo-map-cook-torrance", "photo.exr", "--model cook-torrance"),

@@ -31,7 +31,7 @@ fn early_fits_end_early_and_the_stream_says_so() {
     let photos = "'photo.exr', 'red.exr', 'tiny.exr'";
     let sets = ["a", "b", "c", "d"]
         .map(|name| format!("[[set]]\nname = '{name}'\nphotos = [{photos}]\nseed = {}\n", name.as_bytes()[0]));
-    let folder = folder(&format!("[defaults]\nenv = 'map.exr'\npolish = false\n{QUICK}{}", sets.concat()));
+    let folder = folder(&format!("[defaults]\nenv = 'map.exr'\n{QUICK}{}", sets.concat()));
     let out = folder.path().join("out");
     let mut partial = None;
     let mut command = command(&folder, "--workers 1");
@@ -90,7 +90,7 @@ fn scrape(address: &str) -> String {
 fn metrics_tell_what_waits_for_workers() {
     let models = "models = ['ggx', 'cook-torrance']";
     let folder = folder(&format!(
-        "photos = ['photo.exr', 'red.exr']\nenvironments = 'map.exr'\n{models}\n[defaults]\n{QUICK}\npolish = 'off'"
+        "photos = ['photo.exr', 'red.exr']\nenvironments = 'map.exr'\n{models}\n[defaults]\n{QUICK}"
     ));
     let process = start(&folder, "--workers 0 --metrics 0");
     let coordinator = process.id();
@@ -129,7 +129,7 @@ fn metrics_tell_what_waits_for_workers() {
 #[test]
 fn batch_goes_on_when_nobody_reads_its_progress_any_more() {
     let folder =
-        folder(&format!("photos = 'photo.exr'\nenvironments = 'map.exr'\n[defaults]\npolish = false\n{QUICK}"));
+        folder(&format!("photos = 'photo.exr'\nenvironments = 'map.exr'\n[defaults]\n{QUICK}"));
     let mut process = start(&folder, "--workers 1");
     let found = process.stderr_until(|event| is(event, "worker-joined").then_some(()));
     assert!(found.is_some());

@@ -5,12 +5,10 @@ use std::path::Path;
 use std::process::Command;
 
 use lookalike_tests::journal::{JournalView, damage_an_output, tear};
-use lookalike_tests::process::{Process, signal};
+use lookalike_tests::process::{Process, kill_if_alive};
 
 use super::random::FILES;
-use crate::fit::scene::{fit, folder_of_size, without_timing};
-
-const FLAGS: &str = "--samples 128 --gammas 1:2:0.2 --seed 5 --polish off --workers 2";
+use crate::fit::scene::{MANY_NODES as FLAGS, MANY_NODES_FIT, fit, folder, without_timing};
 
 /// Kill a fit and its workers after so many nodes.
 fn kill_all_after(folder: &Path, out: &str, finished: usize) {
@@ -27,7 +25,7 @@ fn kill_all_after(folder: &Path, out: &str, finished: usize) {
     });
     moment.unwrap_or_else(|| panic!("the fit ended after {count} nodes"));
     process.kill();
-    workers.into_iter().for_each(|worker| signal(worker, "KILL"));
+    workers.into_iter().for_each(kill_if_alive);
 }
 
 fn copy(from: &Path, to: &Path) {
@@ -48,9 +46,9 @@ fn assert_same(whole: &Path, out: &Path, what: &str) {
 
 #[test]
 fn journal_that_was_torn_or_damaged_costs_what_it_has_lost_and_nothing_else() {
-    let folder = folder_of_size(48);
+    let folder = folder();
     let at = |name: &str| folder.path().join(name);
-    fit(folder.path(), "whole", &format!("{FLAGS} --progress none")).done();
+    MANY_NODES_FIT.copy_to(&at("whole"));
     kill_all_after(folder.path(), "killed", 9);
     let resume = |out: &str| fit(folder.path(), out, &format!("{FLAGS} --progress none --resume")).done();
     // What is left of the log; the last one lacks a byte.

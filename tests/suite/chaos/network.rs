@@ -4,8 +4,7 @@ use std::time::Duration;
 
 use lookalike_coordinator::events::{Departure, RunEvent};
 use lookalike_coordinator::runner::RunnerOptions;
-use lookalike_coordinator::state::Policy;
-use lookalike_tests::cluster::Cluster;
+use lookalike_tests::cluster::{Cluster, policy};
 use lookalike_tests::gate::{Gate, Waiting};
 use lookalike_tests::netns::Namespace;
 use lookalike_tests::process::Process;
@@ -29,7 +28,7 @@ struct Scene {
 fn scene(nodes: usize, lost_after: Duration) -> Option<Scene> {
     let namespace = Namespace::new()?;
     let gate = Gate::at(namespace.control());
-    let policy = Policy { heartbeat: Duration::from_millis(100), lost_after, spare_leases: 0, ..Policy::default() };
+    let policy = Policy { heartbeat: Duration::from_millis(100), lost_after, spare_leases: 0, ..policy() };
     let listen = Some((namespace.line(), 0).into());
     let options = RunnerOptions { policy, listen, ..without_workers() };
     let (cluster, _) = run_for_others(gates(&gate, nodes), options);

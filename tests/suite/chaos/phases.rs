@@ -4,8 +4,7 @@ use std::time::Duration;
 
 use lookalike_coordinator::events::{Departure, RunEvent};
 use lookalike_coordinator::runner::RunnerOptions;
-use lookalike_coordinator::state::Policy;
-use lookalike_tests::cluster::Cluster;
+use lookalike_tests::cluster::{Cluster, policy};
 use lookalike_tests::gate::{Gate, Waiting};
 use lookalike_tests::plan::{Leaves, TestPlanner};
 use lookalike_tests::process::Process;
@@ -19,7 +18,7 @@ use super::{
 /// No heartbeat comes in between: what goes up the wire is what the test is about.
 fn quiet() -> RunnerOptions {
     let policy =
-        Policy { heartbeat: Duration::from_secs(60), lost_after: Duration::from_secs(300), ..Policy::default() };
+        Policy { heartbeat: Duration::from_secs(60), lost_after: Duration::from_secs(300), ..policy() };
     RunnerOptions { policy, ..without_workers() }
 }
 
@@ -149,7 +148,7 @@ fn worker_cut_off_for_longer_than_its_lease_brings_an_equal_result_later_and_it_
         heartbeat: Duration::from_millis(100),
         lost_after: Duration::from_secs(3),
         spare_leases: 0,
-        ..Policy::default()
+        ..policy()
     };
     let options = RunnerOptions { policy, ..without_workers() };
     let (cluster, proxy, worker, first) = at_the_gate(&gate, 3, options);

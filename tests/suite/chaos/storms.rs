@@ -57,10 +57,13 @@ fn node_that_kills_its_workers_fails_by_name_and_all_others_complete() {
     assert!(failed.is_empty() && calm.is_some() && calm == innocent, "{failed:?}");
 }
 
+/// Seeds of storms. The fifth has a murderer.
+const SEEDS: &[u64] = if cfg!(feature = "slow") { &[4, 5] } else { &[5] };
+
 #[test]
 fn random_kills_from_outside_bring_no_innocent_node_to_failure_and_do_not_save_the_guilty() {
     let (calm, _) = run(3, 8, false, 0);
-    for seed in [4, 5] {
+    for &seed in SEEDS {
         let (result, failed) = run(seed, 8, seed == 5, 6);
         assert_eq!(failed.keys().collect::<Vec<_>>(), if seed == 5 { vec!["murderer"] } else { vec![] }, "{failed:?}");
         assert!(result == calm, "seed {seed}");

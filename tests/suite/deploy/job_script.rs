@@ -1,7 +1,7 @@
 //! The job script of Slurm on stand-ins: `srun` runs its command here, `scontrol` and `squeue` say what the test wants them to.
 
 use super::source;
-use crate::fit::scene::{fit, folder, without_timing};
+use crate::fit::scene::{Finished, folder, without_timing};
 use lookalike_tests::process::{Process, signal, stderr};
 use serde_json::Value;
 use std::{
@@ -14,7 +14,10 @@ use std::{
 use tempfile::TempDir;
 
 /// Several shards of the subset's table, so that something can die between them.
-const FLAGS: &str = "--samples 128 --seed 5";
+const FLAGS: &str = "--samples 128 --gammas 1:2:0.5 --seed 5 --polish off";
+
+/// The fit of this machine alone.
+static LOCAL: Finished = Finished::new(FLAGS);
 
 /// The node that a step is for is in its environment, of which only Slurm's own is there if the step or its job says so. What ends the step is told to all its processes, as Slurm would have it.
 const SRUN: &str = r#"export="${SLURM_EXPORT_ENV:-ALL}"
@@ -99,7 +102,7 @@ fn child(parent: u32, word: &str) -> u32 {
 
 /// The results of the job are those of a fit of this machine alone.
 fn assert_same_as_local(site: &Path, out: &str) {
-    fit(site, "local", &format!("{FLAGS} --workers 1 --progress none")).done();
+    LOCAL.copy_to(&site.join("local"));
     assert_eq!(without_timing(&site.join("local")), without_timing(&site.join(out)));
 }
 
@@ -122,7 +125,7 @@ fn folder_and_address_are_understood_in_all_their_spellings() {
     let taken = TcpListener::bind("127.0.0.1:0").unwrap();
     let port = taken.local_addr().unwrap().port();
     drop(taken);
-    let line = format!("fit photo.exr --env map.exr -o=run --progress json {FLAGS} --polish off");
+    let line = format!("fit photo.exr --env map.exr -o=run --progress json {FLAGS}");
     let (listen, advertise) = (format!("127.0.0.1:{port}"), format!("localhost:{port}"));
     let environment = [("LOOKALIKE_LISTEN", listen.as_str()), ("LOOKALIKE_ADVERTISE", advertise.as_str())];
     let (output, events) = watch(job(site.path(), &line, &environment), |_, _| ());

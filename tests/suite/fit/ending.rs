@@ -1,6 +1,6 @@
 //! How a fit ends when it does not end well: exit codes, messages, no process left behind.
 
-use super::scene::{QUICK, fit, folder};
+use super::scene::{QUICK, QUICK_POLISHED, fit, folder};
 use lookalike_tests::{
     journal::JournalView,
     process::{Process, signal},
@@ -11,11 +11,11 @@ use std::{fs, process::Command};
 #[test]
 fn missed_max_cssim_is_exit_code_one_with_all_results() {
     let folder = folder();
-    let answer = fit(folder.path(), "out", &format!("{QUICK} --max-cssim 0"));
+    let answer = fit(folder.path(), "out", &format!("{QUICK_POLISHED} --max-cssim 0"));
     assert_eq!(answer.code, Some(1), "{}", answer.stderr);
     assert!(answer.stderr.contains("more than --max-cssim 0"), "{}", answer.stderr);
     assert!(answer.stdout.contains("polished") && folder.path().join("out/fit.json").exists());
-    fit(folder.path(), "met", &format!("{QUICK} --max-cssim 1")).done();
+    fit(folder.path(), "met", &format!("{QUICK} --gammas 1 --max-cssim 1")).done();
 }
 
 #[test]
@@ -105,8 +105,9 @@ fn interrupt_ends_every_process_with_code_130() {
 fn local_workers_log_as_the_coordinator_is_told_to() {
     let folder = folder();
     let joined = "INFO lookalike_worker::session: joined";
-    let quiet = fit(folder.path(), "quiet", QUICK).done();
+    let flags = format!("{QUICK} --gammas 1");
+    let quiet = fit(folder.path(), "quiet", &flags).done();
     assert!(!quiet.stderr.contains(joined), "{}", quiet.stderr);
-    let loud = fit(folder.path(), "loud", &format!("{QUICK} --log lookalike_worker=info")).done();
+    let loud = fit(folder.path(), "loud", &format!("{flags} --log lookalike_worker=info")).done();
     assert!(loud.stderr.contains(joined), "{}", loud.stderr);
 }

@@ -1,6 +1,6 @@
 //! What a fit leaves in its folder and says on its outputs: the contract of design section 10.
 
-use super::scene::{QUICK, SIZE, fit, fit_json, folder, number, picture};
+use super::scene::{POLISHED, QUICK, SIZE, fit, fit_json, folder, number, picture};
 use lookalike::image::{Encoding, content_hash, metadata as keys};
 use serde_json::{Value, json};
 use std::fs;
@@ -107,8 +107,7 @@ fn candidates_csv_has_the_numbers_of_fit_json() {
 
 #[test]
 fn pictures_have_the_size_of_the_photo_and_say_what_they_are() {
-    let folder = folder();
-    fit(folder.path(), "out", QUICK).done();
+    let folder = POLISHED.copy();
     let out = folder.path().join("out");
     for file in ["match.exr", "match.png", "reference.png", "difference.png"] {
         let decoded = picture(&out.join(file));
@@ -137,8 +136,7 @@ fn pictures_have_the_size_of_the_photo_and_say_what_they_are() {
 
 #[test]
 fn score_of_the_files_is_the_score_that_was_reported() {
-    let folder = folder();
-    fit(folder.path(), "out", QUICK).done();
+    let folder = POLISHED.copy();
     let json = fit_json(&folder.path().join("out"));
     let exposure = &json["display_exposure"];
     let arguments = format!("compare photo.exr out/match.exr --display-exposure {exposure} --json");

@@ -1,18 +1,24 @@
 //! A fit whose coordinator is killed, wherever, and that is resumed: the same bits, and nothing done twice.
 
-use super::scene::{QUICK, fit, folder, without_timing};
+use super::scene::{Finished, MANY_NODES, MANY_NODES_FIT, QUICK, QUICK_FIT, fit, folder, without_timing};
 use crate::program::Answer;
 use lookalike_coordinator::journal::RunLock;
 use lookalike_tests::{journal::JournalView, process::Process};
 use serde_json::Value;
 use std::{fs, path::Path, process::Command};
 
-/// Four shards, the coarse table, six searches, one full table, judging, exploration, polish, pictures: at least 16 nodes.
-const FLAGS: &str = "--samples 128 --gammas 1:2:0.2 --seed 5 --workers 2";
+/// [`MANY_NODES`], exploration and polish: at least 16 nodes.
+const WITH_POLISH: &str = "--samples 128 --gammas 1:2:0.2 --seed 5 --workers 2";
+
+/// The fit of [`WITH_POLISH`] that nothing disturbed.
+static WHOLE: Finished = Finished::new(WITH_POLISH);
+
+/// After how many finished nodes a fit is killed; 0 is when the first worker joins.
+const KILLS: &[usize] = if cfg!(feature = "slow") { &[0, 1, 4, 7, 11, 13] } else { &[1, 11] };
 
 /// Starts a fit and kills it with SIGKILL as soon as so many nodes are told to be finished; 0 is when the first worker joins.
-fn kill_after(folder: &Path, out: &str, finished: usize) {
-    let line = format!("fit photo.exr --env map.exr --out {out} {FLAGS} --progress json --resume");
+fn kill_after(folder: &Path, out: &str, flags: &str, finished: usize) {
+    let line = format!("fit photo.exr --env map.exr --out {out} {flags} --progress json --resume");
     let mut command = Command::new(env!("CARGO_BIN_EXE_lookalike-under-test"));
     let command = command.args(line.split_whitespace()).current_dir(folder).env_remove("RUST_LOG");
     let mut process = Process::start(command);
@@ -26,8 +32,8 @@ fn kill_after(folder: &Path, out: &str, finished: usize) {
     process.kill();
 }
 
-fn resume(folder: &Path, out: &str) -> Answer {
-    fit(folder, out, &format!("{FLAGS} --progress none --resume"))
+fn resume(folder: &Path, out: &str, flags: &str) -> Answer {
+    fit(folder, out, &format!("{flags} --progress none --resume"))
 }
 
 fn status(folder: &Path, out: &str) -> Value {
@@ -39,15 +45,15 @@ fn status(folder: &Path, out: &str) -> Value {
 fn killed_anywhere_and_resumed_a_fit_gives_the_same_bits_and_does_nothing_twice() {
     let folder = folder();
     let out = |name: &str| folder.path().join(name);
-    fit(folder.path(), "whole", &format!("{FLAGS} --progress none")).done();
-    for finished in [0, 1, 4, 7, 11, 13] {
+    WHOLE.copy_to(&folder.path().join("whole"));
+    for &finished in KILLS {
         let name = finished.to_string();
-        kill_after(folder.path(), &name, finished);
+        kill_after(folder.path(), &name, WITH_POLISH, finished);
         let stopped = status(folder.path(), &name);
         assert_eq!((&stopped["state"], &stopped["epoch"]), (&"stopped".into(), &1.into()), "{stopped}");
         assert!(stopped["nodes"]["completed"].as_u64().unwrap() >= finished as u64, "{stopped}");
         let access = fs::read(out(&name).join("access.json")).unwrap();
-        resume(folder.path(), &name).done();
+        resume(folder.path(), &name, WITH_POLISH).done();
         let journal = JournalView::of(&out(&name));
         assert_eq!(journal.run_twice(), 0, "after {finished}");
         let recalled = journal.number("SELECT count(*) FROM node_list WHERE epoch = 2 AND state = 'recalled'");
@@ -66,11 +72,11 @@ fn killed_anywhere_and_resumed_a_fit_gives_the_same_bits_and_does_nothing_twice(
 #[test]
 fn fit_that_is_killed_time_and_again_still_ends() {
     let folder = folder();
-    fit(folder.path(), "whole", &format!("{FLAGS} --progress none")).done();
+    MANY_NODES_FIT.copy_to(&folder.path().join("whole"));
     for _ in 0..3 {
-        kill_after(folder.path(), "out", 2);
+        kill_after(folder.path(), "out", MANY_NODES, 2);
     }
-    resume(folder.path(), "out").done();
+    resume(folder.path(), "out", MANY_NODES).done();
     let out = folder.path().join("out");
     assert_eq!(without_timing(&folder.path().join("whole")), without_timing(&out));
     let journal = JournalView::of(&out);
@@ -79,10 +85,8 @@ fn fit_that_is_killed_time_and_again_still_ends() {
 
 #[test]
 fn finished_fit_is_verified_and_not_done_again() {
-    let folder = folder();
+    let folder = QUICK_FIT.copy();
     let out = folder.path().join("out");
-    // Without a run in the folder, --resume begins one.
-    fit(folder.path(), "out", &format!("{QUICK} --resume")).done();
     let before = fs::read(out.join("fit.json")).unwrap();
     let again = fit(folder.path(), "out", &format!("{QUICK} --resume --workers 2")).done();
     assert!(
@@ -107,14 +111,13 @@ fn finished_fit_is_verified_and_not_done_again() {
 
 #[test]
 fn run_with_other_inputs_or_settings_is_refused_with_what_differs() {
-    let folder = folder();
+    let folder = QUICK_FIT.copy();
     let refused =
         |flags: &str, phrases: &[&str]| fit(folder.path(), "out", &format!("{QUICK} {flags}")).refused(phrases);
-    kill_after(folder.path(), "killed", 2);
+    kill_after(folder.path(), "killed", MANY_NODES, 2);
     fit(folder.path(), "killed", QUICK)
         .refused(&["killed already holds a run that is not finished", "go on with it with --resume"]);
-    resume(folder.path(), "killed").done();
-    fit(folder.path(), "out", QUICK).done();
+    resume(folder.path(), "killed", MANY_NODES).done();
     refused("", &["out already holds a finished fit", "choose another --out"]);
     refused("--resume --seed 3", &["--seed is 0 there and 3 here", "resume with those of that run"]);
     refused("--resume --gammas 1:2:0.25", &["--gammas is 1:2:0.5 there and 1:2:0.25 here"]);
@@ -142,7 +145,7 @@ fn second_coordinator_in_one_folder_is_refused_and_told_who_is_there() {
         fit(folder.path(), "out", &flags).refused(&["another coordinator is at work in out", &who]);
     }
     drop(lock);
-    fit(folder.path(), "out", QUICK).done();
+    fit(folder.path(), "out", &format!("{QUICK} --gammas 1")).done();
 }
 
 #[test]
@@ -190,14 +193,14 @@ fn full_disk_ends_the_run_by_name_and_costs_nothing_that_was_acknowledged() {
         println!("skipped: cannot mount a small file system here (needs root)");
         return;
     };
-    fit(folder.path(), "whole", &format!("{FLAGS} --progress none")).done();
-    let full = resume(folder.path(), "small/out");
+    MANY_NODES_FIT.copy_to(&folder.path().join("whole"));
+    let full = resume(folder.path(), "small/out", MANY_NODES);
     assert_eq!(full.code, Some(3), "{}", full.stderr);
     for phrase in ["cannot write the journal small/out/run.sqlite: the disk is full", "continue with --resume"] {
         assert!(full.stderr.contains(phrase), "{}", full.stderr);
     }
     disk.grow("64m");
-    resume(folder.path(), "small/out").done();
+    resume(folder.path(), "small/out", MANY_NODES).done();
     let out = small.join("out");
     let journal = JournalView::of(&out);
     assert_eq!(journal.run_twice(), 0);

@@ -10,17 +10,20 @@ use lookalike::{
 };
 use serde_json::Value;
 use std::{
-    fs,
+    fs::{self, Permissions},
     path::Path,
     sync::{Arc, OnceLock},
 };
 use tempfile::TempDir;
 
 /// Columns and rows of the photo.
-pub(crate) const SIZE: usize = 48;
+pub(crate) const SIZE: usize = 32;
 
-/// A cheap fit: few pixels, few gammas, one worker.
-pub(crate) const QUICK: &str = "--samples 32 --gammas 1:2:0.5 --workers 1 --progress none";
+/// A cheap fit: few pixels, few gammas, no polish, one worker.
+pub(crate) const QUICK: &str = "--samples 32 --gammas 1:2:0.5 --workers 1 --progress none --polish off";
+
+/// The same with polish.
+pub(crate) const QUICK_POLISHED: &str = "--samples 32 --gammas 1:2:0.5 --workers 1 --progress none";
 
 /// A folder with `photo.exr` and `map.exr`.
 pub(crate) fn folder() -> TempDir {
@@ -55,6 +58,64 @@ fn photo(size: usize) -> Image {
     let geometry = Geometry::sphere(size, size, Circle::inscribed(size, size), Camera::Orthographic).unwrap();
     let paint = Material::new(&CookTorrance, vec![0.3, 0.12, 0.08, 0.8, 0.8, 0.8, 0.06, 0.2]).unwrap();
     Shot { geometry: &geometry, light: &light, reflectance: &paint, samples: 256, seed: 11 }.render(|| ()).image
+}
+
+/// A fit that many tests start from. It runs once in this process; each test gets a copy of its files.
+pub(crate) struct Finished {
+    flags: &'static str,
+    files: OnceLock<Vec<(String, Vec<u8>, Permissions)>>,
+}
+
+/// The fit of [`QUICK`].
+pub(crate) static QUICK_FIT: Finished = Finished::new(QUICK);
+
+/// The fit of [`QUICK_POLISHED`].
+pub(crate) static POLISHED: Finished = Finished::new(QUICK_POLISHED);
+
+/// Four shards, the coarse table, six searches, one full table, judging, pictures: at least 14 nodes.
+pub(crate) const MANY_NODES: &str = "--samples 128 --gammas 1:2:0.2 --seed 5 --polish off --workers 2";
+
+/// The fit of [`MANY_NODES`].
+pub(crate) static MANY_NODES_FIT: Finished = Finished::new(MANY_NODES);
+
+impl Finished {
+    /// The fit of [`folder`] with these flags.
+    pub(crate) const fn new(flags: &'static str) -> Self {
+        Self { flags, files: OnceLock::new() }
+    }
+
+    /// Copies its folder of results to `out`.
+    pub(crate) fn copy_to(&self, out: &Path) {
+        fs::create_dir_all(out).unwrap();
+        for (name, bytes, permissions) in self.files.get_or_init(|| self.run()) {
+            fs::write(out.join(name), bytes).unwrap();
+            fs::set_permissions(out.join(name), permissions.clone()).unwrap();
+        }
+    }
+
+    /// A folder with `photo.exr`, `map.exr` and a copy of its results in `out`.
+    pub(crate) fn copy(&self) -> TempDir {
+        let folder = folder();
+        self.copy_to(&folder.path().join("out"));
+        folder
+    }
+
+    /// Its `fit.json`.
+    pub(crate) fn json(&self) -> Value {
+        fit_json(&self.copy().path().join("out"))
+    }
+
+    fn run(&self) -> Vec<(String, Vec<u8>, Permissions)> {
+        let folder = folder();
+        // Where there is no run to resume, `--resume` begins one.
+        fit(folder.path(), "out", &format!("{} --resume", self.flags)).done();
+        let entries = fs::read_dir(folder.path().join("out")).unwrap().map(Result::unwrap);
+        let file = |entry: fs::DirEntry| {
+            let name = entry.file_name().into_string().unwrap();
+            (name, fs::read(entry.path()).unwrap(), entry.metadata().unwrap().permissions())
+        };
+        entries.filter(|entry| entry.path().is_file()).map(file).collect()
+    }
 }
 
 /// Fits `photo.exr` under `map.exr` into the folder `out`.

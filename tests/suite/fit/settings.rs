@@ -1,6 +1,8 @@
 //! Every setting of the method does what it says, as seen in `fit.json`.
 
-use super::scene::{QUICK, fit, fit_json, folder, folder_of_size, number, quick, without_timing};
+use super::scene::{
+    POLISHED, QUICK, QUICK_FIT, QUICK_POLISHED, fit, fit_json, folder, folder_of_size, number, quick, without_timing,
+};
 use serde_json::{Value, json};
 use std::fs;
 
@@ -15,8 +17,8 @@ fn names(parameters: &Value) -> Vec<&str> {
 #[test]
 fn settings_file_gives_the_result_of_the_flags() {
     let folder = folder();
-    fit(folder.path(), "flags", "--samples 48 --gammas 1:2:0.5 --seed 9 --polish off --workers 1").done();
-    let text = "photo = \"photo.exr\"\nenv = \"map.exr\"\nout = \"file\"\nsamples = 48\ngammas = \"1:2:0.5\"\nseed = 4\n\
+    fit(folder.path(), "flags", "--samples 24 --gammas 1:2:1 --seed 9 --polish off --workers 1").done();
+    let text = "photo = \"photo.exr\"\nenv = \"map.exr\"\nout = \"file\"\nsamples = 24\ngammas = \"1:2:1\"\nseed = 4\n\
                 polish = \"off\"\nworkers = 2\n";
     fs::write(folder.path().join("fit.toml"), text).unwrap();
     // A flag wins over the file.
@@ -26,7 +28,7 @@ fn settings_file_gives_the_result_of_the_flags() {
 
 #[test]
 fn gammas_are_those_asked_for() {
-    let json = quick("--gammas 1:2:0.5");
+    let json = QUICK_FIT.json();
     assert_eq!(gammas(&json), [1.0, 1.5, 2.0]);
     assert_eq!(json["gammas"], json!([1.0, 1.5, 2.0]));
     assert_eq!(gammas(&quick("--gammas 2.2")), [2.2]);
@@ -36,7 +38,7 @@ fn gammas_are_those_asked_for() {
 fn full_samples_use_every_usable_pixel() {
     let folder = folder_of_size(20);
     let fitted = |out: &str, flags: &str| {
-        fit(folder.path(), out, &format!("{QUICK} --gammas 1 --polish off {flags}")).done();
+        fit(folder.path(), out, &format!("{QUICK} --gammas 1 {flags}")).done();
         fit_json(&folder.path().join(out))
     };
     let [a, b] = ["1", "2"].map(|seed| fitted(seed, &format!("--samples full --seed {seed}")));
@@ -74,7 +76,9 @@ fn direct_integrator_is_searched_by_pattern_only() {
 
 #[test]
 fn preset_paper_is_the_method_of_the_paper() {
-    let json = quick("--preset paper");
+    let folder = folder();
+    fit(folder.path(), "out", &format!("{QUICK_POLISHED} --preset paper")).done();
+    let json = fit_json(&folder.path().join("out"));
     // Flags given as well win over it: those of the quick fit.
     assert_eq!((json["samples"].as_u64(), gammas(&json).len()), (Some(32), 3));
     for (name, expected) in [
@@ -99,7 +103,7 @@ fn subsets_multiply_the_candidates() {
     assert_eq!(candidates.iter().map(|c| c["subset"].as_u64().unwrap()).collect::<Vec<_>>(), [0, 1, 0, 1, 0, 1]);
     // Other pixels, another minimum; the first subset is that of a fit with one.
     assert_ne!(candidates[0]["parameters"], candidates[1]["parameters"]);
-    let alone = &quick("--gammas 1:2:0.5")["candidates"][0];
+    let alone = &QUICK_FIT.json()["candidates"][0];
     for name in ["cost", "evaluations", "parameters"] {
         assert_eq!(candidates[0][name], alone[name], "{name}");
     }
@@ -110,7 +114,7 @@ fn subsets_multiply_the_candidates() {
 #[test]
 fn judge_decides_which_score_selects_and_polishes() {
     for (judge, score) in [("image", "cssim"), ("object", "cssim_object")] {
-        let json = quick(&format!("--judge {judge}"));
+        let json = if judge == "image" { POLISHED.json() } else { quick("--judge object --polish on") };
         assert_eq!(json["judge"], judge);
         let scores = json["candidates"].as_array().unwrap().iter().map(|c| number(&c[score]));
         let selected = number(&json["stage_two"][score]);
@@ -121,7 +125,7 @@ fn judge_decides_which_score_selects_and_polishes() {
 
 #[test]
 fn without_polish_there_is_none() {
-    let (off, on) = (quick("--polish off"), quick("--polish on"));
+    let (off, on) = (QUICK_FIT.json(), POLISHED.json());
     assert_eq!(off["polished"], Value::Null);
     assert_eq!(off["stage_two"], on["stage_two"]);
     assert!(number(&on["polished"]["cssim"]) < number(&on["stage_two"]["cssim"]));
@@ -129,7 +133,7 @@ fn without_polish_there_is_none() {
 
 #[test]
 fn model_is_the_one_asked_for() {
-    let json = quick("--model cook-torrance");
+    let json = quick("--model cook-torrance --polish on");
     assert_eq!(json["model"], "cook-torrance");
     for parameters in [&json["candidates"][0]["parameters"], &json["polished"]["parameters"]] {
         assert_eq!(names(parameters), ["kd", "ks", "f0", "m"]);
@@ -137,13 +141,13 @@ fn model_is_the_one_asked_for() {
     }
     // The photo was made with this model (m = 0.2) and with noise.
     assert!((number(&json["stage_two"]["parameters"]["m"]) / 0.2 - 1.0).abs() < 0.1, "{}", json["stage_two"]);
-    assert!(number(&json["stage_two"]["cssim"]) < number(&quick("")["stage_two"]["cssim"]));
+    assert!(number(&json["stage_two"]["cssim"]) < number(&QUICK_FIT.json()["stage_two"]["cssim"]));
 }
 
 #[test]
 fn progress_goes_to_stderr_in_the_form_asked_for() {
     let folder = folder();
-    let flags = QUICK.replace("--progress none", "--polish off");
+    let flags = QUICK.replace("--progress none", "");
     let json = fit(folder.path(), "json", &format!("{flags} --progress json")).done();
     let events: Vec<Value> = json.stderr.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
     let finished = |kind: &str| events.iter().filter(|e| e["event"] == "node-finished" && e["kind"] == kind).count();

@@ -10,8 +10,7 @@ use lookalike_coordinator::events::{Departure, RunEvent};
 use lookalike_coordinator::limits::Limits;
 use lookalike_coordinator::reactor::Stop;
 use lookalike_coordinator::runner::{RunError, RunnerOptions};
-use lookalike_coordinator::state::Policy;
-use lookalike_tests::cluster::{Cluster, options, read_access};
+use lookalike_tests::cluster::{Cluster, options, policy, read_access};
 use lookalike_tests::gate::{Gate, Waiting};
 use lookalike_tests::journal::JournalView;
 use lookalike_tests::plan::{Leaves, TestPlanner};
@@ -59,7 +58,7 @@ fn recorded_session_that_is_played_again_lets_nobody_in() {
 #[test]
 fn worker_that_answers_for_a_node_of_another_is_found_out_where_outputs_are_verified() {
     let gate = Gate::new();
-    let policy = Policy { verify_fraction: 1.0, ..Policy::default() };
+    let policy = Policy { verify_fraction: 1.0, ..policy() };
     let leaves = Leaves::Gates { count: 1, address: gate.address().to_string() };
     let listen = Some(([127, 0, 0, 1], 0).into());
     let cluster = Cluster::start(leaves, RunnerOptions { listen, policy, ..options(PROGRAM, 1) });
@@ -208,7 +207,7 @@ fn words_without_end_are_cut_or_refused() {
 #[test]
 fn error_without_end_is_cut_before_anybody_has_to_read_it() {
     let listen = Some(([127, 0, 0, 1], 0).into());
-    let policy = Policy { grace: Duration::from_secs(5), ..Policy::default() };
+    let policy = Policy { grace: Duration::from_secs(5), ..policy() };
     let leaves = Leaves::Digests { count: 1, shared_bytes: 1 };
     let cluster = Cluster::start(leaves, RunnerOptions { listen, policy, ..options(PROGRAM, 0) });
     cluster.address();

@@ -9,8 +9,7 @@ use lookalike_coordinator::events::{Departure, RunEvent};
 use lookalike_coordinator::limits::Limits;
 use lookalike_coordinator::reactor::Stop;
 use lookalike_coordinator::runner::{RunError, RunnerOptions};
-use lookalike_coordinator::state::Policy;
-use lookalike_tests::cluster::{Cluster, options};
+use lookalike_tests::cluster::{Cluster, options, policy};
 use lookalike_tests::gate::Gate;
 use lookalike_tests::plan::{Leaves, TestPlanner};
 use lookalike_tests::stranger::{LIAR, TlsClient, hear, join, read_to_the_end, say, say_frame};
@@ -114,7 +113,7 @@ fn garbage_under_the_encryption_is_the_end_of_the_connection_and_of_nothing_else
 
 /// A run of two leaves over one blob that nobody works for yet.
 fn run_without_workers(limits: Limits) -> (Leaves, Cluster) {
-    run_by(Policy::default(), limits)
+    run_by(policy(), limits)
 }
 
 fn run_by(policy: Policy, limits: Limits) -> (Leaves, Cluster) {
@@ -163,7 +162,7 @@ fn worker_that_asks_and_does_not_take_is_thrown_out() {
 #[test]
 fn worker_that_reads_nothing_is_too_slow_however_alive_it_seems() {
     let policy =
-        Policy { heartbeat: Duration::from_millis(100), lost_after: Duration::from_millis(800), ..Policy::default() };
+        Policy { heartbeat: Duration::from_millis(100), lost_after: Duration::from_secs(2), ..policy() };
     let (leaves, cluster) = run_by(policy, Limits::default());
     let mut liar = join(&cluster.access(), 1);
     let hash = hear(&mut liar, |message| match message {
@@ -195,7 +194,7 @@ fn worker_that_reads_nothing_is_too_slow_however_alive_it_seems() {
 
 #[test]
 fn wrong_output_is_found_out_where_outputs_are_verified() {
-    let policy = Policy { verify_fraction: 1.0, ..Policy::default() };
+    let policy = Policy { verify_fraction: 1.0, ..policy() };
     let (_, cluster) = run_by(policy, Limits::default());
     let mut liar = join(&cluster.access(), 1);
     let lease = hear(&mut liar, |message| match message {

@@ -243,10 +243,11 @@ fn coordinator_that_falls_silent_is_left_and_called_again() {
         let ToCoordinator::Hello(hello) = hello else { panic!("expected a hello, found {hello:?}") };
         names.push(hello.name);
         let run = RunName([1; 16]);
-        let welcome = Welcome { worker: 1, run, epoch: 1, heartbeat_ms: 50, silence_ms: 300, drain_ms: 0 };
+        let welcome = Welcome { worker: 1, run, epoch: 1, heartbeat_ms: 50, silence_ms: 1000, drain_ms: 0 };
         tell(&mut stream, &ToWorker::Welcome(welcome));
-        // Signs of life keep it, though it hears nothing else; then, as of a machine without power, there is not even an end.
-        for _ in 0..20 {
+        // Heartbeats keep the worker for longer than the silence that it tolerates; then, as of a machine without power, there is not
+        // even an end.
+        for _ in 0..30 {
             tell(&mut stream, &ToWorker::Heartbeat);
             while !matches!(read_message(&mut stream), ToCoordinator::Heartbeat { .. }) {}
         }

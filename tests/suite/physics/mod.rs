@@ -3,6 +3,7 @@
 mod limits;
 #[cfg(feature = "slow")]
 mod probes;
+mod stored;
 mod tables;
 
 use lookalike::{
@@ -10,7 +11,7 @@ use lookalike::{
     math::Rgb,
     render::{
         knots::{Knots, PER_OCTAVE},
-        transport::Accuracy,
+        transport::{Accuracy, Pixel},
     },
 };
 use lookalike_tests::scene::{
@@ -19,6 +20,7 @@ use lookalike_tests::scene::{
     reference::Effort,
     spread,
 };
+use std::collections::BTreeSet;
 
 /// Largest root mean square deviation of tables of stage one, as a share of mean radiance (design section 5).
 const TOLERANCE: f64 = 2e-3;
@@ -36,7 +38,6 @@ const QUICK: Rigour =
     Rigour { effort: Effort { first: 1 << 12, standard_error: 1.5e-3, ..EFFORT }, standard_error: 1e-3 };
 
 /// In minutes: a quarter of [`TOLERANCE`] (design section 5).
-#[cfg(feature = "slow")]
 const THOROUGH: Rigour =
     Rigour { effort: Effort { first: 1 << 13, standard_error: 7e-4, ..EFFORT }, standard_error: 5e-4 };
 
@@ -47,38 +48,32 @@ fn knots(per_octave: f64) -> Knots {
 }
 
 /// One comparison of every lobe of some models.
-struct Case<'a> {
+struct Case {
     /// For the print.
-    name: &'a str,
+    name: &'static str,
+    scene: Scene,
     /// Whose lobes.
-    models: &'a [&'static dyn Model],
+    models: Vec<&'static dyn Model>,
     /// Widths; the nearest mid-knots are taken.
-    alphas: &'a [f64],
+    alphas: &'static [f64],
     /// Pixels of full coverage, spread over the object.
     pixels: usize,
     /// Accuracies of tables, each with the largest root mean square deviation of any part of any lobe.
-    accuracies: &'a [(Accuracy, f64)],
+    accuracies: &'static [(Accuracy, f64)],
     /// Of the reference.
     rigour: Rigour,
 }
 
-impl Case<'_> {
+impl Case {
     /// Prints every deviation, then asserts.
     #[track_caller]
-    fn check(&self, scene: &Scene) {
-        let pixels = spread(&scene.interior(), self.pixels, 1);
-        let widths = mid_knots(&knots(PER_OCTAVE), self.alphas);
+    fn check(&self, references: &[References]) {
         let mut failures = Vec::new();
-        let mut seen: Vec<&str> = Vec::new();
-        for model in self.models {
-            // A lobe that several models share is integrated once.
-            let is_new = |name: &str| !seen.contains(&name);
-            let references =
-                References::new(scene, *model, &pixels, (knots(PER_OCTAVE), &widths), self.rigour.effort, is_new);
-            seen.extend(model.lobes().iter().map(|basis| basis.lobe.name()));
+        for references in references {
             for &(accuracy, tolerance) in self.accuracies {
-                for agreement in references.compare(scene, knots(PER_OCTAVE), accuracy) {
-                    let line = format!("{}, {}, {:e}: {agreement}", self.name, model.name(), accuracy.tolerance);
+                for agreement in references.compare(&self.scene, knots(PER_OCTAVE), accuracy) {
+                    let model = references.model().name();
+                    let line = format!("{}, {model}, {:e}: {agreement}", self.name, accuracy.tolerance);
                     println!("{line}");
                     if agreement.rms > tolerance || agreement.standard_error > self.rigour.standard_error {
                         failures.push(line);
@@ -87,5 +82,29 @@ impl Case<'_> {
             }
         }
         assert!(failures.is_empty(), "{failures:#?}");
+    }
+
+    /// What the integrator says of every lobe.
+    fn integrate(&self) -> Vec<References> {
+        let (pixels, widths) = (self.pixels(), mid_knots(&knots(PER_OCTAVE), self.alphas));
+        let of_model = |(model, lobes): (&'static dyn Model, Vec<&str>)| {
+            let (grid, effort) = ((knots(PER_OCTAVE), &widths[..]), self.rigour.effort);
+            References::new(&self.scene, model, &pixels, grid, effort, |name| lobes.contains(&name))
+        };
+        self.lobes().into_iter().map(of_model).collect()
+    }
+
+    fn pixels(&self) -> Vec<Pixel> {
+        spread(&self.scene.interior(), self.pixels, 1)
+    }
+
+    /// The lobes of each model. One that several models share is compared once.
+    fn lobes(&self) -> Vec<(&'static dyn Model, Vec<&'static str>)> {
+        let mut seen = BTreeSet::new();
+        let mut of_model = |model: &'static dyn Model| {
+            let names = model.lobes().iter().map(|basis| basis.lobe.name());
+            names.filter(|name| seen.insert(*name)).collect()
+        };
+        self.models.iter().map(|&model| (model, of_model(model))).collect()
     }
 }

@@ -2,8 +2,10 @@
 //!
 //! The direct integrator is Monte Carlo with its own density, its own points inside the pixel and seeds of its own; tables are
 //! deterministic. They share the map, the geometry and the formula of the lobe, each tested elsewhere.
+//!
+//! By default the integrator's means and variances are read from a file. With `--features slow` it integrates again, and more pixels.
 
-use super::{Case, EFFORT, QUICK, TOLERANCE, knots};
+use super::{Case, EFFORT, Rigour, TOLERANCE, knots, stored};
 use lookalike::{
     brdf::{CookTorrance, Ggx, MODELS, Material, Model, Split},
     render::{
@@ -20,68 +22,124 @@ use lookalike_tests::scene::{
 
 const SUBSET: &[(Accuracy, f64)] = &[(Accuracy::SUBSET, TOLERANCE)];
 
+/// A comparison, and how many pixels it has.
+pub(super) struct Comparison {
+    /// Of so many pixels, with a reference of this rigour.
+    pub(super) build: fn(usize, Rigour) -> Case,
+    /// Pixels whose reference is stored.
+    pub(super) stored: usize,
+    /// Pixels whose reference is integrated by the slow test.
+    pub(super) live: usize,
+}
+
+pub(super) static ROOM: Comparison = Comparison { build: room, stored: 12, live: 24 };
+pub(super) static SUN: Comparison = Comparison { build: sun, stored: 24, live: 64 };
+pub(super) static PERSPECTIVE: Comparison = Comparison { build: perspective, stored: 12, live: 24 };
+
+impl Comparison {
+    #[track_caller]
+    fn check(&self) {
+        let slow = cfg!(feature = "slow");
+        let (pixels, rigour) = if slow { (self.live, super::QUICK) } else { (self.stored, super::THOROUGH) };
+        let case = (self.build)(pixels, rigour);
+        case.check(&if slow { case.integrate() } else { case.stored() });
+    }
+}
+
+fn room(pixels: usize, rigour: Rigour) -> Case {
+    let scene = Scene::sphere(256, Camera::Orthographic, synthetic::room(128)).unwrap();
+    let (models, alphas) = (MODELS.to_vec(), &[0.01, 0.4]);
+    Case { name: "room", scene, models, alphas, pixels, accuracies: SUBSET, rigour }
+}
+
+fn sun(pixels: usize, rigour: Rigour) -> Case {
+    let scene = Scene::sphere(256, Camera::Orthographic, synthetic::one_texel_sun(256, 80, 100)).unwrap();
+    let splits = |model: &&&dyn Model| model.lobes().iter().any(|basis| basis.lobe.split() == Split::Schlick);
+    let (models, alphas) = (MODELS.iter().filter(splits).copied().collect(), &[0.01, 0.1]);
+    Case { name: "sun", scene, models, alphas, pixels, accuracies: SUBSET, rigour }
+}
+
+fn perspective(pixels: usize, rigour: Rigour) -> Case {
+    let scene = Scene::sphere(256, Camera::perspective(50.0).unwrap(), synthetic::room_at_dusk(64)).unwrap();
+    let (models, alphas): (Vec<&dyn Model>, _) = (vec![&Ggx, &CookTorrance], &[0.1]);
+    Case { name: "perspective", scene, models, alphas, pixels, accuracies: SUBSET, rigour }
+}
+
 /// The whole path on light with texture, windows and a sun of one texel: both lobes and both Fresnel parts of every model.
 #[test]
 fn tables_agree_with_the_direct_integrator_in_a_room() {
-    let scene = Scene::sphere(256, Camera::Orthographic, synthetic::room(128)).unwrap();
-    Case { name: "room", models: MODELS, alphas: &[0.01, 0.4], pixels: 24, accuracies: SUBSET, rigour: QUICK }
-        .check(&scene);
+    ROOM.check();
 }
 
 /// Once the `F5` part was 0.3 % too dark near the rim (`render::cut::spread`), and the diffuse lobe of `ashikhmin-shirley`, which fades
 /// towards the rim, by as much (2.5 % in the worst pixel: one position stood for it). Of every model with such a part.
 #[test]
 fn fresnel_part_of_sharp_lobes_agrees_at_the_rim_under_a_sun_of_one_texel() {
-    let scene = Scene::sphere(256, Camera::Orthographic, synthetic::one_texel_sun(256, 80, 100)).unwrap();
-    let splits = |model: &&&dyn Model| model.lobes().iter().any(|basis| basis.lobe.split() == Split::Schlick);
-    let fresnel: Vec<&dyn Model> = MODELS.iter().filter(splits).copied().collect();
-    Case { name: "sun", models: &fresnel, alphas: &[0.01, 0.1], pixels: 64, accuracies: SUBSET, rigour: QUICK }
-        .check(&scene);
+    SUN.check();
 }
 
 #[test]
 fn tables_agree_with_the_direct_integrator_through_a_perspective_camera() {
-    let camera = Camera::perspective(50.0).unwrap();
-    let scene = Scene::sphere(256, camera, synthetic::room_at_dusk(64)).unwrap();
-    Case {
-        name: "perspective",
-        models: &[&Ggx, &CookTorrance],
-        alphas: &[0.1],
-        pixels: 24,
-        accuracies: SUBSET,
-        rigour: QUICK,
+    PERSPECTIVE.check();
+}
+
+/// Pixels that the silhouette cuts, and what covers the sphere there.
+pub(super) struct Silhouette {
+    scene: Scene,
+    pixels: Vec<Pixel>,
+}
+
+/// Materials at the silhouette, parameters of `ggx`.
+pub(super) const MATERIALS: [(&str, [f64; 7]); 2] =
+    [("plastic", [0.5, 0.3, 0.1, 0.04, 0.04, 0.04, 0.1]), ("metal", [0.0, 0.0, 0.0, 0.9, 0.6, 0.3, 0.03])];
+
+impl Silhouette {
+    /// Pixels whose reference is stored.
+    pub(super) const STORED: usize = 32;
+
+    pub(super) fn new(pixels: usize) -> Self {
+        let scene = Scene::sphere(256, Camera::Orthographic, synthetic::room(64)).unwrap();
+        let pixels = spread(&scene.silhouette(), pixels, 2);
+        Self { scene, pixels }
     }
-    .check(&scene);
+
+    /// What the integrator says.
+    pub(super) fn integrate(&self, parameters: &[f64; 7]) -> Reference {
+        let material = Material::new(&Ggx, parameters.to_vec()).unwrap();
+        let effort = Effort { first: 1 << 15, most: 1 << 15, ..EFFORT };
+        Reference::new(&self.scene, &self.pixels, &material, effort, 7)
+    }
+
+    /// What a table of full images says: the green channel of some pixels.
+    fn radiance(&self, pixels: &[Pixel], parameters: &[f64; 7]) -> Vec<f64> {
+        let plan = TransportPlan { model: &Ggx, knots: knots(PER_OCTAVE), accuracy: Accuracy::FULL };
+        let table = plan.integrate(&self.scene.geometry, &self.scene.pyramid, pixels);
+        let mut planes = table.planes();
+        table.radiance(&Ggx, parameters, &mut planes);
+        let [_, green, _] = planes;
+        green
+    }
 }
 
 /// Pixels that the silhouette cuts never enter stage one; in full images they count by their coverage, and so do their errors here.
 #[test]
 fn silhouette_pixels_agree_to_a_percent_of_mean_radiance() {
     const TOLERANCE: f64 = 1e-2;
-    let scene = Scene::sphere(256, Camera::Orthographic, synthetic::room(64)).unwrap();
-    let pixels = spread(&scene.silhouette(), 100, 2);
-    for (model, parameters) in
-        [("ggx", vec![0.5, 0.3, 0.1, 0.04, 0.04, 0.04, 0.1]), ("ggx", vec![0.0, 0.0, 0.0, 0.9, 0.6, 0.3, 0.03])]
-    {
-        let material = Material::new(lookalike::brdf::model(model).unwrap(), parameters.clone()).unwrap();
-        let plan = TransportPlan { model: material.model(), knots: knots(PER_OCTAVE), accuracy: Accuracy::FULL };
-        let radiance = |pixels: &[Pixel]| {
-            let table = plan.integrate(&scene.geometry, &scene.pyramid, pixels);
-            let mut planes = table.planes();
-            table.radiance(material.model(), &parameters, &mut planes);
-            planes
-        };
-        let reference =
-            Reference::new(&scene, &pixels, &material, Effort { first: 1 << 15, most: 1 << 15, ..EFFORT }, 7);
-        let mean = radiance(&spread(&scene.interior(), 200, 3))[1].iter().sum::<f64>() / 200.0;
-        let ours = radiance(&pixels);
+    let slow = cfg!(feature = "slow");
+    let silhouette = Silhouette::new(if slow { 100 } else { Silhouette::STORED });
+    for (name, parameters) in &MATERIALS {
+        let reference = if slow { silhouette.integrate(parameters) } else { stored::silhouette(name) };
+        let object = spread(&silhouette.scene.interior(), 200, 3);
+        let mean = silhouette.radiance(&object, parameters).iter().sum::<f64>() / object.len() as f64;
+        let ours = silhouette.radiance(&silhouette.pixels, parameters);
         let square = |(k, p): (usize, &Pixel)| {
-            let coverage = f64::from(scene.geometry.coverage(p[0] as usize, p[1] as usize));
-            let error = coverage * (ours[1][k] - reference.radiance[k].y) / mean;
+            let coverage = f64::from(silhouette.scene.geometry.coverage(p[0] as usize, p[1] as usize));
+            let error = coverage * (ours[k] - reference.radiance[k].y) / mean;
             error * error
         };
-        let rms = (pixels.iter().enumerate().map(square).sum::<f64>() / pixels.len() as f64).sqrt();
-        println!("{parameters:?}: rms over the silhouette {:.3} % of mean radiance", 100.0 * rms);
+        let squares: Vec<f64> = silhouette.pixels.iter().enumerate().map(square).collect();
+        let rms = (squares.iter().sum::<f64>() / squares.len() as f64).sqrt();
+        println!("{name}: rms over the silhouette {:.3} % of mean radiance", 100.0 * rms);
         assert!(rms < TOLERANCE, "{rms}");
     }
 }

@@ -22,7 +22,10 @@ use std::time::Duration;
 use self::run::{Ending, simulate};
 
 /// How many seeds are simulated.
-const SEEDS: u64 = if cfg!(feature = "slow") { 1000 } else { 50 };
+const SEEDS: u64 = if cfg!(feature = "slow") { 1000 } else { 12 };
+
+/// How many seeds are simulated twice.
+const REPLAYS: u64 = if cfg!(feature = "slow") { 5 } else { 1 };
 
 /// Names the seed to replay.
 const SEED: &str = "LOOKALIKE_SIM_SEED";
@@ -54,7 +57,7 @@ fn runs_come_through_whatever_happens_to_the_network() {
 
 #[test]
 fn seed_replays_to_the_same_events_at_the_same_times() {
-    for seed in 1..=number(TWICE).unwrap_or(5) {
+    for seed in 1..=number(TWICE).unwrap_or(REPLAYS) {
         let [first, second] = [0, 1].map(|_| simulate(seed).expect("a run that comes through").trace);
         let differing = first.lines().zip(second.lines()).find(|(first, second)| first != second);
         assert_eq!(differing, None, "seed {seed}");

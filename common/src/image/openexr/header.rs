@@ -22,7 +22,11 @@ pub(super) fn check(source: &Source<'_>) -> Result<(), ImageError> {
             rest.start = attribute.whole.end;
         }
         if samples.pixels.saturating_mul(samples.channels) > source.limits.max_pixels.saturating_mul(MAX_CHANNELS) {
-            return Err(source.unsupported(FORMAT, format!("{} channels at this size", samples.channels), "remove channels that are not needed"));
+            return Err(source.unsupported(
+                FORMAT,
+                format!("{} channels at this size", samples.channels),
+                "remove channels that are not needed",
+            ));
         }
         // An empty name ends a part. In a multi-part file, a second one ends the list of parts.
         rest.start += 1;
