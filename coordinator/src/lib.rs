@@ -2,6 +2,7 @@
 //! run. It knows neither rendering nor a command line: it imports `lookalike`'s graph and protocol only.
 
 pub mod access;
+pub mod atomic;
 pub mod comm;
 pub mod core;
 pub mod journal;
