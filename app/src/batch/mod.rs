@@ -26,7 +26,7 @@ mod window;
 use crate::{
     exit::Exit,
     inputs::show_warnings,
-    outputs::{FIT_FILES, OutFolder, print_result},
+    outputs::{BATCH_MARK, Claim, ClaimedFolder, FIT_FILES, OldFiles, OutFolder, print_result},
     progress::{Ending, display_of_many},
     run::{journal_failed, run_to_end, runner_options},
     settings::{BatchFit, BatchSettings, OnFailure, ProgressKind},
@@ -36,7 +36,7 @@ use board::{Board, Watchers};
 use lights::Lights;
 use lookalike::graph::Many;
 use lookalike_coordinator::journal::{self, Finished, FitLedger, JOURNAL_FILE, JournalOptions};
-use std::{process::ExitCode, sync::Arc};
+use std::{path::Path, process::ExitCode, sync::Arc};
 use supply::{Supply, SupplyOptions};
 use tokio::sync::Notify;
 use window::{Demand, Window};
@@ -44,12 +44,12 @@ use window::{Demand, Window};
 /// Runs a batch and writes its results.
 pub(crate) fn run(settings: BatchSettings) -> anyhow::Result<ExitCode> {
     // Whatever can fail fails before any work is done.
-    resume::refuse_old(&settings)?;
-    let out = OutFolder::create(&settings.out, settings.resume)?;
+    let folder = ClaimedFolder::take(&claim(&settings))?;
     let metrics = settings.metrics.map(|address| address.listen()).transpose()?;
     let lights = Arc::new(Lights::default());
     let checked = check::check(&settings, &lights)?;
     let out_name = settings.out.display().to_string();
+    let out = folder.begin()?;
     let identity = resume::identity(&settings.fits, &checked.fits);
     let resume::Earlier { is_finished, complete, remark } =
         resume::earlier(&out, &out_name, &identity, &settings.fits)?;
@@ -123,18 +123,35 @@ fn close(out: &OutFolder, board: &Board, ledger: &FitLedger, is_whole: bool, fit
     Ok(())
 }
 
+/// What the batch asks of its folder.
+fn claim(settings: &BatchSettings) -> Claim<'_> {
+    let mut inputs: Vec<&Path> = vec![&settings.manifest];
+    for fit in &settings.fits {
+        inputs.extend([fit.photo.as_path(), fit.environment.path.as_path()]);
+        inputs.extend([&fit.mask, &fit.view.normals].into_iter().filter_map(|path| path.as_deref()));
+    }
+    inputs.extend(settings.cluster.access.as_deref());
+    Claim {
+        command: "batch",
+        files: vec![summary::CSV, BATCH_MARK],
+        fits: settings.fits.iter().map(|fit| fit.name.as_str()).collect(),
+        inputs,
+        access: settings.cluster.access.as_deref(),
+        ..Claim::of_fit(&settings.out, OldFiles::of(settings.resume, settings.force))
+    }
+}
+
 /// Tells all that is wrong with a batch, without running it.
 pub(crate) fn check(settings: &BatchSettings) -> anyhow::Result<()> {
-    resume::refuse_old(settings)?;
+    claim(settings).check()?;
     show_warnings(&check::check(settings, &Lights::default())?.warnings);
     Ok(())
 }
 
 /// The files of all fits, each with its hash.
 fn outputs(out: &OutFolder, fits: &[BatchFit]) -> anyhow::Result<Vec<(String, String)>> {
-    let files = fits.iter().flat_map(|fit| FIT_FILES.map(|file| format!("{}/{file}", fit.name)));
-    let there = files.filter_map(|name| out.hash(&name).transpose().map(|hash| hash.map(|hash| (name, hash))));
-    there.collect()
+    let files: Vec<String> = fits.iter().flat_map(|fit| FIT_FILES.map(|file| format!("{}/{file}", fit.name))).collect();
+    out.hashes(files.iter().map(String::as_str))
 }
 
 /// Writes the last summaries and tells how it went.

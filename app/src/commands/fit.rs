@@ -3,19 +3,25 @@
 use crate::{
     fit::{self, FitJob},
     inputs::{load_capture, resolve_display_exposure, show_warnings},
-    outputs::OutFolder,
+    outputs::{Claim, ClaimedFolder, OldFiles},
     settings::FitSettings,
 };
-use std::{process::ExitCode, sync::Arc, time::Instant};
+use std::{
+    path::{Path, PathBuf},
+    process::ExitCode,
+    sync::Arc,
+    time::Instant,
+};
 
 pub(crate) fn run(settings: FitSettings) -> anyhow::Result<ExitCode> {
     let began = Instant::now();
     // Whatever can fail fails before any work is done.
-    let out = OutFolder::create(&settings.out, settings.resume)?;
+    let folder = ClaimedFolder::take(&claim(&settings))?;
     let loaded = load_capture(&(&settings).into())?;
     show_warnings(&loaded.warnings);
     let coverage = loaded.capture.scoring_coverage();
     let exposure = resolve_display_exposure(&settings.display_exposure, loaded.capture.photo(), &coverage)?;
+    let out = folder.begin()?;
     let job = FitJob {
         inputs: loaded.to_json(),
         capture: Arc::new(loaded.capture),
@@ -33,4 +39,17 @@ pub(crate) fn run(settings: FitSettings) -> anyhow::Result<ExitCode> {
         input_seconds: began.elapsed().as_secs_f64(),
     };
     Ok(fit::run(job)?.map_or(ExitCode::SUCCESS, |finished| finished.code))
+}
+
+/// What the fit asks of its folder.
+fn claim(settings: &FitSettings) -> Claim<'_> {
+    let files = [Some(&settings.photo), settings.mask.as_ref(), settings.view.normals.as_ref()];
+    let mut inputs: Vec<&Path> = files.into_iter().flatten().map(PathBuf::as_path).collect();
+    inputs.push(&settings.environment.path);
+    inputs.extend(settings.cluster.access.as_deref());
+    Claim {
+        inputs,
+        access: settings.cluster.access.as_deref(),
+        ..Claim::of_fit(&settings.out, OldFiles::of(settings.resume, settings.force))
+    }
 }

@@ -17,6 +17,8 @@ pub struct BatchSettings {
     pub out: PathBuf,
     /// Go on with the run that is in the folder, if there is one.
     pub resume: bool,
+    /// Replace files with our names in the folder, never an input of the run.
+    pub force: bool,
     /// Where candidates are judged and polished.
     pub stage_two: StageTwo,
     /// What happens when a fit fails.

@@ -29,6 +29,8 @@ pub struct FitSettings {
     pub out: PathBuf,
     /// Go on with the run that is in the folder, if there is one.
     pub resume: bool,
+    /// Replace files with our names in the folder, never an input of the run.
+    pub force: bool,
     /// Who computes.
     pub cluster: ClusterSettings,
     /// How progress is shown.

@@ -10,7 +10,7 @@ use std::{
     io::Write,
 };
 
-const FILE: &str = "seconds.tsv";
+pub(super) const FILE: &str = "seconds.tsv";
 
 /// What begins the lines of another process.
 const EPOCH: &str = "#";

@@ -34,7 +34,7 @@ pub(crate) struct FitArgs {
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Output")]
 struct OutputArgs {
-    /// Folder of results; must not hold a run, unless --resume goes on with it
+    /// Folder of results; must not hold a run, unless --resume or --force is given
     #[arg(long, short, value_name = "DIR")]
     out: PathBuf,
     /// Exit with code 1 if the final CSSIM lies above this
@@ -44,6 +44,9 @@ struct OutputArgs {
     /// done at once if it is finished
     #[arg(long)]
     resume: bool,
+    /// Replace files with our names in the folder, never an input and never through a symbolic link
+    #[arg(long, conflicts_with = "resume")]
+    force: bool,
 }
 
 #[derive(Debug, Args)]
@@ -72,6 +75,7 @@ impl FitArgs {
             max_cssim: self.output.max_cssim,
             out: self.output.out,
             resume: self.output.resume,
+            force: self.output.force,
             cluster: self.cluster.into_settings()?,
             progress: self.diagnostics.progress,
             metrics: self.diagnostics.metrics,

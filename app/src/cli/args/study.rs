@@ -11,12 +11,15 @@ pub(crate) struct StudyArgs {
     /// TOML file that names materials, lights and experiments
     #[arg(value_name = "STUDY.toml")]
     study: PathBuf,
-    /// Folder of results; must not hold a run, unless --resume goes on with it
+    /// Folder of results; must not hold a run, unless --resume or --force is given
     #[arg(long, short, value_name = "DIR", help_heading = "Output")]
     out: PathBuf,
     /// Go on with the study that is in the folder: what is complete is not computed again. Of a complete one, write the report again
     #[arg(long, help_heading = "Output")]
     resume: bool,
+    /// Replace files with our names in the folder, never an input and never through a symbolic link
+    #[arg(long, conflicts_with = "resume", help_heading = "Output")]
+    force: bool,
     #[command(flatten)]
     cluster: ClusterArgs,
     /// Submit the run to Slurm, which starts coordinator and workers where there is room, and return
@@ -39,6 +42,7 @@ impl StudyArgs {
             study: self.study,
             out: self.out,
             resume: self.resume,
+            force: self.force,
             metrics: self.diagnostics.metrics,
             cluster: self.cluster.into_settings()?,
             progress: self.diagnostics.progress,
