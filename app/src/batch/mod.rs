@@ -19,6 +19,7 @@ mod loader;
 mod prepare;
 mod results;
 mod resume;
+mod row;
 mod summary;
 mod supply;
 mod window;
@@ -179,16 +180,5 @@ fn first_error(first: anyhow::Result<()>, then: anyhow::Result<()>) -> anyhow::R
             Err(first)
         }
         (first, then) => first.and(then),
-    }
-}
-
-/// The exit code of a batch: a fit that failed outweighs one that missed its score.
-fn exit(count: &crate::progress::FitCount) -> Exit {
-    if count.failed > 0 {
-        Exit::SomeFitsFailed
-    } else if count.missed > 0 {
-        Exit::MissedMaxCssim
-    } else {
-        Exit::Done
     }
 }

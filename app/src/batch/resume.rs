@@ -1,6 +1,6 @@
 //! What an earlier run of a batch has left: the same batch or another one, and which fits are complete.
 
-use super::{check::Checked, results::Scores};
+use super::{check::Checked, row::Scores};
 use crate::{
     fit::version,
     outputs::{MARK, OutFolder},

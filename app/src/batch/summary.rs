@@ -1,6 +1,6 @@
 //! `summary.csv`, `summary.json` and the table at the end: one row per fit.
 
-use super::board::{Row, State};
+use super::row::{Row, State};
 use crate::{
     outputs::{BATCH_MARK, OutFolder, aligned, parameters_json},
     progress::FitCount,
@@ -163,7 +163,7 @@ fn quoted(text: &str) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::{super::results::Scores, *};
+    use super::{super::row::Scores, *};
     use lookalike::brdf;
 
     fn row(name: &str, model: &str, state: State) -> Row {

@@ -1,26 +1,26 @@
 //! `lookalike render`: a sphere, or a map of normals, of one material under one light, by the direct integrator.
 
 mod encode;
+mod material;
 
 use super::output::{check_writable, write_file};
 use crate::{
     exit::Exit,
     inputs::{
-        self, LoadedEnvironment, LoadedGeometry, LoadedTable, flat_parameters, load_environment, load_normals,
-        load_table, show_warnings, sphere_geometry,
+        LoadedEnvironment, LoadedGeometry, load_environment, load_normals, show_warnings, sphere_geometry,
     },
-    settings::{self, RenderSettings},
+    settings::RenderSettings,
 };
 use anyhow::Context;
 use encode::{Format, Subject};
 use indicatif::{ProgressBar, ProgressStyle};
 use lookalike::{
-    brdf::{self, Material, Reflectance, flat_names},
     light::LightDistribution,
     math::Rgb,
     render::image::{Noise, Rendering, Shot},
     scene::Circle,
 };
+use material::LoadedMaterial;
 use std::process::ExitCode;
 
 /// Renders a material.
@@ -48,37 +48,6 @@ pub(crate) fn run(settings: RenderSettings) -> anyhow::Result<ExitCode> {
     write_file(&settings.out, &file.bytes)?;
     tell(&settings, &light, &rendering, file.exposure);
     Ok(Exit::Done.into())
-}
-
-/// A material with what names it in metadata.
-#[derive(Debug)]
-struct LoadedMaterial {
-    reflectance: Box<dyn Reflectance>,
-    /// The model's name; `merl` for a measured one.
-    model: &'static str,
-    /// `name=value` pairs of a model.
-    parameters: Option<String>,
-    /// The file of a measured material, with its hash.
-    file: Option<inputs::InputFile>,
-}
-
-impl LoadedMaterial {
-    fn load(material: &settings::Material) -> anyhow::Result<Self> {
-        match material {
-            settings::Material::Measured(path) => {
-                let LoadedTable { table, source } = load_table(path)?;
-                Ok(Self { reflectance: Box::new(table), model: "merl", parameters: None, file: Some(source) })
-            }
-            settings::Material::Analytic { model, params } => {
-                let model = brdf::model(model.as_str())?;
-                let flat = flat_parameters(model, params).context("--params")?;
-                let pairs = flat_names(model.parameters()).into_iter().zip(&flat);
-                let parameters = pairs.map(|(name, value)| format!("{name}={value}")).collect::<Vec<_>>().join(",");
-                let reflectance = Box::new(Material::new(model, flat).context("--params")?);
-                Ok(Self { reflectance, model: model.name(), parameters: Some(parameters), file: None })
-            }
-        }
-    }
 }
 
 fn shape(settings: &RenderSettings) -> anyhow::Result<LoadedGeometry> {

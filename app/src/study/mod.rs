@@ -15,6 +15,7 @@ mod cells;
 mod data;
 mod effort;
 mod file;
+mod inputs;
 mod pictures;
 mod planner;
 mod progress;
@@ -35,6 +36,7 @@ use crate::{
 use anyhow::Context;
 use effort::Effort;
 use file::Study;
+use inputs::{Inputs, Light};
 use lookalike::{
     brdf::merl::MerlTable,
     graph::{Blob, Many},
@@ -55,7 +57,7 @@ use std::{
     sync::{Arc, Mutex, PoisonError},
     time::Instant,
 };
-use supply::{Inputs, Light, Supply, Tally};
+use supply::{Supply, Tally};
 
 /// Runs a study and writes its report.
 pub(crate) fn run(settings: StudySettings) -> anyhow::Result<ExitCode> {
