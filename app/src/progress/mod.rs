@@ -16,7 +16,11 @@ use lookalike_coordinator::comm::RunEvent;
 use std::{
     io::{self, IsTerminal, Write as _},
     sync::Arc,
+    time::Duration,
 };
+
+/// Between two lines of progress where no bars can be drawn.
+const PAUSE: Duration = Duration::from_secs(10);
 
 /// How a run ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -29,11 +29,11 @@ pub(super) const COARSE_SHARD: usize = 512;
 const FULL_PER_OCTAVE: f64 = 5.0;
 
 impl FitPlanner {
-    /// Adds the shards of a table of `count` pixels of the list `pixels`.
+    /// Adds the shards of a table of `count` pixels of the list `pixels`, as nodes of this kind.
     pub(super) fn add_transport(
         &mut self,
         graph: &mut GraphEdit<'_>,
-        what: &str,
+        (kind, what): (&str, &str),
         pixels: (BlobHash, usize, usize),
         knots: Knots,
         accuracy: Accuracy,
@@ -58,7 +58,7 @@ impl FitPlanner {
                 range,
             };
             let spec = NodeSpec {
-                kind: nodes::TRANSPORT.to_owned(),
+                kind: kind.to_owned(),
                 label: format!("transport {what}, pixels {first} to {}", first + range.1 as usize - 1),
                 parameters: encode("parameters", &parameters)?,
                 inputs: inputs.clone(),
@@ -84,7 +84,7 @@ impl FitPlanner {
         };
         let pixels = (list, self.pixels.len(), FULL_SHARD);
         let what = if self.tables.is_empty() { "in full" } else { "in full again" };
-        let shards = self.add_transport(graph, what, pixels, knots, Accuracy::FULL)?;
+        let shards = self.add_transport(graph, (nodes::TRANSPORT_FULL, what), pixels, knots, Accuracy::FULL)?;
         self.tables.push((span, shards.clone()));
         Ok(shards)
     }
