@@ -33,7 +33,7 @@ impl fmt::Display for Exit {
             Self::Done => "done",
             Self::MissedMaxCssim => "the score of --max-cssim was missed",
             Self::BadInput => "bad input",
-            Self::ClusterFailed => "the cluster failed",
+            Self::ClusterFailed => "the run failed",
             Self::SomeFitsFailed => "some fits failed",
             Self::Interrupted => "interrupted",
         })

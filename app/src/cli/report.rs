@@ -39,7 +39,7 @@ mod tests {
     #[test]
     fn each_cause_has_its_line_and_no_backtrace() {
         let error = anyhow!("no such file").context("cannot read the photo").context(Exit::ClusterFailed);
-        let expected = "error: the cluster failed\n  caused by: cannot read the photo\n  caused by: no such file\n";
+        let expected = "error: the run failed\n  caused by: cannot read the photo\n  caused by: no such file\n";
         assert_eq!(render(&error, false), expected);
         assert!(render(&error, true).starts_with("\x1b[1;31merror:\x1b[0m "));
     }

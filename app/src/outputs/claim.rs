@@ -9,7 +9,7 @@
 
 use super::ledger::{LEDGER, Ledger, hash_of};
 use crate::problems::Problems;
-use anyhow::{Context, bail};
+use anyhow::bail;
 use lookalike_coordinator::{
     atomic::draft_of,
     journal::{JOURNAL_FILE, LOCK_FILE, status::STATUS_FILE},

@@ -2,7 +2,7 @@
 
 use super::{
     claim::{Claim, FIT_FILES, OldFiles, changed, is_file, is_there},
-    ledger::{LEDGER, Ledger, hash_of},
+    ledger::{Ledger, hash_of},
 };
 use anyhow::{Context, bail};
 use lookalike_coordinator::{
