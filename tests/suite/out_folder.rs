@@ -36,7 +36,8 @@ fn demo_does_not_replace_a_fit_and_a_fit_not_its_own_photo() {
     fs::write(at("own/fit.json"), r#"{ "inputs": { "photo": { "path": "photo.exr" } } }"#).unwrap();
     fs::copy(at("photo.exr"), at("own/match.exr")).unwrap();
     let photo = fs::read(at("photo.exr")).unwrap();
-    lookalike(folder.path(), "demo -o own --progress none").refused(&["own holds something else than a demo (fit.json)"]);
+    lookalike(folder.path(), "demo -o own --progress none")
+        .refused(&["own holds something else than a demo (fit.json)"]);
     for flags in ["", "--resume", "--force"] {
         lookalike(folder.path(), &format!("fit own/match.exr --env map.exr --out own {QUICK} {flags}"))
             .refused(&["own/match.exr is an input of this run", "choose another --out"]);

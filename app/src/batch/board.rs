@@ -12,16 +12,8 @@ use crate::{
     run::Clock,
     settings::BatchFit,
 };
-use lookalike::{
-    brdf,
-    fit::BestScore,
-    graph::split_label,
-};
-use lookalike_coordinator::{
-    comm::RunEvent,
-    journal::FitLedger,
-    metrics::Metrics,
-};
+use lookalike::{brdf, fit::BestScore, graph::split_label};
+use lookalike_coordinator::{comm::RunEvent, journal::FitLedger, metrics::Metrics};
 use std::{
     collections::BTreeMap,
     sync::{Arc, Mutex, MutexGuard, PoisonError},
@@ -114,6 +106,11 @@ impl Board {
             clock.requeued += u64::from(matches!(event, RunEvent::NodeRequeued { .. }));
         }
         inner.watchers.display.event(event);
+    }
+
+    /// A line for people.
+    pub(super) fn say(&self, text: &str) {
+        self.lock().watchers.display.say(text);
     }
 
     /// The inputs of a fit are there, which took so many seconds.

@@ -29,7 +29,7 @@ use crate::{
     inputs::show_warnings,
     outputs::{BATCH_MARK, Claim, ClaimedFolder, FIT_FILES, OldFiles, OutFolder, print_result},
     progress::{Ending, display_of_many},
-    run::{journal_failed, run_to_end, runner_options},
+    run::{invitation, journal_failed, run_to_end, runner_options},
     settings::{BatchFit, BatchSettings, OnFailure, ProgressKind},
 };
 use anyhow::Context;
@@ -100,6 +100,9 @@ pub(crate) fn run(settings: BatchSettings) -> anyhow::Result<ExitCode> {
     let run = run_to_end(options, Many::new(supply), metrics.as_ref(), |event| {
         demand.note(event);
         board.note(event);
+        if let Some(text) = invitation(event, &settings.cluster, &out, settings.progress) {
+            board.say(&text);
+        }
     });
     // Also of a run that failed: what was computed is written.
     let run = run.map(|(planner, summary)| (drop(planner), summary).1);

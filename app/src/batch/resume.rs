@@ -31,8 +31,8 @@ pub(super) struct Earlier {
     pub(super) remark: Option<String>,
 }
 
-/// What the run in a folder has left, if there is one and it is to be gone on with. Only what its journal says that it wrote is taken
-/// for its work.
+/// What the run in a folder has left, if there is one and it is resumed. Only files that its journal lists count as
+/// its results.
 ///
 /// # Errors
 /// If the run there is one of other inputs or settings, or a result was changed.

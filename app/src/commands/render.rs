@@ -6,9 +6,7 @@ mod material;
 use super::output::{check_writable, write_file};
 use crate::{
     exit::Exit,
-    inputs::{
-        LoadedEnvironment, LoadedGeometry, load_environment, load_normals, show_warnings, sphere_geometry,
-    },
+    inputs::{LoadedEnvironment, LoadedGeometry, load_environment, load_normals, show_warnings, sphere_geometry},
     settings::RenderSettings,
 };
 use anyhow::Context;
@@ -21,7 +19,11 @@ use lookalike::{
     scene::Circle,
 };
 use material::LoadedMaterial;
-use std::process::ExitCode;
+use std::{
+    process::ExitCode,
+    sync::Mutex,
+    time::{Duration, Instant},
+};
 
 /// Renders a material.
 pub(crate) fn run(settings: RenderSettings) -> anyhow::Result<ExitCode> {
@@ -65,13 +67,23 @@ fn shape(settings: &RenderSettings) -> anyhow::Result<LoadedGeometry> {
     }
 }
 
-/// Renders under a bar of rows on stderr, which shows on terminals only.
+/// Renders under a bar of rows on stderr; where none can be drawn, with a line now and then.
 fn with_progress(shot: &Shot<'_>) -> Rendering {
     let rows = ProgressBar::new(shot.geometry.height() as u64);
     if let Ok(style) = ProgressStyle::with_template("rendering {wide_bar} {pos}/{len} rows, {eta} left") {
         rows.set_style(style);
     }
-    let rendering = shot.render(|| rows.inc(1));
+    let told = Mutex::new(Instant::now());
+    let rendering = shot.render(|| {
+        rows.inc(1);
+        // A row that finds another one at it leaves the line to that one.
+        if let (true, Ok(mut told)) = (rows.is_hidden(), told.try_lock())
+            && told.elapsed() >= PAUSE
+        {
+            *told = Instant::now();
+            eprintln!("rendering: {} of {} rows", rows.position(), shot.geometry.height());
+        }
+    });
     rows.finish_and_clear();
     rendering
 }
@@ -98,6 +110,9 @@ fn tell(settings: &RenderSettings, light: &LoadedEnvironment, rendering: &Render
     }
     eprintln!("wrote {}", settings.out.display());
 }
+
+/// Between two lines.
+const PAUSE: Duration = Duration::from_secs(10);
 
 /// What the image writers and readers take.
 const LARGEST_PX: usize = 1 << 14;

@@ -10,7 +10,7 @@ pub(crate) use method::method;
 pub(crate) use notes::notes;
 pub(crate) use results::{final_parameters, final_score, final_scores, judge, write_results};
 
-use crate::run::{Clock, cpu_seconds, is_finished, journal_failed, run_to_end, runner_options};
+use crate::run::{Clock, cpu_seconds, invitation, is_finished, journal_failed, run_to_end, runner_options};
 use crate::{
     exit::Exit,
     outputs::{FitRecord, OutFolder, Pictures, Timing, print_summary},
@@ -127,6 +127,9 @@ fn run_shown(
     let (planner, summary) = run_to_end(options, planner, metrics, |event| {
         clock.note(event);
         display.event(event);
+        if let Some(text) = invitation(event, &job.cluster, &job.out, job.progress) {
+            display.say(&text);
+        }
     })?;
     let outcome = planner.into_outcome().context("the graph ended without a result: please report this")?;
     let notes = notes(method, &outcome);

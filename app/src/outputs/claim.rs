@@ -112,7 +112,9 @@ impl<'a> Claim<'a> {
         }
         let mut words = [0; 8];
         let is_ours = is_file(&path)
-            && fs::File::open(&path).and_then(|mut file| file.read(&mut words)).is_ok_and(|n| n == 0 || &words == b"process ");
+            && fs::File::open(&path)
+                .and_then(|mut file| file.read(&mut words))
+                .is_ok_and(|n| n == 0 || &words == b"process ");
         if is_ours { Ok(()) } else { bail!("{}", self.in_the_way(LOCK_FILE)) }
     }
 
@@ -145,7 +147,9 @@ impl<'a> Claim<'a> {
             }
         }
         let is_told = |name: &str, problems: &[String]| {
-            problems.iter().any(|told| name.split_once('/').is_some_and(|(fit, _)| told.contains(&format!("/{fit} holds"))))
+            problems
+                .iter()
+                .any(|told| name.split_once('/').is_some_and(|(fit, _)| told.contains(&format!("/{fit} holds"))))
         };
         for name in self.names() {
             if is_told(&name, &problems) {
@@ -161,7 +165,11 @@ impl<'a> Claim<'a> {
         // Without its mark, a fit is not taken for a finished one while the others go.
         let names = [MARK.to_owned()].into_iter().chain(self.names()).chain(ledger.names()).chain([LEDGER.to_owned()]);
         let mut seen = std::collections::BTreeSet::new();
-        names.filter(|name| seen.insert(name.clone())).map(|name| self.out.join(name)).filter(|path| is_file(path)).collect()
+        names
+            .filter(|name| seen.insert(name.clone()))
+            .map(|name| self.out.join(name))
+            .filter(|path| is_file(path))
+            .collect()
     }
 
     /// Whether a file is there that only a run leaves behind.
@@ -196,7 +204,8 @@ impl<'a> Claim<'a> {
 
     /// A demo replaces demos only.
     fn check_demo(&self, ledger: &Ledger) -> anyhow::Result<()> {
-        let generated = fs::read(self.out.join(MARK)).ok().and_then(|bytes| serde_json::from_slice::<Value>(&bytes).ok());
+        let generated =
+            fs::read(self.out.join(MARK)).ok().and_then(|bytes| serde_json::from_slice::<Value>(&bytes).ok());
         let is_demo = match generated {
             Some(json) => json["inputs"]["photo"]["generated"] == true,
             None => !is_there(&self.out.join(MARK)) && ledger.is_of("demo"),
@@ -286,18 +295,18 @@ impl<'a> Claim<'a> {
         let has_mark = self.has_mark();
         match self.command {
             "batch" if has_mark => format!(
-                "{shown}/{BATCH_MARK} says that a batch was run there already: go on with it with --resume, choose another --out, \
+                "{shown}/{BATCH_MARK} says that a batch was run there already: resume it with --resume, choose another --out, \
                  or replace it with --force"
             ),
             "batch" | "study" => format!(
-                "{shown}/{JOURNAL_FILE} says that a run was begun there already: go on with it with --resume, choose another \
+                "{shown}/{JOURNAL_FILE} says that a run was begun there already: resume it with --resume, choose another \
                  --out, or replace it with --force"
             ),
             _ if has_mark => format!(
                 "{shown} already holds a finished fit ({MARK}): choose another --out, or replace it with --force"
             ),
             _ => format!(
-                "{shown} already holds a run that is not finished ({JOURNAL_FILE}): go on with it with --resume, choose another \
+                "{shown} already holds a run that is not finished ({JOURNAL_FILE}): resume it with --resume, choose another \
                  --out, or replace it with --force"
             ),
         }

@@ -95,10 +95,7 @@ impl OutFolder {
     }
 
     /// Those of some files that are there, each with the BLAKE3 of its bytes.
-    pub(crate) fn hashes<'a>(
-        &self,
-        names: impl IntoIterator<Item = &'a str>,
-    ) -> anyhow::Result<Vec<(String, String)>> {
+    pub(crate) fn hashes<'a>(&self, names: impl IntoIterator<Item = &'a str>) -> anyhow::Result<Vec<(String, String)>> {
         let there = names.into_iter().filter_map(|name| Some((name.to_owned(), self.hash(name).transpose()?)));
         there.map(|(name, hash)| Ok((name, hash?))).collect()
     }

@@ -10,9 +10,9 @@ mod pictures;
 mod strip;
 mod summary;
 
+pub(crate) use claim::{ACCESS_FILE, BATCH_MARK, Claim, FIT_FILES, MARK, OldFiles, changed};
 pub(crate) use conventions::conventions;
 pub(crate) use fit_json::{FitRecord, Timing, name_of, parameters_json};
-pub(crate) use claim::{BATCH_MARK, Claim, FIT_FILES, MARK, OldFiles, changed};
 pub(crate) use folder::{ClaimedFolder, OutFolder};
 pub(crate) use pictures::{Pictures, write_pictures};
 pub(crate) use strip::{Panel, strip};

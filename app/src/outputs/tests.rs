@@ -42,7 +42,10 @@ fn refused(claim: &Claim<'_>, phrases: &[&str]) {
 fn file_of_the_users_is_refused_by_name_and_forced_away() {
     let folder = folder(&[("candidates.csv", "mine"), ("reference.png", "mine"), ("notes.txt", "mine")]);
     let out = folder.path();
-    refused(&fit(out, OldFiles::Refuse), &["2 problems", "candidates.csv is there already", "reference.png", "--force"]);
+    refused(
+        &fit(out, OldFiles::Refuse),
+        &["2 problems", "candidates.csv is there already", "reference.png", "--force"],
+    );
     refused(&fit(out, OldFiles::Resume), &["candidates.csv is not a file of this run", "choose another --out"]);
     refused(&demo(out, OldFiles::ReplaceDemo), &["holds something else than a demo (candidates.csv)", "--force"]);
     assert_eq!(fs::read(out.join("reference.png")).unwrap(), b"mine");

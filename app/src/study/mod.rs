@@ -30,7 +30,7 @@ use crate::{
     inputs::{load_environment, show_warnings},
     outputs::{Claim, ClaimedFolder, OldFiles, OutFolder, print_result},
     progress::Ending,
-    run::{journal_failed, run_to_end, runner_options},
+    run::{invitation, journal_failed, run_to_end, runner_options},
     settings::{EnvironmentSettings, StudySettings},
 };
 use anyhow::Context;
@@ -132,6 +132,9 @@ fn run_cells(
         seconds.note(event);
         workers += u32::from(matches!(event, RunEvent::WorkerJoined { .. }));
         progress.event(event);
+        if let Some(text) = invitation(event, &settings.cluster, &inputs.out, settings.progress) {
+            progress.say(&text);
+        }
         progress.complete(lock(tally).complete);
     });
     let problem = run.as_ref().err().map(|error| format!("{error:#}"));

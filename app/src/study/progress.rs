@@ -29,7 +29,7 @@ enum Kind {
 }
 
 /// Between two lines.
-const PAUSE: Duration = Duration::from_secs(30);
+const PAUSE: Duration = Duration::from_secs(10);
 
 impl Progress {
     pub(super) fn new(kind: ProgressKind, cells: usize) -> Self {
@@ -48,6 +48,14 @@ impl Progress {
         match &self.kind {
             Kind::Bar(bar) => bar.suspend(|| self.display.event(event)),
             Kind::Lines | Kind::Silent => self.display.event(event),
+        }
+    }
+
+    /// A line for people.
+    pub(super) fn say(&mut self, text: &str) {
+        match &self.kind {
+            Kind::Bar(bar) => bar.suspend(|| self.display.say(text)),
+            Kind::Lines | Kind::Silent => self.display.say(text),
         }
     }
 

@@ -242,7 +242,13 @@ impl FitPlanner {
             let (count, shard) =
                 (subset.pixels.len(), if subset.pixels.len() > 4096 { FULL_SHARD } else { SUBSET_SHARD });
             let knots = stage_one_knots(&self.method);
-            inputs.extend(self.add_transport(graph, (nodes::TRANSPORT, &what), (list, count, shard), knots, Accuracy::SUBSET)?);
+            inputs.extend(self.add_transport(
+                graph,
+                (nodes::TRANSPORT, &what),
+                (list, count, shard),
+                knots,
+                Accuracy::SUBSET,
+            )?);
             inputs.extend(of_scene.iter().copied());
             for (g, &gamma) in self.method.gammas.iter().enumerate() {
                 let parameters = SearchParameters {

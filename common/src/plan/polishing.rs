@@ -75,7 +75,8 @@ impl FitPlanner {
         let list = add(graph, "list of pixels", &pixels)?;
         let knots = Knots::covering(low, high, COARSE_PER_OCTAVE);
         let list = (list, pixels.len(), super::tables::COARSE_SHARD);
-        let table = self.add_transport(graph, (nodes::TRANSPORT, "of the coarse picture"), list, knots, Accuracy::COARSE)?;
+        let table =
+            self.add_transport(graph, (nodes::TRANSPORT, "of the coarse picture"), list, knots, Accuracy::COARSE)?;
         self.polishing.coarse = Some((view, table));
         Ok(())
     }
