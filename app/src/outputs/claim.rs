@@ -16,6 +16,7 @@ use lookalike_coordinator::{
 };
 use serde_json::Value;
 use std::{
+    collections::{BTreeMap, BTreeSet},
     fs,
     io::{ErrorKind, Read},
     path::{Path, PathBuf},
@@ -121,7 +122,7 @@ impl<'a> Claim<'a> {
     /// The check, for a ledger of the folder.
     pub(super) fn check_against(&self, ledger: &Ledger) -> anyhow::Result<()> {
         let shown = self.out.display();
-        self.check_inputs()?;
+        self.check_inputs(ledger)?;
         let has_journal = is_there(&self.out.join(JOURNAL_FILE));
         match self.old {
             _ if has_journal && !is_file(&self.out.join(JOURNAL_FILE)) => bail!("{}", self.in_the_way(JOURNAL_FILE)),
@@ -135,11 +136,13 @@ impl<'a> Claim<'a> {
             }
             _ => {}
         }
-        let mut problems = Vec::new();
+        let is_link = |fit: &&str| self.out.join(fit).is_symlink();
+        let mut problems: Vec<String> =
+            self.fits.iter().copied().filter(is_link).map(|fit| self.in_the_way(fit)).collect();
         for fit in self.fits.iter().filter(|_| self.old != OldFiles::Replace) {
             let mark = format!("{fit}/{MARK}");
             let is_taken = is_there(&self.out.join(fit).join(JOURNAL_FILE))
-                || (is_there(&self.out.join(&mark)) && !(self.old == OldFiles::Resume && self.is_named(ledger, &mark)));
+                || (is_there(&self.out.join(&mark)) && !(self.old == OldFiles::Resume && ledger.has_name(&mark)));
             if is_taken {
                 problems.push(format!(
                     "{shown}/{fit} holds a fit that is not of this run: choose another --out, or move that folder elsewhere"
@@ -164,11 +167,11 @@ impl<'a> Claim<'a> {
     pub(super) fn replaced(&self, ledger: &Ledger) -> Vec<PathBuf> {
         // Without its mark, a fit is not taken for a finished one while the others go.
         let names = [MARK.to_owned()].into_iter().chain(self.names()).chain(ledger.names()).chain([LEDGER.to_owned()]);
-        let mut seen = std::collections::BTreeSet::new();
+        let mut seen = BTreeSet::new();
         names
             .filter(|name| seen.insert(name.clone()))
             .map(|name| self.out.join(name))
-            .filter(|path| is_file(path))
+            .filter(|path| is_file(path) && !path.parent().is_some_and(|it| it != self.out && it.is_symlink()))
             .collect()
     }
 
@@ -190,13 +193,16 @@ impl<'a> Claim<'a> {
     }
 
     /// An input is never replaced.
-    fn check_inputs(&self) -> anyhow::Result<()> {
-        let names = self.names();
-        let inputs: Vec<(PathBuf, &Path)> =
+    fn check_inputs(&self, ledger: &Ledger) -> anyhow::Result<()> {
+        let mut names: BTreeSet<String> = self.names().into_iter().collect();
+        if self.old == OldFiles::Replace {
+            names.extend(ledger.names());
+        }
+        let inputs: BTreeMap<PathBuf, &Path> =
             self.inputs.iter().filter_map(|input| Some((fs::canonicalize(input).ok()?, *input))).collect();
         let lines = names.iter().filter_map(|name| {
             let place = fs::canonicalize(self.out.join(name)).ok()?;
-            let (_, input) = inputs.iter().find(|(path, _)| *path == place)?;
+            let input = inputs.get(&place)?;
             Some(format!("{} is an input of this run, which would replace it: choose another --out", input.display()))
         });
         Problems::check(lines.collect(), &self.out.display().to_string())
@@ -272,11 +278,6 @@ impl<'a> Claim<'a> {
     /// Whether the run in the folder wrote this file.
     fn is_of_run(&self, name: &str, path: &Path, ledger: &Ledger) -> bool {
         fs::read(path).is_ok_and(|bytes| ledger.has(name, &hash_of(&bytes)))
-    }
-
-    /// Whether the run in the folder wrote a file of this name, which may have been changed since.
-    fn is_named(&self, ledger: &Ledger, name: &str) -> bool {
-        ledger.names().contains(name)
     }
 
     fn in_the_way(&self, name: &str) -> String {

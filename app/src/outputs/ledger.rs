@@ -65,6 +65,11 @@ impl Ledger {
         self.lock().written.contains(&(name.to_owned(), hash.to_owned()))
     }
 
+    /// Whether the run wrote a file of this name.
+    pub(super) fn has_name(&self, name: &str) -> bool {
+        self.lock().written.range((name.to_owned(), String::new())..).next().is_some_and(|(known, _)| known == name)
+    }
+
     /// The names of all files that the run wrote.
     pub(super) fn names(&self) -> BTreeSet<String> {
         self.lock().written.iter().map(|(name, _)| name.clone()).collect()
@@ -120,7 +125,12 @@ mod tests {
         assert_eq!(text, "# lookalike fit\nab  match.exr\ncd  a b/match.exr\n");
         fs::write(&path, text + "ef  fit").unwrap();
         let ledger = Ledger::read(folder.path()).unwrap();
-        assert!(ledger.is_of("fit") && ledger.has("match.exr", "ab") && !ledger.has("match.exr", "cd"));
+        assert!(
+            ledger.is_of("fit")
+                && ledger.has("match.exr", "ab")
+                && ledger.has_name("match.exr")
+                && !ledger.has("match.exr", "cd")
+        );
         assert_eq!(ledger.names().into_iter().collect::<Vec<_>>(), ["a b/match.exr", "match.exr"]);
     }
 }

@@ -85,6 +85,11 @@ fn input_is_never_replaced() {
         refused(&claim, &["match.exr is an input of this run", "choose another --out"]);
     }
     assert_eq!(fs::read(&photo).unwrap(), b"photo");
+    // A demo's photo has a name that a fit does not write, but that a forced fit would remove.
+    let out = folder.path().join("demo");
+    begin(&demo(&out, OldFiles::ReplaceDemo)).write("strip.png", b"photo").unwrap();
+    let photo = out.join("strip.png");
+    refused(&Claim { inputs: vec![&photo], ..fit(&out, OldFiles::Replace) }, &["strip.png is an input of this run"]);
 }
 
 #[cfg(unix)]
@@ -102,7 +107,11 @@ fn links_are_neither_followed_nor_replaced() {
             assert_eq!(fs::read(folder.path().join("mine")).unwrap(), b"precious");
         }
     }
-    let folder = folder(&[("elsewhere/x", "")]);
+    let folder = folder(&[("elsewhere/fit.json", ""), ("batch/notes.txt", "")]);
+    symlink(folder.path().join("elsewhere"), folder.path().join("batch/a")).unwrap();
+    let batch = folder.path().join("batch");
+    let claim = Claim { command: "batch", fits: vec!["a"], ..fit(&batch, OldFiles::Replace) };
+    refused(&claim, &["a is a symbolic link"]);
     let out = begin(&fit(&folder.path().join("out"), OldFiles::Refuse));
     symlink(folder.path().join("elsewhere"), folder.path().join("out/cells")).unwrap();
     assert!(out.sub("cells").unwrap_err().to_string().contains("is a symbolic link"));
