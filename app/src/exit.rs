@@ -41,13 +41,3 @@ impl fmt::Display for Exit {
 }
 
 impl std::error::Error for Exit {}
-
-/// Something of the design that this version does not have. Its exit code is 2.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("{what} is not there yet: {instead}")]
-pub(crate) struct NotThereYet {
-    /// The command or flag, as typed.
-    pub(crate) what: &'static str,
-    /// What this version does, and what to do meanwhile.
-    pub(crate) instead: &'static str,
-}

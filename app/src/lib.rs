@@ -20,16 +20,16 @@ mod study;
 
 pub use exit::Exit;
 
-/// What only the fuzz targets call.
+/// Entry points of the fuzz targets.
 #[cfg(fuzzing)]
 #[doc(hidden)]
 pub mod fuzzing {
     use std::path::Path;
 
-    /// How many fits a manifest lists, or what is wrong with it.
+    /// The number of fits in a manifest.
     ///
     /// # Errors
-    /// What is wrong with it.
+    /// The problems of the manifest.
     pub fn manifest(path: &Path) -> Result<usize, String> {
         crate::cli::manifest(path, &[]).map(|fits| fits.len()).map_err(|error| format!("{error:#}"))
     }

@@ -1,19 +1,19 @@
-//! Everything that is wrong, told at once.
+//! All problems of an input, reported together.
 
 use std::fmt;
 
-/// Problems, one line each; as an error, all of them.
+/// Problems, one line each, as one error.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Problems {
     what: String,
     lines: Vec<String>,
 }
 
-/// How many are shown; more are counted.
+/// How many are shown; the rest is counted.
 const MOST_SHOWN: usize = 50;
 
 impl Problems {
-    /// Nothing, if nothing is wrong with `what`.
+    /// Succeeds if there are no problems with `what`.
     ///
     /// # Errors
     /// All problems, each once.

@@ -10,6 +10,7 @@
 //! point away from the surface; radiance is linear with Rec. 709 primaries; images are row-major, top left first.
 
 pub mod brdf;
+pub mod choice;
 pub mod fit;
 pub mod graph;
 pub mod image;

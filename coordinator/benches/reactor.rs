@@ -8,9 +8,10 @@ use std::time::Duration;
 use criterion::{BatchSize, Criterion, criterion_group, criterion_main};
 use lookalike::graph::{Blob, GraphEdit, NodeId, NodeSpec, Placement, PlanError, Planner, WorkerId};
 use lookalike::protocol::ProcessName;
-use lookalike_coordinator::comm::{Action, Outbox, Site, WorkerProcess};
-use lookalike_coordinator::core::{Core, Policy};
+use lookalike_coordinator::actions::{Action, Outbox, WorkerProcess};
+use lookalike_coordinator::events::Site;
 use lookalike_coordinator::reactor::{Event, handle, start};
+use lookalike_coordinator::state::{Core, Policy};
 
 const NODES: usize = 100_000;
 

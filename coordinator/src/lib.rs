@@ -2,9 +2,9 @@
 //! run. It knows neither rendering nor a command line: it imports `lookalike`'s graph and protocol only.
 
 pub mod access;
+pub mod actions;
 pub mod atomic;
-pub mod comm;
-pub mod core;
+pub mod events;
 pub mod journal;
 pub mod limits;
 pub mod metrics;
@@ -13,4 +13,5 @@ pub mod reactor;
 mod rpc;
 pub mod runner;
 pub mod spawn;
+pub mod state;
 pub mod tls;

@@ -1,4 +1,4 @@
-//! How much the world may ask of a coordinator's port.
+//! Limits on what connections may cost the coordinator.
 
 use std::time::Duration;
 

@@ -1,4 +1,4 @@
-//! The policy of a run: how patient the coordinator is with workers, and how distrustful of nodes (design section 8).
+//! The policy of a run: time limits for workers, and limits on the deaths of nodes (design section 8).
 
 use std::time::Duration;
 
@@ -10,8 +10,8 @@ pub struct Policy {
     /// How often a worker shall tell that it lives (default 1 s). It does so from a thread of its own, so a node that keeps
     /// every core busy does not delay it.
     pub heartbeat: Duration,
-    /// A worker that was not heard of for this long is lost, and so is one that reads nothing for this long while something
-    /// waits to be read by it (default 5 s, at least two heartbeats).
+    /// Declare a worker lost after it has sent nothing for this long, or has read nothing for this long though something waits for it
+    /// (default 5 s, at least two heartbeats).
     pub lost_after: Duration,
     /// How many leases a worker holds beyond its threads, so that it never waits for the next one (default 2); more of nodes that
     /// take less than a millisecond.
@@ -101,7 +101,7 @@ pub enum PolicyError {
         /// The given time.
         found: Duration,
     },
-    /// A time that nobody lives to see, such as a typing error gives.
+    /// A duration over one year, most likely a typing error.
     #[error("{flag}: expected at most a year, found {}", humantime::format_duration(*.found))]
     TooLong {
         /// The flag.
@@ -115,7 +115,7 @@ pub enum PolicyError {
         /// The flag.
         flag: &'static str,
     },
-    /// More than anybody needs: a typing error.
+    /// Too many, most likely a typing error.
     #[error("--spare-leases: expected at most {MOST_SPARE_LEASES}, found {found}")]
     SpareLeases {
         /// The given number.
@@ -135,11 +135,11 @@ pub enum PolicyError {
     },
 }
 
-/// A worker reads ahead, it does not hoard.
+/// The most leases beyond its threads that a worker may hold.
 const MOST_SPARE_LEASES: usize = 1000;
 
-/// After how many times [`lost_after`](Policy::lost_after) a worker takes a silent coordinator for gone: a coordinator has more to do
-/// than to tell that it lives.
+/// A worker declares its coordinator lost after this many times [`lost_after`](Policy::lost_after) of silence. A busy coordinator may send
+/// its heartbeats late.
 const SILENCES: u32 = 3;
 
 impl Policy {

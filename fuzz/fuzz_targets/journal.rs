@@ -81,7 +81,7 @@ static WHOLE: LazyLock<TempDir> = LazyLock::new(|| {
 
 const RIGHT: [[u8; 2]; 3] = [[0, 0], [1, 1], [2, 2]];
 
-const TABLES: [&str; 7] = ["run", "epochs", "nodes", "attempts", "workers", "local_workers", "results"];
+const TABLES: [&str; 6] = ["run", "epochs", "nodes", "attempts", "workers", "results"];
 
 fuzz_target!(|bytes: &[u8]| {
     let folder = tempfile::tempdir().expect("a temporary folder");
@@ -90,17 +90,11 @@ fuzz_target!(|bytes: &[u8]| {
     }
     {
         let journal = Connection::open(folder.path().join("run.sqlite")).expect("a journal");
-        // None has worked for it: rows that can be spoilt all the same.
-        journal.execute("INSERT INTO local_workers VALUES (1, 7)", []).expect("the tables of docs/journal.md");
         for change in bytes.chunks(12) {
             spoil(&journal, change);
         }
     }
     let _ = Status::of(folder.path());
-    // Nobody is waited for.
-    if let Ok(journal) = Connection::open(folder.path().join("run.sqlite")) {
-        let _ = journal.execute_batch("DELETE FROM workers; DELETE FROM local_workers;");
-    }
     if let Ok(found) = outputs(folder.path(), true) {
         assert_eq!(found, RIGHT.map(Vec::from));
     }
@@ -130,7 +124,7 @@ fn spoil(journal: &Connection, change: &[u8]) {
     let _ = match row % 4 {
         3 => journal.execute(&format!("UPDATE {table} SET {column} = ?1"), params![value]),
         row => {
-            let first = if table == "local_workers" || table == "workers" { "process" } else { "rowid" };
+            let first = if table == "workers" { "process" } else { "rowid" };
             let one = format!("SELECT {first} FROM {table} LIMIT 1 OFFSET {row}");
             journal.execute(&format!("UPDATE {table} SET {column} = ?1 WHERE {first} = ({one})"), params![value])
         }

@@ -1,4 +1,4 @@
-//! Pictures of where a match differs from its photo, for the figure that compares samples with all pixels.
+//! Pictures of the difference between a match and its photo, for the figure that compares samples with all pixels.
 
 use anyhow::Context;
 use lookalike::{
@@ -7,9 +7,9 @@ use lookalike::{
 };
 use std::{collections::BTreeSet, fs, path::Path};
 
-/// Differences of displayed values are shown this many times as bright.
+/// Factor on the shown differences of displayed values.
 pub(super) const GAIN: f64 = 4.0;
-/// The matches that are compared so.
+/// The matches for which these pictures are made.
 const SHOWN: [&str; 2] = ["ours", "full"];
 
 /// Writes `X-difference-ours.png` and `X-difference-full.png` for every `X` that has its photo and both matches, and adds
@@ -48,7 +48,7 @@ fn read(folder: &Path, name: &str) -> anyhow::Result<Image> {
     Ok(decode(&shown, &bytes)?.image)
 }
 
-/// [`GAIN`] times the absolute difference of displayed values; none of pictures of two sizes.
+/// [`GAIN`] times the absolute difference of displayed values; `None` if the pictures differ in size.
 fn difference(photo: &Image, image: &Image) -> Option<Image> {
     let size = (photo.width(), photo.height());
     if (image.width(), image.height()) != size {

@@ -1,28 +1,28 @@
-//! What a report is made of, before it is Markdown or HTML.
+//! The parts of a report, independent of Markdown and HTML.
 
 use super::verdict::Verdict;
 
-/// A numbered part of the report: text, tables and figures of one question.
+/// A numbered section of the report: text, tables and figures for one question.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Section {
     /// Anchor in the page; lower case.
     pub(super) id: &'static str,
     /// The heading.
     pub(super) title: String,
-    /// What stands below it, in order.
+    /// The content below the heading, in order.
     pub(super) blocks: Vec<Block>,
 }
 
 /// A paragraph, a table or a figure.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Block {
-    /// A paragraph that explains.
+    /// An explanation.
     Text(String),
-    /// A conclusion, by a rule that the text states.
+    /// A conclusion, with the rule that it follows from.
     Finding(Verdict, String),
-    /// What the study would have to hold for this section.
+    /// What the study needs for this section.
     Missing(String),
-    /// Text to be shown as it is.
+    /// Preformatted text.
     Code(String),
     /// Rows and columns.
     Table(Table),
@@ -30,11 +30,11 @@ pub(super) enum Block {
     Figure(Figure),
     /// Pictures side by side.
     Strip(Strip),
-    /// A CSV that no figure carries.
+    /// A CSV without a figure.
     Data(Csv),
 }
 
-/// Rows and columns; the first `labels` columns are words, the others numbers.
+/// Rows and columns; the first `labels` columns are words, the rest are numbers.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(super) struct Table {
     /// What it shows, in one sentence.
@@ -45,7 +45,7 @@ pub(super) struct Table {
     pub(super) labels: usize,
     /// The rows, each as long as `columns`.
     pub(super) rows: Vec<Vec<Entry>>,
-    /// Rows at the end that sum up.
+    /// Number of rows at the end that are totals.
     pub(super) totals: usize,
 }
 
@@ -56,7 +56,7 @@ pub(super) struct Entry {
     pub(super) text: String,
     /// Whether it is the best of its row.
     pub(super) best: bool,
-    /// The verdict that it is, where it is one.
+    /// The verdict, if the entry is one.
     pub(super) verdict: Option<Verdict>,
 }
 
@@ -67,7 +67,7 @@ pub(super) struct Figure {
     pub(super) caption: String,
     /// The drawing.
     pub(super) svg: String,
-    /// The data; its stem is the drawing's as well.
+    /// The data; the drawing's file has the same stem.
     pub(super) csv: Csv,
 }
 
@@ -92,20 +92,20 @@ pub(super) struct Strip {
 /// Pictures of one cell.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct StripRow {
-    /// What the row shows.
+    /// The label of the row.
     pub(super) label: String,
     /// From left to right.
     pub(super) panels: Vec<Panel>,
 }
 
-/// A picture and what stands below it.
+/// A picture and its caption.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Panel {
     /// The line below it.
     pub(super) caption: String,
     /// A second line, of numbers.
     pub(super) note: String,
-    /// File name in `pictures/`, where there is one.
+    /// File name in `pictures/`, if there is a picture.
     pub(super) file: Option<String>,
 }
 
@@ -115,7 +115,7 @@ impl Section {
         Self { id, title: title.to_owned(), blocks: Vec::new() }
     }
 
-    /// A section that has nothing to show, and what `STUDY.toml` needs for it.
+    /// A section without data; `needs` says what `STUDY.toml` needs for it.
     pub(super) fn missing(mut self, needs: &str) -> Self {
         self.blocks.push(Block::Missing(format!("Not in this study: STUDY.toml needs {needs}.")));
         self
@@ -138,7 +138,7 @@ impl Entry {
         Self { text: text.into(), ..Self::default() }
     }
 
-    /// A verdict's word.
+    /// The word of a verdict.
     pub(super) fn verdict(verdict: Verdict) -> Self {
         Self { verdict: Some(verdict), ..Self::of(verdict.word()) }
     }
@@ -156,7 +156,7 @@ impl Table {
         self.rows.push(texts.into_iter().map(Entry::of).collect());
     }
 
-    /// Adds a row of labels and scores, of which the lowest as printed is marked.
+    /// Adds a row of labels and scores; the lowest score, as printed, is marked.
     pub(super) fn scores(&mut self, labels: impl IntoIterator<Item = impl Into<String>>, scores: &[Option<f64>]) {
         let printed: Vec<String> = scores.iter().map(|score| super::text::score(*score)).collect();
         let lowest = scores.iter().flatten().copied().filter(|score| score.is_finite()).min_by(f64::total_cmp);
@@ -166,7 +166,7 @@ impl Table {
         self.rows.push(row);
     }
 
-    /// The same as a file of values separated by commas, its numbers as programs read them.
+    /// The table as CSV, with numbers in a form for programs.
     pub(super) fn csv(&self, stem: &str) -> Csv {
         let mut csv = CsvText::new(stem, &self.columns);
         for row in &self.rows {
@@ -176,7 +176,7 @@ impl Table {
     }
 }
 
-/// A CSV in the making.
+/// A CSV being written.
 #[derive(Debug)]
 pub(super) struct CsvText {
     stem: String,
@@ -184,21 +184,21 @@ pub(super) struct CsvText {
 }
 
 impl CsvText {
-    /// With its heading.
+    /// A CSV with these column headings.
     pub(super) fn new(stem: &str, columns: impl IntoIterator<Item = impl AsRef<str>>) -> Self {
         let mut csv = Self { stem: stem.to_owned(), text: String::new() };
         csv.row(columns);
         csv
     }
 
-    /// Adds a line; what holds a comma, a quote or a line's end is quoted.
+    /// Adds a line; fields with a comma, a quote or a line break are quoted.
     pub(super) fn row(&mut self, fields: impl IntoIterator<Item = impl AsRef<str>>) {
         let fields: Vec<String> = fields.into_iter().map(|field| quoted(field.as_ref())).collect();
         self.text.push_str(&fields.join(","));
         self.text.push('\n');
     }
 
-    /// The whole.
+    /// The finished CSV.
     pub(super) fn done(self) -> Csv {
         Csv { stem: self.stem, text: self.text }
     }

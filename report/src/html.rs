@@ -1,4 +1,4 @@
-//! The report as one HTML file that needs nothing else: style, drawings and pictures are inside.
+//! The report as one self-contained HTML file: style, drawings and pictures are embedded.
 
 use super::{
     document::{Block, Entry, Panel, Section, Strip, Table},
@@ -11,7 +11,7 @@ use std::{collections::BTreeMap, fs, path::Path};
 /// The whole page; pictures are read from `pictures`.
 ///
 /// # Errors
-/// Where a picture cannot be read.
+/// If a picture cannot be read.
 pub(super) fn page(title: &str, lead: &str, sections: &[Section], pictures: &Path) -> anyhow::Result<String> {
     let mut album = Album { folder: pictures, read: BTreeMap::new() };
     let mut contents = String::new();
@@ -22,7 +22,7 @@ pub(super) fn page(title: &str, lead: &str, sections: &[Section], pictures: &Pat
         body.push_str(&format!("<section id=\"{id}\">\n<h2><b>{number}</b>{title}</h2>\n"));
         let mut charts = false;
         for block in &section.blocks {
-            // Charts in a row share the width.
+            // Consecutive charts share the width of the page.
             let chart = matches!(block, Block::Figure(_));
             if chart != charts {
                 body.push_str(if chart { "<div class=\"charts\">\n" } else { "</div>\n" });
@@ -44,7 +44,7 @@ pub(super) fn page(title: &str, lead: &str, sections: &[Section], pictures: &Pat
 
 const STYLE: &str = include_str!("style.css");
 
-/// The pictures that the page shows, each read once.
+/// The pictures of the page; each file is read once.
 struct Album<'a> {
     folder: &'a Path,
     read: BTreeMap<String, String>,
@@ -84,7 +84,7 @@ fn block_html(block: &Block, album: &mut Album<'_>) -> anyhow::Result<String> {
     })
 }
 
-/// The data itself as a link, so that the page stays one file.
+/// A link that contains the data, so that the page stays one file.
 fn data_link(stem: &str, text: &str) -> String {
     let encoded = STANDARD.encode(text);
     format!("<a class=\"csv\" download=\"{stem}.csv\" href=\"data:text/csv;base64,{encoded}\">{stem}.csv</a>")
@@ -96,7 +96,7 @@ fn table_html(table: &Table) -> String {
         format!("<{tag}{class}>{inside}</{tag}>")
     };
     let heading: String = table.columns.iter().enumerate().map(|(i, name)| cell("th", i, &escaped(name))).collect();
-    // Sentences break into lines, names and numbers do not.
+    // Sentences may wrap, names and numbers do not.
     let shape = match table.columns.len() {
         columns if columns == table.labels => " class=\"prose\"",
         columns if columns > 9 => " class=\"wide\"",
@@ -128,7 +128,7 @@ fn entry_html(entry: &Entry) -> String {
     }
 }
 
-/// Which colour a verdict has.
+/// The CSS class of a verdict, which sets its colour.
 fn class(verdict: Verdict) -> String {
     verdict.word().to_lowercase().replace(' ', "-")
 }
@@ -156,7 +156,7 @@ fn panel_html(panel: &Panel, album: &mut Album<'_>) -> anyhow::Result<String> {
     Ok(format!("<div class=\"panel\">{picture}<span>{caption}</span>{note}</div>\n"))
 }
 
-/// Text in which nothing is markup.
+/// Escapes text, so that nothing in it is markup.
 fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }

@@ -1,11 +1,12 @@
-//! The report of a study: from what was measured to pages, figures and files that a program reads.
+//! The report of a study: turns its measurements into pages, figures and files for programs.
 //!
-//! Every word that judges and every number is computed from the data. A section whose data the study does not hold says what
-//! its file would need; nothing is drawn from what is not there.
+//! Every verdict and every number is computed from the data. A section whose data the study does not have says what the study file
+//! needs for it.
 
 mod chart;
 mod differences;
 mod document;
+mod folder;
 mod html;
 mod markdown;
 pub mod measured;
@@ -20,9 +21,8 @@ mod verdict;
 mod tests;
 
 use crate::measured::StudyData;
-use anyhow::Context;
 use document::{Block, Section};
-use std::{collections::BTreeSet, fs, io::ErrorKind, path::Path};
+use std::path::Path;
 use study::Study;
 
 /// The heading of both pages.
@@ -39,7 +39,7 @@ pub fn write(
     mut write: impl FnMut(&str, &[u8]) -> anyhow::Result<()>,
 ) -> anyhow::Result<()> {
     let pictures = out.join("pictures");
-    let mut names = names(&pictures)?;
+    let mut names = folder::names(&pictures)?;
     differences::write(&pictures, &mut names, &mut write)?;
     let study = Study::new(data, names);
     let sections = section::all(&study)?;
@@ -53,7 +53,7 @@ pub fn write(
     write("report.html", html::page(TITLE, &lead, &sections, &pictures)?.as_bytes())
 }
 
-/// What the study is of, in two sentences.
+/// The subject of the study, in two sentences.
 fn lead(study: &Study<'_>) -> String {
     let about = &study.data.about;
     let probes: Vec<String> = about.probes.iter().map(|probe| text::light(probe).to_owned()).collect();
@@ -80,16 +80,4 @@ fn figure_files(sections: &[Section]) -> Vec<(String, &str)> {
             _ => Vec::new(),
         })
         .collect()
-}
-
-/// Names of the files in a folder; none where there is no folder.
-fn names(folder: &Path) -> anyhow::Result<BTreeSet<String>> {
-    let cannot = || format!("cannot list the pictures in {}", folder.display());
-    match fs::read_dir(folder) {
-        Err(error) if error.kind() == ErrorKind::NotFound => Ok(BTreeSet::new()),
-        Err(error) => Err(error).with_context(cannot),
-        Ok(entries) => {
-            entries.map(|entry| Ok(entry.with_context(cannot)?.file_name().to_string_lossy().into_owned())).collect()
-        }
-    }
 }

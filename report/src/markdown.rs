@@ -1,4 +1,4 @@
-//! The report as Markdown, for a repository: figures and pictures are links to the files beside it.
+//! The report as Markdown, for a repository: figures and pictures are links to files in the same folder.
 
 use super::document::{Block, Entry, Section, Strip, Table};
 
@@ -45,7 +45,7 @@ fn entry(entry: &Entry) -> String {
     if entry.best || entry.verdict.is_some() { format!("**{}**", escaped(&entry.text)) } else { escaped(&entry.text) }
 }
 
-/// One table for each run of rows with as many pictures.
+/// One table for each group of consecutive rows with equal numbers of pictures.
 fn strip_of(strip: &Strip) -> String {
     let mut lines = vec![escaped(&strip.caption), String::new()];
     let mut columns = None;
@@ -75,14 +75,14 @@ fn line(entries: impl Iterator<Item = String>) -> String {
     format!("| {} |", entries.collect::<Vec<_>>().join(" | "))
 }
 
-/// A block that shows text as it is, fenced by more backticks than it holds in a row.
+/// A preformatted block; its fence has more backticks than any run of backticks in the text.
 fn fenced(text: &str) -> String {
     let longest = text.split(|c| c != '`').map(str::len).max().unwrap_or(0);
     let fence = "`".repeat(longest.max(2) + 1);
     format!("{fence}text\n{}\n{fence}", text.trim_end())
 }
 
-/// Text in which nothing is markup.
+/// Escapes text, so that nothing in it is markup.
 fn escaped(text: &str) -> String {
     let mut escaped = String::with_capacity(text.len());
     for c in text.chars() {

@@ -1,9 +1,9 @@
-//! What a study measures: one flat table of scored matches, which every section of the report picks its own from.
+//! The measurements of a study: one flat table of scored matches, from which every section of the report selects its rows.
 
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// A match and how it was scored.
+/// A match with its score.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Row {
     /// Name of the measured material.
@@ -16,47 +16,47 @@ pub struct Row {
     pub model: String,
     /// How the parameters were found.
     pub method: Method,
-    /// Pixels that stage one drew; none where it saw all, or there was no stage one.
+    /// Pixels that stage one drew; `None` if it used all pixels, or if there was no stage one.
     pub samples: Option<u32>,
-    /// How they were drawn: `importance`, `stratified`, `uniform`.
+    /// How these pixels were drawn: `importance`, `stratified`, `uniform`.
     pub sampling: String,
-    /// Whether Eq. 1 saw values clamped to what a display can show.
+    /// Whether Eq. 1 used values clamped to the range of a display.
     pub clamped: bool,
     /// Independent subsets of pixels.
     pub subsets: u32,
-    /// Columns and rows of the images that were scored.
+    /// Side of the scored images, in pixels.
     pub size: u32,
-    /// Columns and rows of the images that were searched on: smaller than `size` for `lowres`.
+    /// Side of the images that were searched on, in pixels: smaller than `size` for `lowres`.
     pub searched_size: u32,
     /// Seed of the subset.
     pub seed: u64,
-    /// How many exponents were tried; 0 where there are none.
+    /// Number of gammas that were tried; 0 for a method without gamma.
     #[serde(default)]
     pub gammas: u32,
-    /// The exponent: of the candidate, or of the winner.
+    /// The gamma of the candidate or of the winner.
     pub gamma: Option<f64>,
-    /// Name of the start, where a method has several.
+    /// Name of the start, if a method has several.
     pub start: Option<String>,
-    /// Eq. 1 on the subset, of a candidate.
+    /// Value of Eq. 1 on the subset, for a candidate.
     pub cost: Option<f64>,
-    /// How it was scored: `cssim`, or the name of a variant.
+    /// The metric of the score: `cssim`, or the name of a variant.
     pub metric: String,
     /// The score, by `metric`.
     pub cssim: f64,
-    /// CSSIM over windows centred on the object; none of a variant.
+    /// CSSIM over windows centred on the object; `None` for a variant.
     pub cssim_object: Option<f64>,
-    /// Evaluations of what was minimised: Eq. 1, or CSSIM.
+    /// Evaluations of the minimised function: Eq. 1 or CSSIM.
     pub evaluations: u64,
-    /// Seconds of one core that it took to find the parameters, the tables that it needed included.
+    /// Core-seconds to find the parameters, including the tables that this needed.
     pub cpu_seconds: f64,
-    /// Those of them that stage two took, its table included; none of a method without it.
+    /// Core-seconds of stage two within `cpu_seconds`, including its table; `None` for a method without stage two.
     #[serde(default)]
     pub stage_two_seconds: Option<f64>,
-    /// The parameters by their flat name: `kd.r`, `alpha`.
+    /// The parameters by their flat names, such as `kd.r` and `alpha`.
     pub parameters: BTreeMap<String, f64>,
 }
 
-/// How parameters were found.
+/// The method by which parameters were found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub enum Method {
     /// Two stages: least squares, 21 gammas, the winner by CSSIM.
@@ -65,10 +65,10 @@ pub enum Method {
     /// `Ours`, then polished on CSSIM.
     #[serde(rename = "ours+polish")]
     OursPolished,
-    /// The best candidate of `Ours` of the gammas that are far from the winner's.
+    /// The best candidate of `Ours` among the gammas that are far from the winner's.
     #[serde(rename = "runner-up")]
     RunnerUp,
-    /// The candidate of one gamma of `Ours`: one row for each.
+    /// The candidate of one gamma of `Ours`; one row per gamma.
     #[serde(rename = "candidate")]
     Candidate,
     /// `Ours` with several subsets of pixels.
@@ -80,13 +80,13 @@ pub enum Method {
     /// The paper's two stages: Cook-Torrance, pattern search from one start, 21 gammas, no polish.
     #[serde(rename = "paper")]
     Paper,
-    /// Gamma 1 alone: least squares on radiance.
+    /// Only gamma 1: least squares on radiance.
     #[serde(rename = "l2")]
     L2,
-    /// The logarithm of radiance instead of a power, alone.
+    /// Only the logarithm of radiance instead of a power.
     #[serde(rename = "log")]
     Log,
-    /// Gamma 3 alone.
+    /// Only gamma 3.
     #[serde(rename = "cuberoot")]
     CubeRoot,
     /// Pattern search on CSSIM at full resolution; one row per start.
@@ -101,7 +101,7 @@ pub enum Method {
 }
 
 impl Method {
-    /// The name that results carry.
+    /// The name of the method in results.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Ours => "ours",
@@ -121,7 +121,7 @@ impl Method {
     }
 }
 
-/// What one evaluation of brute force costs without tables: one rendering by the direct integrator.
+/// The time of one evaluation of brute force without tables: one rendering by the direct integrator.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct DirectCost {
     /// Name of the measured material.
@@ -134,18 +134,18 @@ pub struct DirectCost {
     pub size: u32,
     /// Samples per pixel.
     pub samples_per_pixel: u32,
-    /// Seconds of one core, of each rendering; their parameters are those of the candidates.
+    /// Core-seconds of each rendering, at the parameters of the candidates.
     pub seconds: Vec<f64>,
 }
 
-/// How well Eq. 1 ranks matches as CSSIM does.
+/// The agreement of Eq. 1 with CSSIM in the ranking of matches.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Agreement {
     /// Name of the measured material.
     pub material: String,
     /// Name of the light.
     pub probe: String,
-    /// The exponent of Eq. 1, over all pixels.
+    /// The gamma of Eq. 1, which is summed over all pixels.
     pub gamma: f64,
     /// Spearman's rank correlation with CSSIM.
     pub spearman: f64,
@@ -168,7 +168,7 @@ pub struct Photo {
     pub exposure: f64,
 }
 
-/// What made the study.
+/// How the study was made.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct About {
     /// The command line that repeats it.
@@ -177,19 +177,19 @@ pub struct About {
     pub version: String,
     /// Processor and cores of the coordinator's machine.
     pub machine: String,
-    /// Seconds that the run took; of the last run, when it was gone on with.
+    /// Wall-clock seconds of the run; of the last part if it was resumed.
     pub seconds: f64,
     /// Workers that joined.
     pub workers: u32,
     /// The study file as it was read.
     pub study: String,
-    /// Materials in their order.
+    /// Materials in the study's order.
     pub materials: Vec<String>,
-    /// The materials of the paper's six, in their order.
+    /// Those materials that are among the paper's six, in order.
     pub six: Vec<String>,
-    /// Lights that were fitted under, in their order.
+    /// Lights of the fits, in order.
     pub probes: Vec<String>,
-    /// Lights that were only scored under.
+    /// Lights under which matches were only scored.
     pub held_out: Vec<String>,
     /// Size of the grid.
     pub size: u32,
@@ -201,10 +201,10 @@ pub struct About {
     pub seed: u64,
 }
 
-/// All that a study has measured.
+/// All measurements of a study.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct StudyData {
-    /// What made it.
+    /// How the study was made.
     pub about: About,
     /// Photos.
     pub photos: Vec<Photo>,
@@ -216,5 +216,5 @@ pub struct StudyData {
     pub agreements: Vec<Agreement>,
 }
 
-/// How far the gamma of a runner-up is from the winner's: those beside it have found the same match.
+/// Smallest distance of a runner-up's gamma from the winner's, because neighbouring gammas find the same match.
 pub const APART: f64 = 0.5;

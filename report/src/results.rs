@@ -1,4 +1,4 @@
-//! `results.json`: one line for each match that a program may want to compare.
+//! `results.json`: one line per match, for comparisons by programs; `data.json`: the whole study.
 
 use super::study::{CSSIM, Match, Study};
 use crate::measured::{Method, Row, StudyData};
@@ -24,7 +24,7 @@ struct ResultRow<'a> {
     gammas: u32,
 }
 
-/// The methods that results are published of, in their order.
+/// The methods in `results.json`, in order.
 const METHODS: [Method; 8] = [
     Method::Ours,
     Method::OursPolished,
@@ -36,10 +36,10 @@ const METHODS: [Method; 8] = [
     Method::CubeRoot,
 ];
 
-/// The text of `results.json`: matches under the light that they were fitted under, several starts as their best one.
+/// The text of `results.json`: matches under the light of the fit; of several starts only the best.
 ///
 /// # Errors
-/// Where a row cannot be written.
+/// If a row cannot be written.
 pub(super) fn json(study: &Study<'_>) -> serde_json::Result<String> {
     let mut groups: BTreeMap<_, Vec<&Row>> = BTreeMap::new();
     let published = |row: &&Row| row.shown == row.probe && row.metric == CSSIM && row.cssim.is_finite();
@@ -52,10 +52,10 @@ pub(super) fn json(study: &Study<'_>) -> serde_json::Result<String> {
     Ok(format!("[\n{}\n]\n", lines.collect::<serde_json::Result<Vec<_>>>()?.join(",\n")))
 }
 
-/// The text of `data.json`: the whole study, a line for each thing measured.
+/// The text of `data.json`: the whole study, one line per measurement.
 ///
 /// # Errors
-/// Where it cannot be written.
+/// If it cannot be written.
 pub(super) fn data(data: &StudyData) -> serde_json::Result<String> {
     let about = serde_json::to_string_pretty(&data.about)?.replace('\n', "\n  ");
     let lists = [
@@ -73,7 +73,7 @@ fn lines<T: Serialize>(list: &[T]) -> serde_json::Result<String> {
     Ok(if lines.is_empty() { String::new() } else { format!("\n    {}\n  ", lines.join(",\n    ")) })
 }
 
-/// What tells results apart, in the order in which they are listed: all but the start.
+/// The sort key of a result: everything that identifies it, except the start.
 fn key<'a>(study: &Study<'a>, row: &'a Row, method: usize) -> impl Ord + use<'a> {
     let place = |names: &[String], name: &str| names.iter().position(|other| other == name).unwrap_or(names.len());
     let about = &study.data.about;

@@ -1,17 +1,17 @@
-//! Sums over numbers that a table or a sentence gives; none of nothing.
+//! Statistics of the numbers in tables and sentences; `None` without numbers.
 
-/// The mean of what is finite.
+/// The mean of the finite numbers.
 pub(super) fn mean(numbers: &[f64]) -> Option<f64> {
     let finite: Vec<f64> = finite(numbers);
     (!finite.is_empty()).then(|| finite.iter().sum::<f64>() / length(&finite))
 }
 
-/// The median of what is finite.
+/// The median of the finite numbers.
 pub(super) fn median(numbers: &[f64]) -> Option<f64> {
     quantile(numbers, 0.5)
 }
 
-/// A quantile of what is finite, between neighbours linearly; `q` in [0, 1].
+/// A quantile of the finite numbers, linear between neighbours; `q` in [0, 1].
 pub(super) fn quantile(numbers: &[f64], q: f64) -> Option<f64> {
     let mut sorted = finite(numbers);
     sorted.sort_by(f64::total_cmp);
@@ -23,7 +23,7 @@ pub(super) fn quantile(numbers: &[f64], q: f64) -> Option<f64> {
     Some(sorted[below] + part * (sorted[above] - sorted[below]))
 }
 
-/// The standard deviation of a sample, by n - 1; of two numbers at least.
+/// The standard deviation of a sample, with n - 1; `None` for fewer than two numbers.
 pub(super) fn deviation(numbers: &[f64]) -> Option<f64> {
     let finite = finite(numbers);
     let mean = mean(&finite)?;
@@ -31,14 +31,14 @@ pub(super) fn deviation(numbers: &[f64]) -> Option<f64> {
     (finite.len() > 1).then(|| (squares / (length(&finite) - 1.0)).sqrt())
 }
 
-/// The lowest and the highest of what is finite.
+/// The lowest and the highest of the finite numbers.
 pub(super) fn range(numbers: &[f64]) -> Option<(f64, f64)> {
     let finite = finite(numbers);
     let lowest = finite.iter().copied().min_by(f64::total_cmp)?;
     Some((lowest, finite.iter().copied().max_by(f64::total_cmp)?))
 }
 
-/// Spearman's rank correlation, ties by their mean rank; none where a side is constant or there are fewer than three.
+/// Spearman's rank correlation, with mean ranks for ties; `None` if a side is constant or there are fewer than three pairs.
 pub(super) fn spearman(pairs: &[(f64, f64)]) -> Option<f64> {
     if pairs.len() < 3 || pairs.iter().any(|(x, y)| !x.is_finite() || !y.is_finite()) {
         return None;
@@ -65,12 +65,12 @@ fn finite(numbers: &[f64]) -> Vec<f64> {
     numbers.iter().copied().filter(|x| x.is_finite()).collect()
 }
 
-/// The length as a number: exact below 2^32, and no table is longer.
+/// The length as `f64`: exact below 2^32, which no table exceeds.
 fn length(numbers: &[f64]) -> f64 {
     number(numbers.len())
 }
 
-/// A count as a number: exact below 2^32, the highest such above.
+/// A count as `f64`: exact below 2^32, clamped above.
 pub(super) fn number(count: usize) -> f64 {
     f64::from(u32::try_from(count).unwrap_or(u32::MAX))
 }
@@ -80,7 +80,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn sums_of_known_numbers() {
+    fn statistics_of_known_numbers() {
         let numbers = [4.0, 1.0, 2.0, 3.0, f64::NAN];
         assert_eq!((mean(&numbers), median(&numbers), range(&numbers)), (Some(2.5), Some(2.5), Some((1.0, 4.0))));
         assert_eq!((quantile(&numbers, 0.25), quantile(&numbers, 1.0)), (Some(1.75), Some(4.0)));
@@ -89,7 +89,7 @@ mod tests {
     }
 
     #[test]
-    fn spearman_sees_order_and_not_distance() {
+    fn spearman_depends_on_order_and_not_on_distance() {
         let up: Vec<_> = [1.0, 2.0, 4.0, 30.0].into_iter().zip([0.1, 0.2, 0.3, 0.9]).collect();
         assert_eq!(spearman(&up), Some(1.0));
         assert_eq!(spearman(&up.iter().map(|(x, y)| (*x, -y)).collect::<Vec<_>>()), Some(-1.0));

@@ -1,4 +1,4 @@
-//! Picks a section's rows from the flat table.
+//! Selects the rows of a section from the flat table.
 
 use crate::measured::{Method, Row, StudyData};
 use std::collections::{BTreeMap, BTreeSet};
@@ -6,25 +6,25 @@ use std::collections::{BTreeMap, BTreeSet};
 /// The name of the metric whose scores are CSSIM.
 pub(super) const CSSIM: &str = "cssim";
 
-/// The pixels that stage one sees by default, and in the paper.
+/// The pixels of stage one by default, and in the paper.
 const SAMPLES: u32 = 256;
 
-/// The data of a study and what its grid has in common.
+/// The data of a study, and the settings common to its grid.
 #[derive(Debug)]
 pub(super) struct Study<'a> {
-    /// All that was measured.
+    /// All measurements.
     pub(super) data: &'a StudyData,
     /// Names of the files in `pictures/`.
     pub(super) pictures: BTreeSet<String>,
     /// The model of the grid.
     pub(super) model: String,
-    /// The pixels of the grid's stage one.
+    /// The pixels of stage one in the grid.
     pub(super) samples: Option<u32>,
     /// The seed of the grid.
     pub(super) seed: u64,
 }
 
-/// Which rows are meant; made by [`Study::pick`] with what the grid has.
+/// A selection of rows; [`Study::pick`] makes one with the settings of the grid.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Pick<'a> {
     pub(super) method: Method,
@@ -41,22 +41,22 @@ pub(super) struct Pick<'a> {
     pub(super) model: Option<&'a str>,
 }
 
-/// The best of the rows that were meant, and what all of them cost.
+/// The best of the selected rows, and the total cost of all of them.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Match<'a> {
     /// The row of the lowest score.
     pub(super) row: &'a Row,
     /// Its score.
     pub(super) cssim: f64,
-    /// Seconds of one core, of all starts.
+    /// Core-seconds of all starts.
     pub(super) cpu_seconds: f64,
     /// Evaluations, of all starts.
     pub(super) evaluations: u64,
 }
 
 impl<'a> Study<'a> {
-    /// Takes the model and the seed of the grid from what the study says of itself, where it does not, those that most
-    /// matches of two stages have; 256 samples where any match has them, else what most have.
+    /// Takes the model and the seed of the grid from `about`, or, if it has none, those of most two-stage matches. The number of samples
+    /// is 256 if any match has it, otherwise that of most matches.
     pub(super) fn new(data: &'a StudyData, pictures: BTreeSet<String>) -> Self {
         let grid: Vec<&Row> = data
             .rows
@@ -75,14 +75,14 @@ impl<'a> Study<'a> {
         Self { data, pictures, model: model.unwrap_or_default(), samples, seed: seed.unwrap_or(0) }
     }
 
-    /// Every material under every light that one was fitted under, in the study's order, whether it has a match or not.
+    /// Every material under every light of the fits, in the study's order, with or without a match.
     pub(super) fn places(&self) -> Vec<(&'a str, &'a str)> {
         let about = &self.data.about;
         let under = |material: &'a String| about.probes.iter().map(move |probe| (material.as_str(), probe.as_str()));
         about.materials.iter().flat_map(under).collect()
     }
 
-    /// The cells of the paper's six materials; all, where the study does not name them.
+    /// The cells of the paper's six materials; all cells if the study does not name the six.
     pub(super) fn six(&self) -> Vec<(&'a str, &'a str)> {
         let six = &self.data.about.six;
         if six.is_empty() { self.cells() } else { self.cells_of(six) }
@@ -93,7 +93,7 @@ impl<'a> Study<'a> {
         self.cells_of(&self.data.about.materials)
     }
 
-    /// Of some materials, with every light that one was fitted under.
+    /// The cells of some materials, with every light of the fits.
     pub(super) fn cells_of(&self, materials: &'a [String]) -> Vec<(&'a str, &'a str)> {
         let there: BTreeSet<(&str, &str)> = self
             .data
@@ -108,7 +108,7 @@ impl<'a> Study<'a> {
         all.filter(|cell| there.contains(cell)).collect()
     }
 
-    /// Columns and rows of the grid's images.
+    /// Side of the grid's images, in pixels.
     pub(super) const fn size(&self) -> u32 {
         self.data.about.size
     }
@@ -131,7 +131,7 @@ impl<'a> Study<'a> {
         }
     }
 
-    /// The rows that are meant, in the order of the data. Without a model: those of the grid's, or of the method's first.
+    /// The selected rows, in the order of the data. Without a model in the selection: the rows of the grid's model, or of the method's first.
     pub(super) fn rows(&self, pick: &Pick<'_>) -> Vec<&'a Row> {
         let rows: Vec<&Row> = self.data.rows.iter().filter(|row| pick.admits(row)).collect();
         let models: BTreeSet<&str> = rows.iter().map(|row| row.model.as_str()).collect();
@@ -140,7 +140,7 @@ impl<'a> Study<'a> {
         rows.into_iter().filter(|row| Some(row.model.as_str()) == model).collect()
     }
 
-    /// The best of the rows that are meant.
+    /// The best of the selected rows.
     pub(super) fn find(&self, pick: &Pick<'_>) -> Option<Match<'a>> {
         Match::best(&self.rows(pick))
     }
@@ -156,12 +156,12 @@ impl<'a> Study<'a> {
         self.cells().into_iter().filter_map(both).collect()
     }
 
-    /// The file of a picture, where it is there.
+    /// The file of a picture, if it exists.
     pub(super) fn picture(&self, (material, probe): (&str, &str), size: u32, what: &str) -> Option<String> {
         self.existing(format!("{material}-{probe}-{size}-{what}.png"))
     }
 
-    /// The file of a picture under a light that the fit has not seen.
+    /// The file of a picture under a held-out light, if it exists.
     pub(super) fn held_out_picture(&self, (material, probe): (&str, &str), shown: &str, what: &str) -> Option<String> {
         self.existing(format!("{material}-{probe}-at-{shown}-{}-{what}.png", self.size()))
     }
@@ -172,7 +172,7 @@ impl<'a> Study<'a> {
 }
 
 impl Pick<'_> {
-    /// Whether a row is meant. What a method does not have, it is not asked for.
+    /// Whether a row is selected. Settings that its method does not have are not compared.
     fn admits(&self, row: &Row) -> bool {
         let place = row.material == self.material && row.probe == self.probe && row.shown == self.shown;
         let scored = row.size == self.size && row.metric == self.metric && row.cssim.is_finite();
@@ -182,7 +182,7 @@ impl Pick<'_> {
         let several = matches!(row.method, Method::Subsets | Method::SubsetsPolished);
         let drawn = row.samples.is_none() || row.sampling == self.sampling && row.seed == self.seed;
         let subset = row.samples == self.samples && drawn && (several || row.subsets <= 1);
-        // Shown again under another light or scored by another metric, a match is known by its cell and method.
+        // A match that is scored under another light or by another metric is identified by its cell and method.
         let again = row.shown != row.probe || row.metric != CSSIM;
         let stage_one = one_stage || again || subset && row.clamped == self.clamped;
         row.method == self.method && place && scored && searched && model && stage_one
@@ -190,7 +190,7 @@ impl Pick<'_> {
 }
 
 impl<'a> Match<'a> {
-    /// The best of several starts; of a match that has no start, the first, as experiments may have found it again.
+    /// The best of several starts. Of a match without starts the first row, as several experiments may have found the same match.
     pub(super) fn best(rows: &[&'a Row]) -> Option<Self> {
         let first = *rows.first()?;
         let row = rows.iter().copied().min_by(|a, b| a.cssim.total_cmp(&b.cssim))?;
@@ -207,12 +207,12 @@ impl<'a> Match<'a> {
     }
 }
 
-/// A match of one subset under the light it was fitted under, at the grid's size.
+/// Whether a row is a match with one subset under the light of its fit, at the grid's size.
 fn on_grid(row: &Row, size: u32) -> bool {
     row.shown == row.probe && row.metric == CSSIM && row.size == size && !row.clamped
 }
 
-/// What occurs most often; of equals the preferred, else the least.
+/// The most frequent value; of equally frequent ones the preferred one, otherwise the least.
 fn commonest<T: Ord + Clone>(values: impl Iterator<Item = T>, preferred: impl Fn(&T) -> bool) -> Option<T> {
     let mut counts: BTreeMap<T, usize> = BTreeMap::new();
     values.for_each(|value| *counts.entry(value).or_default() += 1);

@@ -34,7 +34,7 @@ fn findings(section: &Section) -> Vec<(Verdict, &str)> {
     section.blocks.iter().filter_map(finding).collect()
 }
 
-/// The row of a table that starts so.
+/// The row of a table with this first entry.
 fn row(table: &Table, start: &[&str]) -> Vec<String> {
     let texts = |row: &Vec<super::document::Entry>| row.iter().map(|entry| entry.text.clone()).collect::<Vec<_>>();
     let starts = |row: &Vec<String>| row.iter().zip(start).all(|(text, start)| text == start);

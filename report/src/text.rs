@@ -1,4 +1,4 @@
-//! Numbers and names as a reader sees them.
+//! Formats numbers and names for readers.
 
 use crate::measured::Method;
 
@@ -7,7 +7,7 @@ pub(super) fn score(score: Option<f64>) -> String {
     fixed(score, 4)
 }
 
-/// A number with so many decimals; a dash where there is none.
+/// A number with this many decimals; a dash if there is none.
 pub(super) fn fixed(number: Option<f64>, decimals: usize) -> String {
     match number.filter(|number| number.is_finite()) {
         Some(number) => without_negative_zero(format!("{number:.decimals$}")).replace('-', "−"),
@@ -26,7 +26,7 @@ pub(super) fn signed(difference: Option<f64>) -> String {
     }
 }
 
-/// A number of a table as programs read it: its minus is a hyphen, its absence nothing.
+/// A number of a table in a form for programs: with a hyphen as minus, empty if there is none.
 pub(super) fn plain(shown: &str) -> String {
     match shown.strip_prefix('−') {
         Some(digits) => format!("-{digits}"),
@@ -35,10 +35,10 @@ pub(super) fn plain(shown: &str) -> String {
     }
 }
 
-/// What stands instead of the numbers of a claim that the study has none for.
+/// Replaces the numbers of a claim if the study has none.
 pub(super) const ABSENT: &str = "Not in this study.";
 
-/// A number to three significant digits, for what spans magnitudes: seconds, ratios.
+/// A number to three significant digits, for quantities over several orders of magnitude: seconds, ratios.
 pub(super) fn significant(number: Option<f64>) -> String {
     let Some(number) = number.filter(|number| number.is_finite()) else { return "–".to_owned() };
     let decimals = match number.abs() {
@@ -51,12 +51,12 @@ pub(super) fn significant(number: Option<f64>) -> String {
     format!("{number:.decimals$}")
 }
 
-/// A probability; of one that is nearly 0, only that it is below what four decimals show.
+/// A probability to three significant digits; below 0.0001 only that bound.
 pub(super) fn probability(p: f64) -> String {
     if p < 1e-4 { "p < 0.0001".to_owned() } else { format!("p = {}", significant(Some(p))) }
 }
 
-/// What the evaluations of a method are of.
+/// The function that a method evaluates.
 pub(super) const fn minimised(method: Method) -> &'static str {
     match method {
         Method::Ours
@@ -73,7 +73,7 @@ pub(super) const fn minimised(method: Method) -> &'static str {
     }
 }
 
-/// A number for a CSV: the shortest that reads back the same; empty where there is none.
+/// A number for a CSV: the shortest text that reads back as the same number; empty if there is none.
 pub(super) fn exact(number: Option<f64>) -> String {
     number.filter(|number| number.is_finite()).map_or_else(String::new, |number| number.to_string())
 }
@@ -104,7 +104,7 @@ fn without_negative_zero(text: String) -> String {
     }
 }
 
-/// The name of a light that readers of the paper know, else the file's.
+/// The name of a light in the paper, otherwise that of its file.
 pub(super) fn light(probe: &str) -> &str {
     match probe {
         "grace_cross" => "Grace Cathedral",

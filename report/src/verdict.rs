@@ -1,20 +1,20 @@
-//! The rules by which numbers confirm a claim or refute it, stated beside each number.
+//! The rules by which numbers confirm or refute a claim; the report prints the rule with the numbers.
 
 use super::{
     statistics::{mean, number},
     text,
 };
 
-/// What the numbers say of a claim.
+/// The verdict on a claim.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Verdict {
-    /// They bear it out.
+    /// The numbers confirm it.
     Confirmed,
-    /// They contradict it.
+    /// The numbers contradict it.
     Refuted,
-    /// They do neither, or there are none.
+    /// Neither, or there are no numbers.
     NotDecided,
-    /// There is no claim: a measurement.
+    /// A measurement without a claim.
     Measured,
 }
 
@@ -29,7 +29,7 @@ impl Verdict {
         }
     }
 
-    /// `Confirmed` or `Refuted`; `NotDecided` where nothing was measured.
+    /// `Confirmed` or `Refuted`; `NotDecided` without a measurement.
     pub(super) fn of(holds: Option<bool>) -> Self {
         match holds {
             Some(true) => Self::Confirmed,
@@ -39,18 +39,18 @@ impl Verdict {
     }
 }
 
-/// Ours may exceed brute force by this in the mean.
+/// Largest mean excess of ours over brute force that still counts as no worse.
 pub(super) const MEAN_SLACK: f64 = 0.002;
-/// A cell that exceeds its rival by more is listed; a difference that a reader may see.
+/// A cell that exceeds its rival by more than this is listed; such a difference may be visible.
 pub(super) const CELL_SLACK: f64 = 0.01;
-/// Of the comparisons, the part that has to point one way.
+/// Share of the comparisons that must agree in sign.
 const MAJORITY: f64 = 2.0 / 3.0;
-/// Fewer comparisons decide nothing.
+/// Fewest comparisons for a decision.
 const FEWEST: usize = 5;
-/// The probability of signs as one-sided, were both equally likely, from which on they decide nothing.
+/// Signs decide only if the probability of signs at least as one-sided, with both equally likely, is below this.
 const CHANCE: f64 = 0.1;
 
-/// The rule of [`paired`] in words, after the numbers that it goes by.
+/// The rule of [`paired`] in words, after the numbers that it uses.
 pub(super) fn rule(margins: &[f64]) -> String {
     format!(
         "n = {}, sign test {}; confirmed if the mean margin is positive, two thirds of at least {FEWEST} comparisons are, and \
@@ -66,7 +66,7 @@ pub(super) fn no_worse(pairs: &[(f64, f64)]) -> Verdict {
     Verdict::of(mean(&excess).map(|mean| mean <= MEAN_SLACK && excess.iter().all(|excess| *excess <= CELL_SLACK)))
 }
 
-/// Whether margins (rival less ours) favour ours: [`rule`].
+/// Whether margins (rival minus ours) favour ours, by [`rule`].
 pub(super) fn paired(margins: &[f64]) -> Verdict {
     let Some(mean) = mean(margins) else { return Verdict::NotDecided };
     if margins.len() < FEWEST || sign_test(margins) >= CHANCE {
@@ -84,12 +84,12 @@ pub(super) fn paired(margins: &[f64]) -> Verdict {
     }
 }
 
-/// The two-sided probability, were either sign equally likely, of signs at least as one-sided as these; zeros have none.
+/// The two-sided probability of signs at least as one-sided as these if both signs are equally likely; zeros are left out.
 fn sign_test(margins: &[f64]) -> f64 {
     let wins = margins.iter().filter(|margin| **margin > 0.0).count();
     let losses = margins.iter().filter(|margin| **margin < 0.0).count();
     let (fewer, all) = (wins.min(losses), wins + losses);
-    // Logarithms, as 2^all overflows.
+    // In logarithms, because 2^all overflows.
     let mut choices = -number(all) * std::f64::consts::LN_2;
     let mut tail = choices.exp();
     for chosen in 1..=fewer {
@@ -125,7 +125,7 @@ mod tests {
         let margins = |wins: usize, losses: usize, loss: f64| [vec![0.1; wins], vec![-loss; losses]].concat();
         assert_eq!(paired(&margins(9, 1, 0.1)), Confirmed);
         assert_eq!(paired(&margins(1, 9, 0.1)), Refuted);
-        // A mean against the majority, no majority, and one that chance may give.
+        // A mean that contradicts the majority, no majority, and a majority that may be chance.
         assert_eq!(paired(&margins(9, 1, 9.0)), NotDecided);
         assert_eq!(paired(&margins(30, 20, 0.1)), NotDecided);
         assert_eq!(paired(&margins(6, 3, 0.1)), NotDecided);

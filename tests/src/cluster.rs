@@ -7,10 +7,10 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use lookalike::protocol::Access;
-use lookalike_coordinator::comm::RunEvent;
-use lookalike_coordinator::core::RunSummary;
+use lookalike_coordinator::events::RunEvent;
 use lookalike_coordinator::runner::{RunError, RunnerOptions, run};
 use lookalike_coordinator::spawn::WorkerCommand;
+use lookalike_coordinator::state::RunSummary;
 use tempfile::TempDir;
 
 use crate::nodes::registry;
@@ -92,7 +92,7 @@ impl Cluster {
     /// Wait until the coordinator listens, and return where.
     pub fn address(&self) -> String {
         self.wait_for(|event| match event {
-            RunEvent::Listening { address } => Some(address.clone()),
+            RunEvent::Listening { address, .. } => Some(address.clone()),
             _ => None,
         })
     }

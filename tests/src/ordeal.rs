@@ -27,7 +27,7 @@ const FAULTS: (u64, u64) = (4, 9);
 /// How many workers are killed at most: one that dies all the time is given up for good.
 const MOST_KILLS: u32 = 5;
 
-/// How many coordinators are killed at most: each costs the time that workers are waited for.
+/// How many coordinators are killed at most.
 const MOST_COORDINATORS: u32 = 3;
 
 /// A fit, and what is to become of it.

@@ -50,7 +50,7 @@ pub fn main() -> ExitCode {
     let mut options = RunnerOptions { limits, ..RunnerOptions::new(workers, access_file.into()) };
     if command == "resume" {
         let journal = JournalOptions::new(Path::new(access_file).with_file_name(JOURNAL_FILE), RunIdentity::default());
-        options.journal = Some(JournalOptions { resume: true, survivors: true, ..journal });
+        options.journal = Some(JournalOptions { resume: true, ..journal });
     }
     match coordinate(Leaves::Gates { count, address: address.to_owned() }, options) {
         Ok(result) => {

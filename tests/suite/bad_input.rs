@@ -3,11 +3,11 @@
 use crate::program::{image, lookalike, write_exr, write_merl, write_png};
 use lookalike::{
     image::Image,
-    scene::{CircleSource, PixelStatus},
+    scene::{Camera, CircleSource, PixelStatus},
 };
 use lookalike_app::{
-    inputs::{CaptureFiles, LoadedCapture, load_capture},
-    settings::{CameraSpec, EnvironmentSettings, ViewSettings},
+    inputs::{LoadedCapture, load_capture},
+    settings::{CaptureSettings, EnvironmentSettings, ViewSettings},
 };
 use std::{fs, path::Path};
 
@@ -153,11 +153,9 @@ fn a_file_that_may_not_be_read() {
 /// The photo of a fit, through the loader that `fit` uses.
 fn capture(folder: &Path, photo: &str, mask: Option<&str>, normals: Option<&str>) -> Result<LoadedCapture, String> {
     let environment = EnvironmentSettings { path: folder.join("map.exr"), mapping: None, rotation_deg: 0.0 };
-    let view = ViewSettings { camera: CameraSpec::Orthographic, normals: normals.map(|name| folder.join(name)) };
-    let mask = mask.map(|name| folder.join(name));
-    let photo = folder.join(photo);
-    let files =
-        CaptureFiles { photo: &photo, mask: mask.as_deref(), environment: &environment, view: &view, sphere: None };
+    let view = ViewSettings { camera: Camera::Orthographic, normals: normals.map(|name| folder.join(name)) };
+    let (photo, mask) = (folder.join(photo), mask.map(|name| folder.join(name)));
+    let files = CaptureSettings { photo, mask, environment, view, sphere: None };
     load_capture(&files).map_err(|error| format!("{error:#}"))
 }
 

@@ -4,10 +4,11 @@ use std::process::Command;
 use std::time::{Duration, SystemTime};
 
 use lookalike_coordinator::access::Credentials;
-use lookalike_coordinator::comm::RunEvent;
-use lookalike_coordinator::core::Policy;
+use lookalike_coordinator::events::RunEvent;
+use lookalike_coordinator::reactor::Stop;
 use lookalike_coordinator::runner::{RunError, RunnerOptions};
 use lookalike_coordinator::spawn::WorkerCommand;
+use lookalike_coordinator::state::Policy;
 use lookalike_tests::cluster::{Cluster, options};
 use lookalike_tests::gate::{Gate, Waiting};
 use lookalike_tests::plan::{Leaves, TestPlanner};
@@ -173,7 +174,7 @@ fn without_any_worker_the_run_ends_with_a_named_error() {
     let leaves = Leaves::Digests { count: 1, shared_bytes: 1 };
     let (events, outcome) = Cluster::start(leaves, RunnerOptions { policy, ..local_listener() }).outcome();
     let error = outcome.unwrap_err();
-    assert!(matches!(error, RunError::NoWorkerCame { .. }), "{error}");
+    assert!(matches!(error, RunError::Stop(Stop::NoWorkerCame { .. })), "{error}");
     assert_eq!(error.exit_code(), 3);
     assert!(events.iter().any(|event| matches!(event, RunEvent::WaitingForWorkers { .. })), "{events:?}");
 }
@@ -187,7 +188,7 @@ fn worker_program_that_does_not_work_is_an_error_at_once() {
         Cluster::start(leaves.clone(), options).error()
     };
     let missing = with("/nonexistent/lookalike", "");
-    assert!(matches!(missing, RunError::Spawn { .. }), "{missing}");
+    assert!(matches!(missing, RunError::Spawn(_)), "{missing}");
     let unusable = with(PROGRAM, "--no-such-flag");
     assert!(unusable.to_string().contains("keep dying, the last one with exit status: 2"), "{unusable}");
 }

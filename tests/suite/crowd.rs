@@ -1,6 +1,6 @@
 //! Many workers at once: they join, wait without being lost, and share what there is to do.
 
-use lookalike_coordinator::comm::RunEvent;
+use lookalike_coordinator::events::RunEvent;
 use lookalike_coordinator::runner::RunnerOptions;
 use lookalike_tests::cluster::{Cluster, options};
 use lookalike_tests::gate::Gate;

@@ -5,9 +5,9 @@ use std::process::Command;
 use std::time::Duration;
 
 use lookalike::graph::FailureReason;
-use lookalike_coordinator::comm::{Departure, RunEvent};
-use lookalike_coordinator::core::Policy;
+use lookalike_coordinator::events::{Departure, RunEvent};
 use lookalike_coordinator::runner::{RunError, RunnerOptions};
+use lookalike_coordinator::state::Policy;
 use lookalike_tests::cluster::{Cluster, options};
 use lookalike_tests::gate::Gate;
 use lookalike_tests::plan::{Leaves, TestPlanner};

@@ -1,10 +1,10 @@
-//! Blobs by hash, within a bound: a blob is fetched once and kept for the nodes to come.
+//! A bounded cache of blobs by hash: a blob is fetched once and kept for later nodes.
 
 use std::collections::BTreeMap;
 
 use lookalike::graph::{Blob, BlobHash};
 
-/// Blobs by hash; the least recently used ones go first when the bound is passed.
+/// Blobs by hash; when the bound is exceeded, the least recently used ones are dropped.
 #[derive(Debug)]
 pub(crate) struct BlobCache {
     bound_bytes: usize,
@@ -18,7 +18,7 @@ impl BlobCache {
         Self { bound_bytes, entries: BTreeMap::new(), total_bytes: 0, clock: 0 }
     }
 
-    /// The blob of this name, if it is still there.
+    /// The blob of this hash, if it is cached.
     pub(crate) fn get(&mut self, hash: BlobHash) -> Option<Blob> {
         self.clock += 1;
         let (blob, last_use) = self.entries.get_mut(&hash)?;
@@ -26,7 +26,7 @@ impl BlobCache {
         Some(blob.clone())
     }
 
-    /// Keep a blob; a blob larger than the bound is not kept.
+    /// Cache a blob, unless it is larger than the bound.
     pub(crate) fn insert(&mut self, blob: Blob) {
         self.clock += 1;
         let bytes = blob.len();
@@ -48,7 +48,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn least_recently_used_blob_goes_first() {
+    fn least_recently_used_blob_is_dropped_first() {
         let mut cache = BlobCache::new(10);
         let [first, second, third] = [1, 2, 3].map(|byte| Blob::new(vec![byte; 4]));
         cache.insert(first.clone());

@@ -3,30 +3,19 @@
 use std::io::{self, Read};
 
 use tokio_util::sync::CancellationToken;
-use tracing::info;
 
 /// The wishes that this process shall end.
 #[derive(Clone, Debug, Default)]
 pub struct Wishes {
     /// Cancelled by the first SIGTERM or Ctrl-C: finish what is begun, then end.
     pub drain: CancellationToken,
-    /// Cancelled by the second, and as the leash says: end at once.
+    /// Cancelled by the second, and by the end of the leash: end at once.
     pub end: CancellationToken,
 }
 
-/// What the end of stdin means to a worker.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Leash {
-    /// Nothing.
-    None,
-    /// The coordinator is gone, in order or not: end.
-    Tight,
-    /// If a byte came before it, the run is over: end. Without one the coordinator was killed, and another one may come.
-    Loose,
-}
-
-/// From now on, what asks this process to end is a wish.
-pub(crate) fn watch_for_the_end(leash: Leash) -> io::Result<Wishes> {
+/// From now on, what asks this process to end is a wish: signals and, if it is leashed, the end of stdin, which means that its
+/// coordinator has ended or was killed.
+pub(crate) fn watch_for_the_end(is_leashed: bool) -> io::Result<Wishes> {
     let wishes = Wishes::default();
     let Wishes { drain, end } = wishes.clone();
     let mut signals = EndSignals::listen()?;
@@ -36,24 +25,16 @@ pub(crate) fn watch_for_the_end(leash: Leash) -> io::Result<Wishes> {
         signals.next().await;
         end.cancel();
     });
-    if leash != Leash::None {
+    if is_leashed {
         let end = wishes.end.clone();
         let watch = move || {
-            if is_the_end(leash, io::stdin().lock()) {
-                end.cancel();
-            } else {
-                info!("the coordinator was killed; waiting for another one");
-            }
+            // A byte, the end of the stream and an error all mean the same.
+            let _ = io::stdin().lock().read(&mut [0]);
+            end.cancel();
         };
         std::thread::Builder::new().name("leash".into()).spawn(watch)?;
     }
     Ok(wishes)
-}
-
-/// Wait for the coordinator's end of the leash. Whether this process shall end.
-fn is_the_end(leash: Leash, mut stdin: impl Read) -> bool {
-    let is_over = matches!(stdin.read(&mut [0]), Ok(1..));
-    is_over || leash == Leash::Tight
 }
 
 /// The signals that ask a process to end: SIGTERM, and SIGINT, which is Ctrl-C.
@@ -89,19 +70,6 @@ impl EndSignals {
         if tokio::signal::ctrl_c().await.is_err() {
             // There is no Ctrl-C here, so nobody can ask.
             std::future::pending::<()>().await;
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn loose_leash_survives_only_a_coordinator_that_was_killed() {
-        for (leash, killed) in [(Leash::Tight, true), (Leash::Loose, false)] {
-            assert!(is_the_end(leash, &b"."[..]), "{leash:?}");
-            assert_eq!(is_the_end(leash, &b""[..]), killed, "{leash:?}");
         }
     }
 }

@@ -1,4 +1,4 @@
-//! Why a worker ended without its coordinator's leave.
+//! Why a worker ended before its coordinator ended the run.
 
 use std::error::Error;
 use std::io;
@@ -10,7 +10,7 @@ use thiserror::Error;
 
 use crate::wire::WireError;
 
-/// Why a worker ended without its coordinator's leave.
+/// Why a worker ended before its coordinator ended the run.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum WorkerError {
@@ -19,18 +19,18 @@ pub enum WorkerError {
     AccessFile {
         /// The file.
         path: PathBuf,
-        /// What the system says.
+        /// The error of the system.
         source: io::Error,
     },
-    /// The access file is none.
+    /// The file is not an access file.
     #[error("the access file {} is not usable", path.display())]
     AccessContent {
         /// The file.
         path: PathBuf,
-        /// What is wrong with it.
+        /// The error in it.
         source: AccessError,
     },
-    /// The coordinator and this worker do not fit, or the coordinator refuses it. Trying again would not help.
+    /// The coordinator refuses this worker, or the two are incompatible. A retry would fail again.
     #[error("cannot join the coordinator at {address}")]
     Refused {
         /// Where the coordinator should be.
@@ -43,21 +43,21 @@ pub enum WorkerError {
     CoordinatorLost {
         /// Where the coordinator should be.
         address: String,
-        /// How long it was tried.
+        /// How long the worker tried.
         after: Duration,
-        /// What went wrong last.
+        /// The last error.
         source: WireError,
     },
     /// The compute threads cannot be started.
     #[error("cannot start the compute threads")]
     Pool(#[from] rayon::ThreadPoolBuildError),
-    /// The system gives no event loop, thread or signal handler.
+    /// The system provides no event loop, thread or signal handler.
     #[error("cannot start the worker's own threads")]
     Runtime(#[source] io::Error),
 }
 
 impl WorkerError {
-    /// The exit code of the process: 2 when a new attempt would fail too, else 3.
+    /// The exit code of the process: 2 if a retry would fail too, otherwise 3.
     #[must_use]
     pub fn exit_code(&self) -> u8 {
         match self {

@@ -1,4 +1,4 @@
-//! Jobs to results: the compute pool.
+//! Executes jobs on the compute pool.
 
 use std::sync::Arc;
 
@@ -7,10 +7,10 @@ use tokio::sync::mpsc::UnboundedSender;
 
 use crate::world::Pool;
 
-/// One execution of one node: all it needs.
+/// One execution of one node, with everything that it needs.
 #[derive(Debug)]
 pub(crate) struct Job {
-    /// Names this execution within the process.
+    /// Identifies this execution within the process.
     pub(crate) serial: u64,
     pub(crate) kind: String,
     pub(crate) parameters: Vec<u8>,
@@ -44,18 +44,18 @@ impl<P: Pool> Executor<P> {
         Self { pool, registry: Arc::new(registry), decoded: Arc::new(DecodedCache::new(decoded_bytes)), completed }
     }
 
-    /// The surroundings for one execution.
+    /// The context of one execution.
     pub(crate) fn context(&self) -> RunContext {
         RunContext::new(Arc::clone(&self.decoded))
     }
 
-    /// Begin to execute a job. Its result goes to the channel.
+    /// Start to execute a job. Its result is sent to the channel.
     pub(crate) fn start(&self, job: Job) {
         let registry = Arc::clone(&self.registry);
         let completed = self.completed.clone();
         self.pool.spawn(move || {
             let result = registry.run(&job.kind, &job.parameters, &job.inputs, &job.context);
-            // Nobody listens any more when the process is about to end.
+            // The receiver is dropped when the process is about to end.
             let _ = completed.send(Completed { serial: job.serial, result });
         });
     }

@@ -44,7 +44,7 @@ pub fn run(options: &WorkerOptions, registry: Registry) -> Result<(), WorkerErro
     // One thread is enough to talk; the cores belong to the pool.
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(WorkerError::Runtime)?;
     runtime.block_on(async {
-        let wishes = watch_for_the_end(options.leash).map_err(WorkerError::Runtime)?;
+        let wishes = watch_for_the_end(options.is_leashed).map_err(WorkerError::Runtime)?;
         run_in(Real, options, registry, wishes).await
     })
 }
@@ -88,6 +88,14 @@ pub fn main_from(arguments: impl IntoIterator<Item = OsString>, registry: Regist
 /// Run a worker and tell its error on stderr: 0 done, 2 bad input or refused, 3 the coordinator was lost.
 #[must_use]
 pub fn run_and_report(options: &WorkerOptions, registry: Registry) -> ExitCode {
+    // A local worker has a coordinator that tells the user.
+    if !options.is_leashed
+        && let Some(address) = session::address(options)
+    {
+        let patience = humantime::format_duration(options.reconnect_for);
+        // Its reader may be gone.
+        let _ = writeln!(std::io::stderr(), "connecting to the coordinator at {address}, for at most {patience}");
+    }
     match run(options, registry) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {

@@ -6,8 +6,6 @@ use std::time::Duration;
 
 use clap::Args;
 
-use crate::ending::Leash;
-
 /// The flags of `lookalike-worker` and `lookalike worker`.
 #[derive(Clone, Debug, Args)]
 pub struct Arguments {
@@ -35,10 +33,6 @@ pub struct Arguments {
     /// End when stdin ends: the coordinator holds the other end of the pipe
     #[arg(long, hide = true)]
     pub leash: bool,
-
-    /// With --leash: do not end when the coordinator was killed, but wait for the next one as long as --reconnect-for says
-    #[arg(long, requires = "leash", hide = true)]
-    pub survive: bool,
 }
 
 impl Arguments {
@@ -51,11 +45,7 @@ impl Arguments {
             reconnect_for: self.reconnect_for,
             drain_time: self.drain_time,
             address: self.address,
-            leash: match (self.leash, self.survive) {
-                (false, _) => Leash::None,
-                (true, false) => Leash::Tight,
-                (true, true) => Leash::Loose,
-            },
+            is_leashed: self.leash,
             ..WorkerOptions::new(self.access)
         }
     }
@@ -74,8 +64,8 @@ pub struct WorkerOptions {
     pub reconnect_for: Duration,
     /// How long to finish what executes when asked to end; `None`: as the coordinator says.
     pub drain_time: Option<Duration>,
-    /// What the end of stdin means.
-    pub leash: Leash,
+    /// Whether to end when stdin ends: a coordinator on this machine holds the other end of the pipe.
+    pub is_leashed: bool,
     /// How many bytes of blobs to keep beyond those that assigned nodes need.
     pub cached_blob_bytes: usize,
     /// How many bytes of blobs (counted encoded) to keep decoded.
@@ -92,7 +82,7 @@ impl WorkerOptions {
             threads: NonZeroUsize::MIN,
             reconnect_for: Duration::from_mins(10),
             drain_time: None,
-            leash: Leash::None,
+            is_leashed: false,
             cached_blob_bytes: 256 << 20,
             decoded_blob_bytes: 128 << 20,
         }

@@ -16,7 +16,7 @@ use tokio_rustls::client::TlsStream;
 use tracing::{debug, info, warn};
 
 use crate::cache::BlobCache;
-use crate::ending::{Leash, Wishes};
+use crate::ending::Wishes;
 use crate::error::WorkerError;
 use crate::execute::{Completed, Executor};
 use crate::options::WorkerOptions;
@@ -61,7 +61,7 @@ pub(crate) async fn run<W: World>(
         address,
         access,
         name: ProcessName(name),
-        is_local: options.leash != Leash::None,
+        is_local: options.is_leashed,
         threads: threads.get(),
         wishes,
         own_drain_time: options.drain_time,
@@ -72,6 +72,11 @@ pub(crate) async fn run<W: World>(
         tasks,
     };
     session.keep_connected(options.reconnect_for).await
+}
+
+/// Where a worker with these options connects to, if its access file says so.
+pub(crate) fn address(options: &WorkerOptions) -> Option<String> {
+    options.address.clone().or_else(|| read_access(options).ok().map(|access| access.address))
 }
 
 fn read_access(options: &WorkerOptions) -> Result<Access, WorkerError> {
@@ -184,7 +189,7 @@ impl<W: World> Session<W> {
             // Nothing of what follows from it has a connection to go to: `welcomed` says what counts.
             drop(self.tasks.completed(completed, || self.executor.context()));
         }
-        let actions = self.tasks.welcomed(welcome.run);
+        let actions = self.tasks.welcomed(welcome.run, welcome.epoch);
         self.act(&connection, actions);
         let ended = tokio::select! {
             biased;

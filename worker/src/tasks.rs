@@ -8,7 +8,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use lookalike::graph::{Blob, BlobHash, NodeFailure, NodeKey, RunContext};
+use lookalike::graph::{Blob, BlobHash, NodeFailure, RunContext};
 use lookalike::protocol::{Assignment, Executing, FailureKind, LeaseName, RunName, ToCoordinator, bounded_text};
 
 use crate::cache::BlobCache;
@@ -32,31 +32,24 @@ pub(crate) enum Action {
 pub(crate) struct Tasks {
     threads: usize,
     cache: BlobCache,
-    run: Option<RunName>,
-    tasks: BTreeMap<Place, Task>,
+    /// The coordinator that the tasks belong to: the run and its epoch.
+    coordinator: Option<(RunName, u64)>,
+    /// By node number.
+    tasks: BTreeMap<u64, Task>,
     /// Blobs that were asked for and have not come.
     fetching: BTreeSet<BlobHash>,
     /// Nothing more begins.
     is_draining: bool,
     /// Those whose inputs are there, in the order in which they came; also some that have gone since.
-    ready: BTreeMap<u64, Place>,
+    ready: BTreeMap<u64, u64>,
     /// Executions, by serial number, that use a thread: also those whose task is gone.
-    running: BTreeMap<u64, Place>,
+    running: BTreeMap<u64, u64>,
     next_serial: u64,
-}
-
-/// A node's number, after the epoch that gave it: another coordinator of the run may count otherwise.
-type Place = (u64, u64);
-
-fn place(lease: LeaseName) -> Place {
-    (lease.epoch, lease.node)
 }
 
 #[derive(Debug)]
 struct Task {
     lease: LeaseName,
-    /// What it computes, whatever its number.
-    key: NodeKey,
     stage: Stage,
 }
 
@@ -81,7 +74,7 @@ impl Tasks {
         Self {
             threads,
             cache,
-            run: None,
+            coordinator: None,
             tasks: BTreeMap::new(),
             fetching: BTreeSet::new(),
             is_draining: false,
@@ -91,25 +84,26 @@ impl Tasks {
         }
     }
 
-    /// A coordinator has welcomed us, perhaps again. What had not begun was given back by the lost connection; what had
-    /// begun goes on, and answers are sent again. Another run's work is worth nothing.
-    pub(crate) fn welcomed(&mut self, run: RunName) -> Vec<Action> {
-        let is_same_run = self.run.replace(run) == Some(run);
+    /// A coordinator has accepted this worker. After a broken connection to the same coordinator, nodes that had not begun are
+    /// dropped, because the coordinator has re-queued them; nodes that had begun continue, and answers are sent again. For another
+    /// coordinator, of this run or another one, everything is dropped.
+    pub(crate) fn welcomed(&mut self, run: RunName, epoch: u64) -> Vec<Action> {
+        let is_same = self.coordinator.replace((run, epoch)) == Some((run, epoch));
         self.fetching.clear();
         for (_, task) in std::mem::take(&mut self.tasks) {
             match &task.stage {
                 Stage::Gathering { .. } => {}
                 Stage::Announcing(job) => _ = self.running.remove(&job.serial),
-                Stage::Executing { .. } | Stage::Answered(_) if is_same_run => {
-                    self.tasks.insert(place(task.lease), task);
+                Stage::Executing { .. } | Stage::Answered(_) if is_same => {
+                    self.tasks.insert(task.lease.node, task);
                 }
                 Stage::Executing { context, .. } => context.cancel(),
                 Stage::Answered(_) => {}
             }
         }
         let mut actions: Vec<_> = self.tasks.values().filter_map(Task::answer).collect();
-        if is_same_run {
-            // At once: perhaps it is another coordinator, which waits for this before it gives out anything.
+        if is_same {
+            // At once, so that the coordinator does not give these nodes to other workers.
             actions.push(Action::Send(ToCoordinator::Heartbeat { executing: self.executing() }));
         }
         actions
@@ -129,10 +123,7 @@ impl Tasks {
     /// A node was assigned.
     pub(crate) fn assigned(&mut self, assignment: Assignment, new_context: impl Fn() -> RunContext) -> Vec<Action> {
         let lease = assignment.lease;
-        let inputs = assignment.inputs.iter().map(|hash| BlobHash(*hash));
-        let key = NodeKey::of(&assignment.kind, &assignment.parameters, inputs);
-        self.take_over(lease, key);
-        if let Some(task) = self.tasks.get_mut(&place(lease)) {
+        if let Some(task) = self.tasks.get_mut(&lease.node) {
             // We had it before the connection broke: answer under the new lease.
             task.lease = lease;
             return match &task.stage {
@@ -154,30 +145,18 @@ impl Tasks {
         }
         let arrival = self.serial();
         if inputs.iter().all(Option::is_some) {
-            self.ready.insert(arrival, place(lease));
+            self.ready.insert(arrival, lease.node);
         }
-        self.tasks.insert(place(lease), Task { lease, key, stage: Stage::Gathering { assignment, inputs, arrival } });
+        self.tasks.insert(lease.node, Task { lease, stage: Stage::Gathering { assignment, inputs, arrival } });
         actions.extend(self.begin(new_context));
         actions
-    }
-
-    /// If an earlier coordinator gave us what this one gives us under a new lease, go on with that.
-    fn take_over(&mut self, lease: LeaseName, key: NodeKey) {
-        let mut earlier = self.tasks.range(..(lease.epoch, 0));
-        let earlier = earlier.find(|(_, task)| task.key == key).map(|(place, _)| *place);
-        if let Some(task) = earlier.and_then(|earlier| self.tasks.remove(&earlier)) {
-            if let Some(serial) = task.serial() {
-                self.running.insert(serial, place(lease));
-            }
-            self.tasks.insert(place(lease), task);
-        }
     }
 
     /// The "started" of this execution is on the wire.
     pub(crate) fn announced(&mut self, serial: u64) -> Vec<Action> {
         let is_meant = |task: &&mut Task| task.serial() == Some(serial);
-        let place = self.running.get(&serial);
-        let Some(task) = place.and_then(|place| self.tasks.get_mut(place)).filter(is_meant) else {
+        let node = self.running.get(&serial);
+        let Some(task) = node.and_then(|node| self.tasks.get_mut(node)).filter(is_meant) else {
             return Vec::new();
         };
         let Stage::Announcing(Job { context, .. }) = &task.stage else {
@@ -193,12 +172,12 @@ impl Tasks {
     /// A fetched blob has come.
     pub(crate) fn fetched(&mut self, blob: Blob, new_context: impl Fn() -> RunContext) -> Vec<Action> {
         self.fetching.remove(&blob.hash());
-        for (place, task) in &mut self.tasks {
+        for (node, task) in &mut self.tasks {
             let Stage::Gathering { assignment, inputs, arrival } = &mut task.stage else { continue };
             let missing = assignment.inputs.iter().zip(&mut *inputs).filter(|(hash, _)| **hash == blob.hash().0);
             missing.for_each(|(_, input)| *input = Some(blob.clone()));
             if inputs.iter().all(Option::is_some) {
-                self.ready.insert(*arrival, *place);
+                self.ready.insert(*arrival, *node);
             }
         }
         self.cache.insert(blob);
@@ -207,10 +186,10 @@ impl Tasks {
 
     /// An execution has ended.
     pub(crate) fn completed(&mut self, completed: Completed, new_context: impl Fn() -> RunContext) -> Vec<Action> {
-        let place = self.running.remove(&completed.serial);
+        let node = self.running.remove(&completed.serial);
         let is_meant = |task: &&mut Task| task.serial() == Some(completed.serial);
         let mut actions = Vec::new();
-        if let Some(task) = place.and_then(|place| self.tasks.get_mut(&place)).filter(is_meant) {
+        if let Some(task) = node.and_then(|node| self.tasks.get_mut(&node)).filter(is_meant) {
             task.stage = Stage::Answered(completed.result);
             actions.extend(task.answer());
         }
@@ -220,10 +199,10 @@ impl Tasks {
 
     /// The coordinator does not want this node any more.
     pub(crate) fn cancelled(&mut self, lease: LeaseName, new_context: impl Fn() -> RunContext) -> Vec<Action> {
-        if self.tasks.get(&place(lease)).is_none_or(|task| task.lease != lease) {
+        if self.tasks.get(&lease.node).is_none_or(|task| task.lease != lease) {
             return Vec::new();
         }
-        match self.tasks.remove(&place(lease)).map(|task| task.stage) {
+        match self.tasks.remove(&lease.node).map(|task| task.stage) {
             Some(Stage::Announcing(job)) => _ = self.running.remove(&job.serial),
             Some(Stage::Executing { context, .. }) => context.cancel(),
             Some(Stage::Gathering { assignment, .. }) => self.forgo(&assignment),
@@ -250,8 +229,8 @@ impl Tasks {
 
     /// The coordinator has our answer.
     pub(crate) fn acknowledged(&mut self, lease: LeaseName) {
-        if self.tasks.get(&place(lease)).is_some_and(|task| matches!(task.stage, Stage::Answered(_))) {
-            self.tasks.remove(&place(lease));
+        if self.tasks.get(&lease.node).is_some_and(|task| matches!(task.stage, Stage::Answered(_))) {
+            self.tasks.remove(&lease.node);
         }
     }
 
@@ -271,10 +250,10 @@ impl Tasks {
     fn begin(&mut self, new_context: impl Fn() -> RunContext) -> Vec<Action> {
         let mut actions = Vec::new();
         while self.running.len() < self.threads
-            && let Some((came, place)) = self.ready.pop_first()
+            && let Some((came, node)) = self.ready.pop_first()
         {
             let serial = self.serial();
-            let Some(task) = self.tasks.get_mut(&place) else { continue };
+            let Some(task) = self.tasks.get_mut(&node) else { continue };
             let Stage::Gathering { assignment, inputs, arrival } = &mut task.stage else { continue };
             // It was cancelled, and given to us again.
             if *arrival != came {
@@ -284,7 +263,7 @@ impl Tasks {
             let kind = std::mem::take(&mut assignment.kind);
             let parameters = std::mem::take(&mut assignment.parameters);
             task.stage = Stage::Announcing(Job { serial, kind, parameters, inputs, context: new_context() });
-            self.running.insert(serial, place);
+            self.running.insert(serial, node);
             actions.push(Action::Announce { lease: task.lease, serial });
         }
         actions

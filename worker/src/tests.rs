@@ -13,7 +13,7 @@ const RUN: RunName = RunName([1; 16]);
 
 fn tasks(threads: usize) -> Tasks {
     let mut tasks = Tasks::new(threads, BlobCache::new(1000));
-    assert!(tasks.welcomed(RUN).is_empty());
+    assert!(tasks.welcomed(RUN, 1).is_empty());
     tasks
 }
 
@@ -84,7 +84,7 @@ fn shared_input_is_fetched_once_and_kept() {
 #[test]
 fn inputs_that_have_come_survive_a_full_cache() {
     let mut tasks = Tasks::new(1, BlobCache::new(100));
-    tasks.welcomed(RUN);
+    tasks.welcomed(RUN, 1);
     let [first, second] = [1, 2].map(|byte| Blob::new(vec![byte; 80]));
     tasks.assigned(assignment(lease(0, 1), &[&first, &second]), context);
     assert!(tasks.fetched(first, context).is_empty());
@@ -118,7 +118,7 @@ fn unacknowledged_answers_are_sent_again_on_a_new_connection() {
     let failure = Err(NodeFailure::Panicked { message: "no".into() });
     tasks.completed(Completed { serial: serials[1], result: failure }, context);
     tasks.acknowledged(lease(0, 1));
-    assert_eq!(said(&tasks.welcomed(RUN)), ["failed 1 (Panic): no", "executes [2]"]);
+    assert_eq!(said(&tasks.welcomed(RUN, 1)), ["failed 1 (Panic): no", "executes [2]"]);
     // Node 2 went on executing; it comes back to us under a new lease.
     assert_eq!(said(&tasks.assigned(assignment(lease(2, 2), &[]), context)), ["started 2.2"]);
     assert_eq!(said(&tasks.completed(output(serials[2], 12), context)), ["output 2.2 12"]);
@@ -130,44 +130,29 @@ fn what_had_not_begun_is_forgotten_with_its_connection() {
     let mut tasks = tasks(1);
     let unwritten = tasks.assigned(assignment(lease(0, 1), &[]), context);
     tasks.assigned(assignment(lease(1, 1), &[]), context);
-    assert_eq!(said(&tasks.welcomed(RUN)), ["executes []"]);
+    assert_eq!(said(&tasks.welcomed(RUN, 1)), ["executes []"]);
     assert!(announce(&mut tasks, &unwritten).is_empty());
     assert_eq!(said(&tasks.assigned(assignment(lease(1, 2), &[]), context)), ["announce 1.2"]);
 }
 
 #[test]
-fn another_coordinator_of_the_run_may_number_nodes_otherwise() {
-    let mut tasks = tasks(3);
-    let node = |lease, kind: &str| Assignment { kind: kind.into(), ..assignment(lease, &[]) };
-    let later = |node, attempt| LeaseName { node, attempt, epoch: 2 };
-    let mut actions = tasks.assigned(node(lease(0, 1), "x"), context);
-    actions.extend(tasks.assigned(node(lease(1, 1), "y"), context));
-    let serials = announce(&mut tasks, &actions);
-    tasks.completed(output(serials[0], 10), context);
-    assert_eq!(said(&tasks.welcomed(RUN)), ["output 0.1 10", "executes [1]"]);
-    // The number of the one, but what the other computes: that goes on under its new name.
-    assert_eq!(said(&tasks.assigned(node(later(0, 1), "y"), context)), ["started 0.1"]);
-    assert_eq!(said(&tasks.assigned(node(later(1, 1), "x"), context)), ["output 1.1 10"]);
-    // The number of both, and something else.
-    assert_eq!(said(&tasks.assigned(node(later(2, 1), "z"), context)), ["announce 2.1"]);
-    tasks.acknowledged(lease(0, 1));
-    tasks.acknowledged(later(1, 1));
-    assert_eq!(said(&tasks.completed(output(serials[1], 11), context)), ["output 0.1 11"]);
-}
-
-#[test]
-fn another_run_has_nothing_to_do_with_our_work() {
-    let mut tasks = tasks(2);
-    let mut actions = tasks.assigned(assignment(lease(0, 1), &[]), context);
-    actions.extend(tasks.assigned(assignment(lease(1, 1), &[]), context));
-    let serials = announce(&mut tasks, &actions);
-    tasks.completed(output(serials[0], 10), context);
-    assert!(tasks.welcomed(RunName([2; 16])).is_empty());
-    // The same number is another node there; the old execution still has its thread, but no voice.
-    let own = tasks.assigned(assignment(lease(1, 1), &[]), context);
-    assert_eq!(said(&own), ["announce 1.1"]);
-    announce(&mut tasks, &own);
-    assert!(tasks.completed(output(serials[1], 11), context).is_empty());
+fn another_coordinator_gets_nothing_of_what_an_earlier_one_gave_out() {
+    for (run, epoch) in [(RUN, 2), (RunName([2; 16]), 1)] {
+        let mut tasks = tasks(2);
+        let mut actions = tasks.assigned(assignment(lease(0, 1), &[]), context);
+        actions.extend(tasks.assigned(assignment(lease(1, 1), &[]), context));
+        let serials = announce(&mut tasks, &actions);
+        tasks.completed(output(serials[0], 10), context);
+        assert!(tasks.welcomed(run, epoch).is_empty());
+        assert!(tasks.are_done());
+        // The same number is another node there. The old execution still has its thread, but its output is dropped.
+        let later = |node| LeaseName { epoch, ..lease(node, 1) };
+        let own = tasks.assigned(assignment(later(1), &[]), context);
+        assert_eq!(said(&own), ["announce 1.1"]);
+        announce(&mut tasks, &own);
+        assert_eq!(tasks.executing().iter().map(|node| node.lease).collect::<Vec<_>>(), [later(1)]);
+        assert!(tasks.completed(output(serials[1], 11), context).is_empty());
+    }
 }
 
 #[test]
@@ -208,7 +193,7 @@ fn draining_worker_finishes_what_it_began_and_begins_with_nothing_more() {
     assert_eq!(said(&tasks.assigned(assignment(lease(2, 1), &[]), context)), ["Draining"]);
     assert_eq!(said(&tasks.completed(output(serials[0], 9), context)), ["output 0.1 9"]);
     assert!(!tasks.are_done(), "the answer may be lost");
-    assert_eq!(said(&tasks.welcomed(RUN)), ["output 0.1 9", "executes []"]);
+    assert_eq!(said(&tasks.welcomed(RUN, 1)), ["output 0.1 9", "executes []"]);
     tasks.acknowledged(lease(0, 1));
     assert!(tasks.are_done());
 }

@@ -1,10 +1,9 @@
-//! TLS on a connection: the worker's side, and what both sides have in common.
+//! TLS on a connection: the worker's side, and the common parts of both sides.
 //!
-//! TLS 1.3 with ring and nothing else. The coordinator shows a self-signed certificate; the worker knows it by the hash in its
-//! access file ([`CertificatePin`]) and trusts no other, whatever names or issuers it has. Workers have no certificates: that
-//! they may join, they prove with the secret in the preamble, whose proofs hold on this one connection only
-//! ([`channel_binding`]). No session is ever resumed and nothing is sent before the handshake is over, so there is nothing to
-//! replay.
+//! Only TLS 1.3 with ring. The coordinator presents a self-signed certificate; the worker compares its hash with the access file
+//! ([`CertificatePin`]) and trusts no other certificate, regardless of name and issuer. Workers have no certificates: in the preamble
+//! they prove that they know the secret, with proofs that are valid on this connection only ([`channel_binding`]). Sessions are never
+//! resumed and there is no early data, so nothing can be replayed.
 //!
 //! [RFC 8446] TLS 1.3, [RFC 9266] channel bindings for it.
 //!
@@ -31,25 +30,25 @@ use thiserror::Error as ThisError;
 use tokio::io::{AsyncRead, AsyncWrite, BufReader};
 use tokio_rustls::{TlsConnector, client};
 
-/// The name that every coordinator's certificate is for, whatever its host is called.
+/// The name in every coordinator's certificate, independent of its host.
 pub const SERVER_NAME: &str = "lookalike-coordinator";
 
-/// A stream that is read in large pieces: rustls asks for 4 KiB at a time.
+/// A buffered stream, because rustls reads only 4 KiB at a time.
 pub type Transport<S> = BufReader<S>;
 
-/// How much is read from the system at a time.
+/// How many bytes are read from the system at a time.
 const READ_BYTES: usize = 32 << 10;
 
-/// A TLS handshake that failed because of what the other side is. Trying again does not help.
+/// Why a TLS handshake with this peer fails. A retry would fail again.
 #[derive(Clone, Debug, PartialEq, Eq, ThisError)]
 #[non_exhaustive]
 pub enum TlsError {
-    /// The certificate is another one than the access file names.
+    /// The certificate is not the one in the access file.
     #[error(
-        "wrong certificate: it is not the one that the access file names, so this is another coordinator, or somebody in between; copy the access file again from the run that is to be joined"
+        "wrong certificate: it is not the one that the access file names, so this is another coordinator or a man in the middle; copy the access file again from the run to join"
     )]
     ForeignCertificate,
-    /// The certificate is not valid any more.
+    /// The certificate has expired.
     #[error(
         "the coordinator's certificate has expired; check this machine's clock, or make a new access file with `lookalike access new`"
     )]
@@ -57,26 +56,26 @@ pub enum TlsError {
     /// The certificate is not valid yet.
     #[error("the coordinator's certificate is not valid yet; set this machine's clock")]
     EarlyCertificate,
-    /// The other side shows our coordinator's certificate but does not have its key.
+    /// The peer presents the coordinator's certificate but does not have its key.
     #[error(
-        "the other side shows the coordinator's certificate without having its key: it is an impostor; see who answers at the address"
+        "the other side shows the coordinator's certificate without having its key: it is an impostor; check which host answers at the address"
     )]
     Impostor,
-    /// The other side does not speak TLS 1.3 as we do.
+    /// The peer does not speak TLS 1.3, or has no common cipher suite.
     #[error(
         "expected TLS 1.3, found something else ({found}); is the address right, and the coordinator of the same build?"
     )]
     NotTls13 {
-        /// What rustls says.
+        /// The error of rustls.
         found: String,
     },
 }
 
 impl TlsError {
-    /// What a failed handshake says about the other side; the stream's own error if it says nothing.
+    /// The fault of the peer in a failed handshake; otherwise the error of the stream.
     ///
     /// # Errors
-    /// The stream's error.
+    /// The error of the stream.
     pub fn of_handshake(error: io::Error) -> Result<Self, io::Error> {
         let Some(fault) = error.get_ref().and_then(|inner| inner.downcast_ref::<Error>()) else {
             return Err(error);
@@ -87,7 +86,7 @@ impl TlsError {
         })
     }
 
-    /// What is wrong with a certificate.
+    /// The error for a fault of a certificate.
     #[must_use]
     pub fn of_certificate(fault: &CertificateError) -> Self {
         match fault {
@@ -99,10 +98,10 @@ impl TlsError {
     }
 }
 
-/// Speak TLS as the worker with the coordinator at the other end of `stream`.
+/// Start TLS as a worker with the coordinator at the other end of `stream`.
 ///
 /// # Errors
-/// When the stream fails, or the other side is not the coordinator whose certificate `pin` names: see
+/// If the stream fails, or the peer is not the coordinator whose certificate `pin` identifies: see
 /// [`TlsError::of_handshake`].
 pub async fn connect<S>(stream: S, pin: CertificatePin) -> io::Result<client::TlsStream<Transport<S>>>
 where
@@ -113,16 +112,16 @@ where
     TlsConnector::from(Arc::new(config)).connect(name, transport(stream)).await
 }
 
-/// The stream as TLS reads it.
+/// The stream with the read buffer for TLS.
 #[must_use]
 pub fn transport<S: AsyncRead>(stream: S) -> Transport<S> {
     BufReader::with_capacity(READ_BYTES, stream)
 }
 
-/// How a worker speaks TLS with the coordinator whose certificate `pin` names.
+/// The TLS configuration of a worker for the coordinator whose certificate `pin` identifies.
 ///
 /// # Errors
-/// When rustls and its provider do not fit together.
+/// If rustls and its provider are incompatible.
 pub fn client_config(pin: CertificatePin) -> Result<ClientConfig, Error> {
     let verifier = Arc::new(PinVerifier { pin });
     let mut config = ClientConfig::builder_with_provider(provider())
@@ -132,31 +131,31 @@ pub fn client_config(pin: CertificatePin) -> Result<ClientConfig, Error> {
         .with_no_client_auth();
     config.resumption = Resumption::disabled();
     config.enable_early_data = false;
-    // The name says nothing that the coordinator needs; it need not be read on the way.
+    // The coordinator does not need the name, and without it the name is not visible on the network.
     config.enable_sni = false;
     Ok(config)
 }
 
-/// The cryptography of both sides: ring, with AES-128 before AES-256. It is as far out of reach, and blobs travel faster.
+/// The cryptography of both sides: ring, with AES-128 preferred to AES-256, because it is strong enough and faster.
 #[must_use]
 pub fn provider() -> Arc<CryptoProvider> {
     let cipher_suites = vec![TLS13_AES_128_GCM_SHA256, TLS13_AES_256_GCM_SHA384, TLS13_CHACHA20_POLY1305_SHA256];
     Arc::new(CryptoProvider { cipher_suites, ..ring::default_provider() })
 }
 
-/// What names this connection to its two ends alone: see [`ChannelBinding`].
+/// The value that identifies this connection to its two ends: see [`ChannelBinding`].
 ///
 /// # Errors
-/// When the handshake is not over.
+/// If the handshake is not complete.
 pub fn channel_binding<Side>(connection: &ConnectionCommon<Side>) -> Result<ChannelBinding, Error> {
     let value = connection.export_keying_material([0; 32], b"EXPORTER-Channel-Binding", Some(b""))?;
     Ok(ChannelBinding::from_exporter(value))
 }
 
-/// Check that a self-signed certificate is one, for a server, and valid at `now`. Its name does not matter.
+/// Check that a certificate is self-signed, for a server, and valid at `now`. Its name is not checked.
 ///
 /// # Errors
-/// What is wrong with it: [`TlsError::of_certificate`] has words for it.
+/// The fault of the certificate; [`TlsError::of_certificate`] turns it into a message.
 pub fn check_certificate(certificate: &CertificateDer<'_>, now: UnixTime) -> Result<(), CertificateError> {
     let itself = || {
         let mut roots = RootCertStore::empty();
@@ -176,7 +175,7 @@ pub fn check_certificate(certificate: &CertificateDer<'_>, now: UnixTime) -> Res
     })
 }
 
-/// Trusts the one certificate that the pin names.
+/// Trusts only the certificate that the pin identifies.
 #[derive(Debug)]
 struct PinVerifier {
     pin: CertificatePin,

@@ -1,4 +1,4 @@
-//! The protocol on a stream: the only place, for worker and coordinator alike, where protocol bytes meet tokio.
+//! The protocol on a tokio stream, for worker and coordinator: the only place that reads and writes protocol bytes on streams.
 
 use std::io;
 
@@ -16,70 +16,70 @@ use tokio::time::Instant;
 
 use crate::tls::TlsError;
 
-/// How much is read at a time.
+/// How many bytes are read at a time.
 const READ_BYTES: usize = 64 << 10;
 
-/// How much is written at a time, large blobs apart.
+/// How many bytes are written at a time, except for large blobs.
 const PARCEL_BYTES: usize = 32 << 10;
 
-/// A connection that cannot go on.
+/// Why a connection cannot continue.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum WireError {
     /// The stream itself failed.
     #[error(transparent)]
     Stream(#[from] io::Error),
-    /// The TLS handshake failed because of what the other side is.
+    /// The TLS handshake failed because of the peer.
     #[error(transparent)]
     Tls(#[from] TlsError),
     /// The handshake inside TLS failed.
     #[error(transparent)]
     Handshake(#[from] HandshakeError),
-    /// The peer sent something that is no frame.
+    /// The peer sent bytes that are not a frame.
     #[error(transparent)]
     Frame(#[from] FrameError),
-    /// The peer sent something that is no message.
+    /// The peer sent bytes that are not a message.
     #[error(transparent)]
     Codec(#[from] CodecError),
     /// The peer sent a blob that is not the announced one.
     #[error(transparent)]
     Transfer(#[from] TransferError),
-    /// The stream ended where it should not.
+    /// The stream ended unexpectedly.
     #[error("the connection ended")]
     Ended,
-    /// The peer said nothing for too long.
+    /// The peer sent nothing for too long.
     #[error("no answer in time")]
     TimedOut,
     /// A message or part where none is allowed.
     #[error("expected {expected}, found {found}")]
     Unexpected {
-        /// What is allowed.
+        /// What was expected.
         expected: &'static str,
-        /// What came.
+        /// What was received.
         found: String,
     },
 }
 
 impl WireError {
-    /// Whether the peer broke the protocol, as opposed to the stream having ended under it.
+    /// Whether the peer violated the protocol; false if the stream failed or ended.
     #[must_use]
     pub fn is_violation(&self) -> bool {
         !matches!(self, Self::Stream(_) | Self::Ended | Self::TimedOut)
     }
 
-    /// Whether another attempt would end in the same way: the two sides do not fit, or one refuses the other.
+    /// Whether a retry would fail again, because the two sides are incompatible or one refuses the other.
     #[must_use]
     pub fn is_final(&self) -> bool {
         matches!(self, Self::Tls(_) | Self::Handshake(_))
     }
 }
 
-/// What comes next on a stream.
+/// The next item on a stream.
 #[derive(Debug)]
 pub enum Received<T> {
     /// A message.
     Message(T),
-    /// A part of the blob that was announced last.
+    /// A part of the last announced blob.
     Part(Vec<u8>),
 }
 
@@ -98,15 +98,15 @@ impl<R: AsyncRead + Unpin> Incoming<R> {
         Self::with_frames(stream, FrameReader::default())
     }
 
-    /// Read frames from `stream`, cut by `frames`: it says how long they may be.
+    /// Read frames from `stream` with `frames`, which sets their largest length.
     pub fn with_frames(stream: R, frames: FrameReader) -> Self {
         Self { stream, frames, chunk: vec![0; READ_BYTES], heard: Instant::now() }
     }
 
-    /// The next message or part; `None` when the stream ended between frames. Nothing is lost when the future is dropped.
+    /// The next message or part; `None` if the stream ended between frames. Cancel safe: no bytes are lost if the future is dropped.
     ///
     /// # Errors
-    /// When the stream fails, ends inside a frame, or holds anything else than frames with messages of type `T` and parts.
+    /// If the stream fails, ends inside a frame, or has anything but frames with messages of type `T` and parts.
     pub async fn next<T: DeserializeOwned>(&mut self) -> Result<Option<Received<T>>, WireError> {
         loop {
             if let Some(received) = self.complete()? {
@@ -118,7 +118,7 @@ impl<R: AsyncRead + Unpin> Incoming<R> {
         }
     }
 
-    /// The next message or part, if all of it has been read. Call it until `None` before the next [`read`](Self::read).
+    /// The next message or part, if it was read completely. Call it until `None` before the next [`read`](Self::read).
     ///
     /// # Errors
     /// As [`next`](Self::next).
@@ -130,10 +130,11 @@ impl<R: AsyncRead + Unpin> Incoming<R> {
         }))
     }
 
-    /// Read what there is, at least a byte; `false` when the stream ended between frames. Nothing is lost when the future is dropped.
+    /// Read the available bytes, at least one; `false` if the stream ended between frames. Cancel safe: no bytes are lost if the future is
+    /// dropped.
     ///
     /// # Errors
-    /// When the stream fails, or ends inside a frame.
+    /// If the stream fails, or ends inside a frame.
     pub async fn read(&mut self) -> Result<bool, WireError> {
         let count = self.stream.read(&mut self.chunk).await?;
         self.heard = Instant::now();
@@ -145,15 +146,15 @@ impl<R: AsyncRead + Unpin> Incoming<R> {
         Ok(true)
     }
 
-    /// When something was read last: every byte is a sign of life, however long the frame is that it belongs to.
+    /// When a byte was last read. Every byte is a sign of life, even in the middle of a long frame.
     pub fn heard(&self) -> Instant {
         self.heard
     }
 
-    /// The next thing, which has to be a message.
+    /// The next item, which must be a message.
     ///
     /// # Errors
-    /// As [`next`](Self::next), and when a part comes or the stream ends.
+    /// As [`next`](Self::next), and if it is a part or the stream ends.
     pub async fn message<T: DeserializeOwned>(&mut self) -> Result<T, WireError> {
         match self.next().await? {
             Some(Received::Message(message)) => Ok(message),
@@ -168,14 +169,14 @@ impl<R: AsyncRead + Unpin> Incoming<R> {
 /// Send a message.
 ///
 /// # Errors
-/// When the stream fails or the message does not fit into a frame.
+/// If the stream fails or the message does not fit into a frame.
 pub async fn send_message<T: Serialize>(stream: &mut (impl AsyncWrite + Unpin), message: &T) -> Result<(), WireError> {
     let mut parcel = Parcel::default();
     parcel.add(message)?;
     parcel.send(stream).await
 }
 
-/// Frames that leave together: a write costs as much as many small messages do.
+/// Frames that are sent in one write, because a write takes as long as many small messages.
 #[derive(Debug, Default)]
 pub struct Parcel {
     bytes: Vec<u8>,
@@ -185,7 +186,7 @@ impl Parcel {
     /// Add a message.
     ///
     /// # Errors
-    /// When it does not fit into a frame.
+    /// If it does not fit into a frame.
     pub fn add<T: Serialize>(&mut self, message: &T) -> Result<(), WireError> {
         let body = encode_message(message)?;
         self.bytes.extend_from_slice(&frame_header(FrameTag::Message, body.len())?);
@@ -193,10 +194,10 @@ impl Parcel {
         Ok(())
     }
 
-    /// Add a blob behind the message that announces it, if it is small; else send all there is, and the blob.
+    /// Add a small blob after the message that announces it. For a large blob, send everything that was added, and then the blob.
     ///
     /// # Errors
-    /// When the stream fails.
+    /// If the stream fails.
     pub async fn add_blob(&mut self, blob: &Blob, stream: &mut (impl AsyncWrite + Unpin)) -> Result<(), WireError> {
         let is_small = is_small(blob);
         for part in parts(blob) {
@@ -212,37 +213,37 @@ impl Parcel {
         if is_small { Ok(()) } else { self.send(stream).await }
     }
 
-    /// Whether it is time to send it, whatever else there is to be sent.
+    /// Whether it must be sent before more is added.
     #[must_use]
     pub fn is_full(&self) -> bool {
         self.bytes.len() >= PARCEL_BYTES
     }
 
-    /// Write everything that was added; nothing of it stays.
+    /// Write everything that was added, and empty the parcel.
     ///
     /// # Errors
-    /// When the stream fails.
+    /// If the stream fails.
     pub async fn send(&mut self, stream: &mut (impl AsyncWrite + Unpin)) -> Result<(), WireError> {
         stream.write_all(&self.bytes).await?;
-        // TLS may hold back what the socket did not take.
+        // TLS may buffer bytes that the socket did not accept.
         stream.flush().await?;
         self.bytes.clear();
-        // A message may be long once.
+        // Give back the memory of an unusually long message.
         self.bytes.shrink_to(2 * PARCEL_BYTES);
         Ok(())
     }
 }
 
-/// Whether a blob travels in one parcel with other things.
+/// Whether a blob is sent in one parcel with other frames.
 #[must_use]
 pub fn is_small(blob: &Blob) -> bool {
     blob.len() <= PARCEL_BYTES
 }
 
-/// The worker's side of the preamble: prove the secret, and have it proved.
+/// The worker's side of the preamble: prove to know the secret, and check the coordinator's proof.
 ///
 /// # Errors
-/// When the stream fails, or the other side is no coordinator of this version that knows the secret and accepts us.
+/// If the stream fails, or the peer is not a coordinator of this version that knows the secret and accepts this worker.
 pub async fn greet_coordinator(
     stream: &mut (impl AsyncRead + AsyncWrite + Unpin),
     key: &ProofKey,
@@ -256,10 +257,10 @@ pub async fn greet_coordinator(
     Ok(verdict.check(&challenge, &response, key)?)
 }
 
-/// The coordinator's side of the preamble: challenge, judge, and tell the verdict.
+/// The coordinator's side of the preamble: send the challenge, check the response, send the verdict.
 ///
 /// # Errors
-/// When the stream fails, or the other side is no worker of this version that knows the secret.
+/// If the stream fails, or the peer is not a worker of this version that knows the secret.
 pub async fn greet_worker(
     stream: &mut (impl AsyncRead + AsyncWrite + Unpin),
     key: &ProofKey,
@@ -291,7 +292,7 @@ mod tests {
     use tokio::io::duplex;
 
     #[tokio::test]
-    async fn what_leaves_together_arrives_in_order_small_or_large() {
+    async fn small_and_large_blobs_of_one_parcel_arrive_in_order() {
         let (mut near, far) = duplex(1000);
         let blobs = [vec![1; 10], vec![2; PARCEL_BYTES + 1], Vec::new(), vec![3; 3 << 20], vec![4; 7]].map(Blob::new);
         let sent = blobs.clone();

@@ -1,7 +1,7 @@
-//! What a coordinator or a worker needs of the world around it, and cannot compute: a network, a heart, threads, chance.
+//! The environment of a coordinator or a worker: network, heartbeat, threads, random bytes.
 //!
-//! The program lives in one world, [`Real`]; tests put it into one where all of this, and time, is simulated. Time is not part of
-//! it: whatever waits does so with `tokio::time`, whose clock the runtime has.
+//! The program runs in [`Real`]; tests run it in a world that simulates all of this. Time is not part of the trait: all waits use
+//! `tokio::time`, whose clock belongs to the runtime, and the runtime of the tests simulates that too.
 
 use std::future::Future;
 use std::io;
@@ -16,65 +16,65 @@ use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::Notify;
 use tracing::warn;
 
-/// The world as one process sees it.
+/// The environment of one process.
 pub trait World: Clone + Send + Sync + 'static {
-    /// A connection, as TCP makes them.
+    /// A connection, like one of TCP.
     type Stream: AsyncRead + AsyncWrite + Unpin + Send + 'static;
-    /// Where connections come in.
+    /// A listening socket.
     type Listener: Send + 'static;
-    /// Beats until it is dropped.
+    /// A running heartbeat; it stops when this is dropped.
     type Heart: Send;
-    /// Where nodes are computed.
+    /// The threads that compute nodes.
     type Pool: Pool;
 
     /// Connect to `HOST:PORT`.
     fn connect(&self, address: &str) -> impl Future<Output = io::Result<Self::Stream>> + Send;
 
-    /// Listen on an address; the one that was got, if any port was asked for.
+    /// Listen on an address; returns the bound address, which matters if the port was 0.
     fn listen(&self, address: SocketAddr) -> impl Future<Output = io::Result<(Self::Listener, SocketAddr)>> + Send;
 
-    /// Wait for the next connection, and say where it comes from. Nothing is lost when the future is dropped.
+    /// Wait for the next connection; returns the peer's address too. Cancel safe: no connection is lost if the future is dropped.
     fn accept(listener: &Self::Listener) -> impl Future<Output = io::Result<(Self::Stream, SocketAddr)>> + Send;
 
-    /// Beat from now on, however busy everything else is. Beats that nobody has taken yet are one.
+    /// Start to notify `heart` at an interval, even if all other threads are busy. Notifications that were not received are merged.
     fn start_heart(&self, interval: Duration, heart: Arc<Notify>) -> Self::Heart;
 
     /// Start threads that compute.
     ///
     /// # Errors
-    /// When the system gives none.
+    /// If the system cannot start threads.
     fn start_pool(&self, threads: NonZeroUsize) -> Result<Self::Pool, ThreadPoolBuildError>;
 
-    /// The threads that every process has to compute on.
+    /// The global compute pool of the process.
     fn common_pool(&self) -> Self::Pool;
 
-    /// Fill with bytes that nobody can foresee.
+    /// Fill with unpredictable random bytes.
     ///
     /// # Errors
-    /// When the system gives none.
+    /// If the system has no random bytes.
     fn fill_random(&self, bytes: &mut [u8]) -> io::Result<()>;
 
-    /// The number of this process.
+    /// The id of this process.
     fn process(&self) -> u32;
 
-    /// How long it takes until something is on the disk, in a world that decides it; `None`: as long as it takes.
+    /// The simulated time of a write to disk; `None` in the real world.
     fn disk_time(&self) -> Option<Duration>;
 }
 
 /// Threads that compute.
 pub trait Pool: Send {
-    /// Run a job after those before, when a thread is free. Its parallel iterators use the pool.
+    /// Run a job after the earlier ones, when a thread is free. Its parallel iterators use the pool.
     fn spawn(&self, job: impl FnOnce() + Send + 'static);
 }
 
-/// The world as it is.
+/// The real environment.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Real;
 
 impl World for Real {
     type Stream = TcpStream;
     type Listener = TcpListener;
-    /// Beats as long as the other end is there; `None` if no thread could be started.
+    /// The heartbeat stops when this sender is dropped; `None` if its thread could not be started.
     type Heart = Option<mpsc::Sender<()>>;
     type Pool = Threads;
 
@@ -92,12 +92,12 @@ impl World for Real {
 
     async fn accept(listener: &TcpListener) -> io::Result<(TcpStream, SocketAddr)> {
         let (stream, peer) = listener.accept().await?;
-        // A stream for which this fails has ended already: whoever reads it will notice.
+        // If this fails, the stream has already ended, and the next read returns the error.
         let _ = stream.set_nodelay(true);
         Ok((stream, peer))
     }
 
-    /// In a thread of its own: nodes may keep every other thread busy.
+    /// In a separate thread, because nodes may keep all other threads busy.
     fn start_heart(&self, interval: Duration, heart: Arc<Notify>) -> Self::Heart {
         let (keep, dropped) = mpsc::channel::<()>();
         let beat = move || {
@@ -108,7 +108,7 @@ impl World for Real {
         match std::thread::Builder::new().name("heartbeat".into()).spawn(beat) {
             Ok(_) => Some(keep),
             Err(error) => {
-                warn!(%error, "cannot start the heartbeat: the coordinator will take this worker for lost");
+                warn!(%error, "cannot start the heartbeat: the coordinator will declare this worker lost");
                 None
             }
         }
@@ -137,7 +137,7 @@ impl World for Real {
     }
 }
 
-/// A rayon pool; without one of its own, that of the process. Dropped, it does not wait for running jobs: they end with the process.
+/// A rayon pool; `None` for the global one. Dropping it does not wait for running jobs, which end with the process.
 #[derive(Debug)]
 pub struct Threads(Option<ThreadPool>);
 

@@ -13,7 +13,7 @@ use crate::{
     settings::BatchFit,
 };
 use lookalike::{brdf, fit::BestScore, graph::split_label};
-use lookalike_coordinator::{comm::RunEvent, journal::FitLedger, metrics::Metrics};
+use lookalike_coordinator::{events::RunEvent, journal::PartLedger, metrics::Metrics};
 use std::{
     collections::BTreeMap,
     sync::{Arc, Mutex, MutexGuard, PoisonError},
@@ -34,7 +34,7 @@ pub(super) struct Watchers {
     pub(super) display: Box<dyn Display>,
     pub(super) metrics: Option<Metrics>,
     /// The journal.
-    pub(super) ledger: FitLedger,
+    pub(super) ledger: PartLedger,
 }
 
 struct Inner {
@@ -72,9 +72,9 @@ impl Board {
             let (scores, seconds) = complete.unzip();
             Ok::<_, brdf::ParameterError>(Row {
                 name: fit.name.clone(),
-                photo: fit.photo.to_string_lossy().into_owned(),
-                env: fit.environment.path.to_string_lossy().into_owned(),
-                model: brdf::model(fit.method.model.as_str())?,
+                photo: fit.capture.photo.to_string_lossy().into_owned(),
+                env: fit.capture.environment.path.to_string_lossy().into_owned(),
+                model: fit.method.model,
                 state: scores.map_or(State::Waiting, State::Done),
                 seconds,
             })
@@ -89,7 +89,7 @@ impl Board {
             is_stopped: false,
             began: Instant::now(),
         };
-        (0..).zip(&inner.rows).for_each(|(number, row)| inner.watchers.ledger.tell(row.for_the_journal(number)));
+        (0..).zip(&inner.rows).for_each(|(number, row)| inner.watchers.ledger.tell(row.journal_row(number)));
         inner.show_metrics();
         let board = Self { inner: Mutex::new(inner), out, writing: Mutex::new(()) };
         board.write_summaries()?;
@@ -106,11 +106,6 @@ impl Board {
             clock.requeued += u64::from(matches!(event, RunEvent::NodeRequeued { .. }));
         }
         inner.watchers.display.event(event);
-    }
-
-    /// A line for people.
-    pub(super) fn say(&self, text: &str) {
-        self.lock().watchers.display.say(text);
     }
 
     /// The inputs of a fit are there, which took so many seconds.
@@ -295,7 +290,7 @@ impl Inner {
     /// Tells everybody of a change of a fit.
     fn show(&mut self, number: u32, event: &FitEvent) {
         if let Some(row) = self.rows.get(number as usize) {
-            self.watchers.ledger.tell(row.for_the_journal(number));
+            self.watchers.ledger.tell(row.journal_row(number));
         }
         self.show_metrics();
         let count = self.count();

@@ -36,7 +36,7 @@ pub(super) fn check(settings: &BatchSettings, lights: &Lights) -> anyhow::Result
         .par_iter()
         .map(|fit| {
             let prepared = Prepared::new(fit, lights, settings.stage_two)?;
-            let (pixels, identity) = (prepared.pixels(), prepared.identity(fit)?);
+            let (pixels, identity) = (prepared.pixels(), prepared.identity()?);
             Ok((Checked { inputs: prepared.inputs, pixels, identity }, prepared.warnings))
         })
         .collect();

@@ -63,7 +63,7 @@ fn read_all(shelf: &Shelf, sender: &SyncSender<Loaded>) {
         let prepared = Prepared::new(fit, &shelf.lights, shelf.stage_two);
         let unchanged = prepared.and_then(|prepared| {
             same(&checked.inputs, &prepared.inputs)?;
-            same_settings(&checked.identity, &prepared.identity(fit)?)?;
+            same_settings(&checked.identity, &prepared.identity()?)?;
             Ok(Box::new(prepared))
         });
         if sender.send((number, unchanged)).is_err() {

@@ -29,14 +29,14 @@ use crate::{
     inputs::show_warnings,
     outputs::{BATCH_MARK, Claim, ClaimedFolder, FIT_FILES, OldFiles, OutFolder, print_result},
     progress::{Ending, display_of_many},
-    run::{invitation, journal_failed, run_to_end, runner_options},
+    run::{journal_failed, run_to_end, runner_options},
     settings::{BatchFit, BatchSettings, OnFailure, ProgressKind},
 };
 use anyhow::Context;
 use board::{Board, Watchers};
 use lights::Lights;
 use lookalike::graph::Many;
-use lookalike_coordinator::journal::{self, Finished, FitLedger, JOURNAL_FILE, JournalOptions};
+use lookalike_coordinator::journal::{self, Finished, JOURNAL_FILE, JournalOptions, PartLedger};
 use std::{path::Path, process::ExitCode, sync::Arc};
 use supply::{Supply, SupplyOptions};
 use tokio::sync::Notify;
@@ -64,7 +64,7 @@ pub(crate) fn run(settings: BatchSettings) -> anyhow::Result<ExitCode> {
     }
     remark.iter().for_each(|text| display.say(text));
     metrics.iter().for_each(|metrics| display.say(&format!("metrics at {}", metrics.url())));
-    let ledger = FitLedger::default();
+    let ledger = PartLedger::default();
     let watchers = Watchers { display, metrics: metrics.clone(), ledger: ledger.clone() };
     let board = Arc::new(Board::new(&fits, complete, watchers, out.clone()).context(Exit::ClusterFailed)?);
     if is_finished {
@@ -93,16 +93,12 @@ pub(crate) fn run(settings: BatchSettings) -> anyhow::Result<ExitCode> {
         path: out.file(JOURNAL_FILE),
         identity,
         resume: settings.resume,
-        survivors: true,
-        best: None,
-        fits: ledger.clone(),
+        score: None,
+        parts: ledger.clone(),
     });
     let run = run_to_end(options, Many::new(supply), metrics.as_ref(), |event| {
         demand.note(event);
         board.note(event);
-        if let Some(text) = invitation(event, &settings.cluster, &out, settings.progress) {
-            board.say(&text);
-        }
     });
     // Also of a run that failed: what was computed is written.
     let run = run.map(|(planner, summary)| (drop(planner), summary).1);
@@ -112,7 +108,7 @@ pub(crate) fn run(settings: BatchSettings) -> anyhow::Result<ExitCode> {
 }
 
 /// Tells the journal what has come after it was closed: fits whose results were written last, and how all of it ended.
-fn close(out: &OutFolder, board: &Board, ledger: &FitLedger, is_whole: bool, fits: &[BatchFit]) -> anyhow::Result<()> {
+fn close(out: &OutFolder, board: &Board, ledger: &PartLedger, is_whole: bool, fits: &[BatchFit]) -> anyhow::Result<()> {
     let path = out.file(JOURNAL_FILE);
     if !path.exists() {
         // The run could not begin.
@@ -131,8 +127,7 @@ fn close(out: &OutFolder, board: &Board, ledger: &FitLedger, is_whole: bool, fit
 fn claim(settings: &BatchSettings) -> Claim<'_> {
     let mut inputs: Vec<&Path> = vec![&settings.manifest];
     for fit in &settings.fits {
-        inputs.extend([fit.photo.as_path(), fit.environment.path.as_path()]);
-        inputs.extend([&fit.mask, &fit.view.normals].into_iter().filter_map(|path| path.as_deref()));
+        inputs.extend(fit.capture.files());
     }
     inputs.extend(settings.cluster.access.as_deref());
     Claim {

@@ -2,8 +2,8 @@
 
 use super::lights::Lights;
 use crate::{
-    fit::{FitIdentity, method},
-    inputs::{CaptureFiles, load_capture_under, resolve_display_exposure},
+    fit::FitIdentity,
+    inputs::{load_capture_under, resolve_display_exposure},
     settings::{BatchFit, StageTwo},
 };
 use anyhow::Context;
@@ -30,7 +30,7 @@ impl Prepared {
     pub(super) fn new(fit: &BatchFit, lights: &Lights, stage_two: StageTwo) -> anyhow::Result<Self> {
         let began = Instant::now();
         let mut encoded = None;
-        let loaded = load_capture_under(&CaptureFiles::from(fit), |settings| {
+        let loaded = load_capture_under(&fit.capture, |settings| {
             let light = lights.get(settings)?;
             encoded = Some(light.encoded.clone());
             Ok(light.loaded.clone())
@@ -39,7 +39,7 @@ impl Prepared {
         let capture = Arc::new(loaded.capture);
         let coverage = capture.scoring_coverage();
         let exposure = resolve_display_exposure(&fit.display_exposure, capture.photo(), &coverage)?;
-        let method = method(&fit.method)?;
+        let method = fit.method.clone();
         let placement = match stage_two {
             StageTwo::Coordinator => Placement::Coordinator,
             StageTwo::Workers => Placement::Worker,
@@ -54,9 +54,9 @@ impl Prepared {
     }
 
     /// What may not change when the batch is resumed, by name.
-    pub(super) fn identity(&self, fit: &BatchFit) -> anyhow::Result<Vec<(&'static str, String)>> {
-        let (inputs, capture, settings, exposure) = (&self.inputs, &*self.capture, &fit.method, self.exposure);
-        FitIdentity { inputs, capture, settings, exposure, also_render: &[] }.parts()
+    pub(super) fn identity(&self) -> anyhow::Result<Vec<(&'static str, String)>> {
+        let (inputs, capture, method, exposure) = (&self.inputs, &*self.capture, &self.method, self.exposure);
+        FitIdentity { inputs, capture, method, exposure, also_render: &[] }.parts()
     }
 
     /// Pixels of the photo.

@@ -4,7 +4,6 @@ use super::{backlog::Backlog, board::Board, row::Scores};
 use crate::{
     fit::{final_parameters, final_score, final_scores, notes, write_results},
     outputs::{FIT_FILES, FitRecord, OutFolder, Timing},
-    settings::MethodSettings,
 };
 use anyhow::Context;
 use lookalike::{fit::Method, plan::FitOutcome, scene::Capture};
@@ -19,7 +18,6 @@ use tokio::sync::Notify;
 #[derive(Debug)]
 pub(super) struct Inputs {
     pub(super) capture: Arc<Capture>,
-    pub(super) settings: MethodSettings,
     pub(super) method: Method,
     pub(super) exposure: f64,
     /// The `inputs` of `fit.json`.
@@ -106,7 +104,6 @@ fn write(out: &OutFolder, out_name: String, fitted: &Fitted) -> anyhow::Result<S
     let folder = out.sub(&fitted.name)?;
     let notes = notes(&inputs.method, outcome);
     let record = FitRecord {
-        settings: &inputs.settings,
         method: &inputs.method,
         capture: &inputs.capture,
         inputs: &inputs.inputs,

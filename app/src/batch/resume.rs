@@ -5,9 +5,9 @@ use crate::{
     fit::version,
     outputs::{MARK, OutFolder},
     run::{journal_failed, missing},
-    settings::{BatchFit, Judge},
+    settings::BatchFit,
 };
-use lookalike::brdf::{self, Channels, Model};
+use lookalike::brdf::{Channels, Model};
 use lookalike_coordinator::journal::{self, JOURNAL_FILE, RunIdentity};
 use serde_json::Value;
 use std::fs;
@@ -73,16 +73,12 @@ fn complete_fit(out: &OutFolder, fit: &BatchFit, files: &[(String, String)]) -> 
     let (stage_two, polished) = (&json["stage_two"], &json["polished"]);
     let last = if polished.is_null() { stage_two } else { polished };
     let (cssim, cssim_object) = (last["cssim"].as_f64()?, last["cssim_object"].as_f64()?);
-    let judged = match fit.method.judge {
-        Judge::Image => cssim,
-        Judge::Object => cssim_object,
-    };
-    let model = brdf::model(fit.method.model.as_str()).ok()?;
+    let judged = fit.method.judge.pick(cssim, cssim_object);
     let scores = Scores {
         cssim,
         cssim_object,
         gamma: stage_two["gamma"].as_f64()?,
-        parameters: flat(model, &last["parameters"])?,
+        parameters: flat(fit.method.model, &last["parameters"])?,
         is_polished: !polished.is_null(),
         is_missed: fit.max_cssim.is_some_and(|limit| judged > limit),
         files: files.to_vec(),
@@ -110,6 +106,7 @@ fn flat(model: &dyn Model, parameters: &Value) -> Option<Vec<f64>> {
 mod tests {
     use super::*;
     use crate::outputs::parameters_json;
+    use lookalike::brdf;
 
     #[test]
     fn parameters_come_back_from_their_names() {

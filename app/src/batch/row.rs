@@ -1,7 +1,7 @@
 //! A fit of a batch: how far it is, and its scores.
 
 use lookalike::brdf::Model;
-use lookalike_coordinator::journal::{FitRow, FitStatus};
+use lookalike_coordinator::journal::{PartRow, PartStatus};
 
 /// A fit, as the summaries show it.
 #[derive(Debug, Clone)]
@@ -46,20 +46,20 @@ impl State {
 
 impl Row {
     /// As the journal has it.
-    pub(super) fn for_the_journal(&self, number: u32) -> FitRow {
+    pub(super) fn journal_row(&self, number: u32) -> PartRow {
         let (scores, error) = match &self.state {
             State::Done(scores) => (Some(scores), None),
             State::Failed(error) => (None, Some(error.clone())),
             State::Waiting | State::Running | State::Stopped => (None, None),
         };
-        let status = FitStatus {
+        let status = PartStatus {
             name: self.name.clone(),
             state: self.state.name().to_owned(),
-            cssim: scores.map(|scores| scores.cssim),
+            score: scores.map(|scores| scores.cssim),
             seconds: self.seconds,
             error,
         };
-        FitRow { number, status, outputs: scores.map(|scores| scores.files.clone()).unwrap_or_default() }
+        PartRow { number, status, outputs: scores.map(|scores| scores.files.clone()).unwrap_or_default() }
     }
 }
 

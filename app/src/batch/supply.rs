@@ -92,8 +92,7 @@ impl Supply {
         let pixels = prepared.pixels();
         let Prepared { capture, method, exposure, inputs, planner, seconds, .. } = prepared;
         self.options.board.started(number, planner.best(), seconds);
-        let settings = fit.method.clone();
-        let inputs = Inputs { capture, settings, method, exposure, inputs, max_cssim: fit.max_cssim };
+        let inputs = Inputs { capture, method, exposure, inputs, max_cssim: fit.max_cssim };
         self.active.insert(number, Active { inputs, pixels });
         Ok(Some(Part { number, name: fit.name.clone(), planner, stays: false }))
     }
@@ -181,13 +180,13 @@ mod tests {
         progress::display_of_many,
         settings::ProgressKind,
     };
-    use lookalike_coordinator::journal::FitLedger;
+    use lookalike_coordinator::journal::PartLedger;
     use serde_json::Value;
 
     /// A supply whose next fit has so many pixels, for one worker of one thread.
     fn supply(out: &OutFolder, pixels: usize) -> Supply {
         let watchers =
-            Watchers { display: display_of_many(ProgressKind::None, 0), metrics: None, ledger: FitLedger::default() };
+            Watchers { display: display_of_many(ProgressKind::None, 0), metrics: None, ledger: PartLedger::default() };
         let board = Arc::new(Board::new(&[], Vec::new(), watchers, out.clone()).unwrap());
         let options = SupplyOptions {
             fits: Arc::new([]),

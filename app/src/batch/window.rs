@@ -3,7 +3,7 @@
 use super::backlog::Load;
 use crate::settings::StageTwo;
 use lookalike::graph::WorkerId;
-use lookalike_coordinator::comm::RunEvent;
+use lookalike_coordinator::events::RunEvent;
 use std::{
     collections::BTreeMap,
     sync::{
@@ -83,7 +83,7 @@ impl Window {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use lookalike_coordinator::comm::Departure;
+    use lookalike_coordinator::events::Departure;
 
     fn window(threads: usize, stage_two: StageTwo) -> Window {
         let demand = Arc::new(Demand::expecting(1));

@@ -22,7 +22,7 @@ pub(crate) fn expand_config(grammar: &Command, mut argv: Vec<OsString>) -> anyho
     let file = match files[..] {
         [] => return Ok(argv),
         [file] => argv.remove(file),
-        _ => bail!("two settings files, {:?} and {:?}; expected at most one", argv[files[0]], argv[files[1]]),
+        _ => bail!("two settings files, {:?} and {:?}; give at most one", argv[files[0]], argv[files[1]]),
     };
     let config = config::read(command, Path::new(&file))?;
     let given = positionals.len() - 1;
@@ -31,7 +31,10 @@ pub(crate) fn expand_config(grammar: &Command, mut argv: Vec<OsString>) -> anyho
     }
     for (expected, (place, value)) in (given + 1..).zip(config.positionals.range(given + 1..)) {
         if *place != expected {
-            bail!("{}: the positional argument before {value:?} is missing", file.display());
+            bail!(
+                "{}: the positional argument before {value:?} is missing; give it here or on the command line",
+                file.display()
+            );
         }
         argv.push(value.clone());
     }
@@ -47,7 +50,7 @@ pub(crate) fn insert_flags(grammar: &Command, mut argv: Vec<OsString>, flags: Ve
     argv
 }
 
-/// The flags of `A` that an argument list for a subcommand gives, each as one token; defaults are none of them.
+/// The flags of `A` that an argument list for a subcommand gives, each as one token, without defaults.
 ///
 /// # Errors
 /// If the list does not parse.

@@ -16,7 +16,7 @@ mod tokens;
 #[cfg(fuzzing)]
 pub(crate) use manifest::read as manifest;
 
-use crate::{exit::NotThereYet, settings::DemoSettings};
+use crate::settings::DemoSettings;
 use anyhow::Context;
 use args::{Cli, Command, FitArgs, MethodArgs};
 use clap::{CommandFactory, Parser};
@@ -65,7 +65,7 @@ fn start_tracing(filter: &str) -> anyhow::Result<()> {
         .with_env_filter(EnvFilter::try_new(filter).context("--log")?)
         .with_writer(io::stderr)
         .with_ansi(io::stderr().is_terminal())
-        // A worker may outlive whoever reads its stderr, and must not die of that.
+        // A worker may outlive the reader of its stderr: a write to the closed pipe must not end it.
         .log_internal_errors(false)
         .try_init()
         .map_err(anyhow::Error::from_boxed)
@@ -95,8 +95,6 @@ fn dispatch(Cli { log, command }: Cli) -> anyhow::Result<ExitCode> {
             }
         }
         Command::Status(args) => status::run(&args.into_settings()),
-        Command::Check(_) => later("lookalike check", "`lookalike fit` refuses inputs that it cannot use"),
-        Command::Export(_) => later("lookalike export", "the parameters are in OUT/fit.json"),
         Command::Study(args) => {
             let job = args.job();
             let mut settings = args.into_settings()?;
@@ -106,12 +104,7 @@ fn dispatch(Cli { log, command }: Cli) -> anyhow::Result<ExitCode> {
                 None => study::run(settings),
             }
         }
-        Command::Report(_) => later("lookalike report", "the numbers are in OUT/fit.json and OUT/candidates.csv"),
     }
-}
-
-fn later(what: &'static str, instead: &'static str) -> anyhow::Result<ExitCode> {
-    Err(NotThereYet { what, instead }.into())
 }
 
 #[cfg(test)]

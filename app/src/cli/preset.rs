@@ -1,6 +1,7 @@
 //! `--preset`: named bundles of flags.
 
-use crate::settings::{CompressAtZero, Preset, Start};
+use crate::settings::Preset;
+use lookalike::fit::{Compress, Start};
 use std::ffi::OsString;
 
 /// The flags a preset stands for. They precede all others, so that a flag given explicitly wins.
@@ -14,15 +15,15 @@ pub(crate) fn flags(preset: Preset) -> Vec<OsString> {
 pub(crate) fn start(preset: Option<Preset>) -> Start {
     match preset {
         Some(Preset::Paper) => Start::Paper,
-        None => Start::Scan,
+        None => Start::default(),
     }
 }
 
 /// What compression does near zero under a preset.
-pub(crate) fn compress_at_zero(preset: Option<Preset>) -> CompressAtZero {
+pub(crate) fn compress(preset: Option<Preset>) -> Compress {
     match preset {
-        Some(Preset::Paper) => CompressAtZero::Clamp,
-        None => CompressAtZero::Tangent,
+        Some(Preset::Paper) => Compress::Clamp,
+        None => Compress::default(),
     }
 }
 

@@ -16,7 +16,7 @@ pub(crate) fn failure(error: &anyhow::Error) -> ExitCode {
         return if error.exit_code() == 0 { Exit::Done.into() } else { Exit::BadInput.into() };
     }
     let colour = io::stderr().is_terminal() && env::var_os("NO_COLOR").is_none_or(|value| value.is_empty());
-    // Nobody is left to tell that stderr is closed.
+    // A closed stderr cannot be reported anywhere.
     let _ = io::stderr().write_all(render(error, colour).as_bytes());
     error.downcast_ref::<Exit>().copied().unwrap_or(Exit::BadInput).into()
 }

@@ -4,10 +4,11 @@ use crate::{
     demo::{environment, material, photo},
     fit::{self, FitJob},
     outputs::{Claim, ClaimedFolder, FIT_FILES, OldFiles, OutFolder, Panel, Pictures, print_result, strip},
-    settings::{ClusterSettings, DemoSettings, MethodSettings},
+    settings::{ClusterSettings, DemoSettings},
 };
 use anyhow::Context;
 use lookalike::{
+    fit::Method,
     image::{Image, content_hash, openexr, png},
     light::Environment,
     metric::auto_exposure,
@@ -45,7 +46,7 @@ pub(crate) fn run(settings: DemoSettings) -> anyhow::Result<ExitCode> {
     let out_name = settings.out.display().to_string();
     let job = FitJob {
         capture: Arc::clone(&capture),
-        settings: MethodSettings::default(),
+        method: Method::default(),
         exposure,
         inputs,
         cluster: ClusterSettings { workers: settings.workers, log: settings.log, ..ClusterSettings::default() },
@@ -56,7 +57,6 @@ pub(crate) fn run(settings: DemoSettings) -> anyhow::Result<ExitCode> {
         max_cssim: None,
         also_render: SHOWN.to_vec(),
         resume: false,
-        is_resumable: false,
         input_seconds: began.elapsed().as_secs_f64(),
     };
     let finished = fit::run(job)?.context("a fit that nobody has made is finished: please report this")?;

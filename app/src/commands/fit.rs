@@ -6,18 +6,13 @@ use crate::{
     outputs::{Claim, ClaimedFolder, OldFiles},
     settings::FitSettings,
 };
-use std::{
-    path::{Path, PathBuf},
-    process::ExitCode,
-    sync::Arc,
-    time::Instant,
-};
+use std::{process::ExitCode, sync::Arc, time::Instant};
 
 pub(crate) fn run(settings: FitSettings) -> anyhow::Result<ExitCode> {
     let began = Instant::now();
     // Whatever can fail fails before any work is done.
     let folder = ClaimedFolder::take(&claim(&settings))?;
-    let loaded = load_capture(&(&settings).into())?;
+    let loaded = load_capture(&settings.capture)?;
     show_warnings(&loaded.warnings);
     let coverage = loaded.capture.scoring_coverage();
     let exposure = resolve_display_exposure(&settings.display_exposure, loaded.capture.photo(), &coverage)?;
@@ -25,7 +20,7 @@ pub(crate) fn run(settings: FitSettings) -> anyhow::Result<ExitCode> {
     let job = FitJob {
         inputs: loaded.to_json(),
         capture: Arc::new(loaded.capture),
-        settings: settings.method,
+        method: settings.method,
         exposure,
         cluster: settings.cluster,
         progress: settings.progress,
@@ -35,7 +30,6 @@ pub(crate) fn run(settings: FitSettings) -> anyhow::Result<ExitCode> {
         max_cssim: settings.max_cssim,
         also_render: Vec::new(),
         resume: settings.resume,
-        is_resumable: true,
         input_seconds: began.elapsed().as_secs_f64(),
     };
     Ok(fit::run(job)?.map_or(ExitCode::SUCCESS, |finished| finished.code))
@@ -43,9 +37,7 @@ pub(crate) fn run(settings: FitSettings) -> anyhow::Result<ExitCode> {
 
 /// What the fit asks of its folder.
 fn claim(settings: &FitSettings) -> Claim<'_> {
-    let files = [Some(&settings.photo), settings.mask.as_ref(), settings.view.normals.as_ref()];
-    let mut inputs: Vec<&Path> = files.into_iter().flatten().map(PathBuf::as_path).collect();
-    inputs.push(&settings.environment.path);
+    let mut inputs = settings.capture.files();
     inputs.extend(settings.cluster.access.as_deref());
     Claim {
         inputs,

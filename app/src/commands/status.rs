@@ -3,7 +3,7 @@
 use crate::{outputs::print_result, settings::StatusSettings};
 use anyhow::Context;
 use lookalike_coordinator::journal::{
-    FitStatus,
+    PartStatus,
     status::{Counts, RunState, Status},
 };
 use std::{process::ExitCode, time::Duration};
@@ -39,13 +39,13 @@ fn table(status: &Status, folder: &str) -> String {
     line("coordinator", format!("process {} on {}{which}", status.process, status.host));
     line("nodes", progress(&status.nodes));
     line("attempts", format!("{}, {} of them lost with their workers", status.attempts, status.requeued));
-    if let Some(best) = status.best_cssim {
+    if let Some(best) = status.best_score {
         line("best CSSIM", format!("{best:.4}"));
     }
-    if !status.fits.is_empty() {
-        line("fits", fit_count(&status.fits));
+    if !status.parts.is_empty() {
+        line("fits", fit_count(&status.parts));
     }
-    text.push_str(&fits(&status.fits));
+    text.push_str(&fits(&status.parts));
     text.push_str(&kinds(status));
     text.push_str(&workers(status));
     for failure in &status.failures {
@@ -65,7 +65,7 @@ fn table(status: &Status, folder: &str) -> String {
 }
 
 /// How many fits are in each state, in one line.
-fn fit_count(fits: &[FitStatus]) -> String {
+fn fit_count(fits: &[PartStatus]) -> String {
     let of = |state: &str| fits.iter().filter(|fit| fit.state == state).count();
     let mut text = format!("{} of {} done", of("done") + of("missed"), fits.len());
     for state in ["missed", "failed", "running", "waiting", "stopped"] {
@@ -77,11 +77,11 @@ fn fit_count(fits: &[FitStatus]) -> String {
 }
 
 /// A line per fit. Of many, those first that somebody may want to look at.
-fn fits(all: &[FitStatus]) -> String {
+fn fits(all: &[PartStatus]) -> String {
     if all.is_empty() {
         return String::new();
     }
-    let mut shown: Vec<&FitStatus> = all.iter().collect();
+    let mut shown: Vec<&PartStatus> = all.iter().collect();
     if all.len() > MOST_FITS {
         shown
             .sort_by_key(|fit| FIRST_STATES.iter().position(|state| *state == fit.state).unwrap_or(FIRST_STATES.len()));
@@ -89,8 +89,8 @@ fn fits(all: &[FitStatus]) -> String {
     }
     let width = shown.iter().map(|fit| fit.name.chars().count()).chain([3]).max().unwrap_or(3);
     let mut text = format!("\n{:<width$}  {:<7}  {:>6}  {:>9}\n", "fit", "state", "CSSIM", "seconds");
-    for FitStatus { name, state, cssim, seconds, error } in &shown {
-        let cssim = cssim.map(|cssim| format!("{cssim:.4}")).unwrap_or_default();
+    for PartStatus { name, state, score, seconds, error } in &shown {
+        let cssim = score.map(|cssim| format!("{cssim:.4}")).unwrap_or_default();
         let seconds = seconds.map(|seconds| format!("{seconds:.1}")).unwrap_or_default();
         let error = error.as_deref().map(|error| format!("  {error}")).unwrap_or_default();
         let line = format!("{name:<width$}  {state:<7}  {cssim:>6}  {seconds:>9}{error}");

@@ -16,7 +16,8 @@ use lookalike::{
         sampling::{key, uniform},
     },
     render::{
-        cut::{Band, Cut, Point},
+        cut::{Band, Cut},
+        point::Point,
         pyramid::LightPyramid,
     },
     scene::Geometry,

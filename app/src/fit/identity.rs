@@ -1,8 +1,10 @@
 //! The identity of a fit: what may not change when its run is resumed.
 
-use crate::{outputs::name_of, settings::MethodSettings};
 use anyhow::Context;
-use lookalike::scene::Capture;
+use lookalike::{
+    fit::{Gammas, Method},
+    scene::Capture,
+};
 use lookalike_coordinator::journal::RunIdentity;
 use serde_json::Value;
 
@@ -12,7 +14,7 @@ pub(crate) struct FitIdentity<'a> {
     /// The `inputs` of `fit.json`.
     pub(crate) inputs: &'a Value,
     pub(crate) capture: &'a Capture,
-    pub(crate) settings: &'a MethodSettings,
+    pub(crate) method: &'a Method,
     /// Exposure before the metric.
     pub(crate) exposure: f64,
     /// Gammas whose candidates are rendered as well.
@@ -25,7 +27,7 @@ impl FitIdentity<'_> {
         Ok(self.parts()?.into_iter().fold(version(), |identity, (name, value)| identity.with(name, value)))
     }
 
-    /// The inputs, by content, and the settings. Names are those of the command line.
+    /// The inputs, by content, and the method. Names are those of the command line.
     pub(crate) fn parts(&self) -> anyhow::Result<Vec<(&'static str, String)>> {
         let mut parts = Vec::new();
         let inputs = [("photo", "the photo"), ("environment", "--env"), ("mask", "--mask"), ("normals", "--normals")];
@@ -42,22 +44,23 @@ impl FitIdentity<'_> {
             }
         }
         let geometry = serde_json::to_string(&self.capture.geometry().spec()).context("the geometry")?;
-        let settings = self.settings;
+        let method = self.method;
+        let gammas = Gammas::of_values(&method.gammas).map_or_else(String::new, |gammas| gammas.to_string());
         parts.extend([
             ("the place of the object (--sphere, --camera)", geometry),
             ("--display-exposure", self.exposure.to_string()),
-            ("--model", settings.model.to_string()),
-            ("--gammas", settings.gammas.to_string()),
-            ("--samples", settings.samples.to_string()),
-            ("--sampling", name_of(&settings.sampling)),
-            ("--subsets", settings.subsets.to_string()),
-            ("--search", name_of(&settings.search)),
-            ("--integrator", settings.integrator.to_string()),
-            ("the start of the searches (--preset)", format!("{:?}", settings.start).to_lowercase()),
-            ("compression at zero (--preset)", format!("{:?}", settings.compress_at_zero).to_lowercase()),
-            ("--polish", if settings.polish { "on" } else { "off" }.to_owned()),
-            ("--judge", name_of(&settings.judge)),
-            ("--seed", settings.seed.to_string()),
+            ("--model", method.model.name().to_owned()),
+            ("--gammas", gammas),
+            ("--samples", method.samples.to_string()),
+            ("--sampling", method.sampling.to_string()),
+            ("--subsets", method.subsets.to_string()),
+            ("--search", method.search.to_string()),
+            ("--integrator", method.integration.to_string()),
+            ("the start of the searches (--preset)", format!("{:?}", method.start).to_lowercase()),
+            ("compression at zero (--preset)", format!("{:?}", method.compress).to_lowercase()),
+            ("--polish", if method.polish { "on" } else { "off" }.to_owned()),
+            ("--judge", method.judge.to_string()),
+            ("--seed", method.seed.to_string()),
             ("the gammas that are shown", format!("{:?}", self.also_render)),
         ]);
         Ok(parts)

@@ -1,21 +1,19 @@
 //! One fit from a checked capture to a folder of results: plans the graph, runs it on workers, writes what came out.
 
 mod identity;
-mod method;
 mod notes;
 mod results;
 
 pub(crate) use identity::{FitIdentity, version};
-pub(crate) use method::method;
 pub(crate) use notes::notes;
-pub(crate) use results::{final_parameters, final_score, final_scores, judge, write_results};
+pub(crate) use results::{final_parameters, final_score, final_scores, write_results};
 
-use crate::run::{Clock, cpu_seconds, invitation, is_finished, journal_failed, run_to_end, runner_options};
+use crate::run::{Clock, cpu_seconds, is_finished, journal_failed, run_to_end, runner_options};
 use crate::{
     exit::Exit,
     outputs::{FitRecord, OutFolder, Pictures, Timing, print_summary},
     progress::{Display, Ending, display},
-    settings::{ClusterSettings, MethodSettings, MetricsAddress, ProgressKind},
+    settings::{ClusterSettings, MetricsAddress, ProgressKind},
 };
 use anyhow::Context;
 use lookalike::{
@@ -24,7 +22,7 @@ use lookalike::{
     scene::Capture,
 };
 use lookalike_coordinator::{
-    journal::{self, FitLedger, JOURNAL_FILE, JournalOptions},
+    journal::{self, JOURNAL_FILE, JournalOptions, PartLedger},
     metrics::Metrics,
 };
 use serde_json::Value;
@@ -34,7 +32,7 @@ use std::{process::ExitCode, sync::Arc};
 #[derive(Debug)]
 pub(crate) struct FitJob {
     pub(crate) capture: Arc<Capture>,
-    pub(crate) settings: MethodSettings,
+    pub(crate) method: Method,
     /// Exposure before the metric.
     pub(crate) exposure: f64,
     /// The `inputs` of `fit.json`.
@@ -50,8 +48,6 @@ pub(crate) struct FitJob {
     pub(crate) also_render: Vec<f64>,
     /// Go on with the run that is in the folder, if there is one.
     pub(crate) resume: bool,
-    /// Whether somebody may want to go on with this run.
-    pub(crate) is_resumable: bool,
     /// Seconds spent on loading or making the inputs.
     pub(crate) input_seconds: f64,
 }
@@ -66,7 +62,7 @@ pub(crate) struct Finished {
 
 /// Runs a fit and writes its results; `None` if that was done before.
 pub(crate) fn run(job: FitJob) -> anyhow::Result<Option<Finished>> {
-    let method = method(&job.settings)?;
+    let method = job.method.clone();
     let planner = FitPlanner::new(Arc::clone(&job.capture), method.clone(), job.exposure)
         .context("the photo cannot be fitted")?
         .also_render(&job.also_render);
@@ -81,7 +77,7 @@ pub(crate) fn run(job: FitJob) -> anyhow::Result<Option<Finished>> {
     let best = final_score(&method, &outcome);
     let missed = job.max_cssim.is_some_and(|limit| best > limit);
     if let (true, Some(limit)) = (missed, job.max_cssim) {
-        eprintln!("the match has a score of {best:.4} (--judge {}), more than --max-cssim {limit}", judge(&method));
+        eprintln!("the match has a score of {best:.4} (--judge {}), more than --max-cssim {limit}", method.judge);
     }
     let code = if missed { Exit::MissedMaxCssim } else { Exit::Done };
     Ok(Some(Finished { outcome, pictures, code: code.into() }))
@@ -106,7 +102,7 @@ fn run_shown(
     let identity = FitIdentity {
         inputs: &job.inputs,
         capture: &job.capture,
-        settings: &job.settings,
+        method,
         exposure: job.exposure,
         also_render: &job.also_render,
     };
@@ -115,21 +111,18 @@ fn run_shown(
         return Ok(None);
     }
     let mut clock = Clock::start();
-    let mut options = runner_options(&job.cluster, &job.out, job.settings.seed);
+    let best = planner.best();
+    let mut options = runner_options(&job.cluster, &job.out, method.seed);
     options.journal = Some(JournalOptions {
         path: job.out.file(JOURNAL_FILE),
         identity,
         resume: job.resume,
-        survivors: job.is_resumable,
-        best: Some(planner.best()),
-        fits: FitLedger::default(),
+        score: Some(Arc::new(move || best.get())),
+        parts: PartLedger::default(),
     });
     let (planner, summary) = run_to_end(options, planner, metrics, |event| {
         clock.note(event);
         display.event(event);
-        if let Some(text) = invitation(event, &job.cluster, &job.out, job.progress) {
-            display.say(&text);
-        }
     })?;
     let outcome = planner.into_outcome().context("the graph ended without a result: please report this")?;
     let notes = notes(method, &outcome);
@@ -153,13 +146,5 @@ fn run_shown(
 }
 
 fn record<'a>(job: &'a FitJob, method: &'a Method, outcome: &'a FitOutcome, notes: &'a [String]) -> FitRecord<'a> {
-    FitRecord {
-        settings: &job.settings,
-        method,
-        capture: &job.capture,
-        inputs: &job.inputs,
-        outcome,
-        display_exposure: job.exposure,
-        notes,
-    }
+    FitRecord { method, capture: &job.capture, inputs: &job.inputs, outcome, display_exposure: job.exposure, notes }
 }

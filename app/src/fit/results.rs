@@ -2,11 +2,7 @@
 
 use crate::outputs::{FitRecord, OutFolder, Pictures, Timing, candidates_csv, parameters_json, write_pictures};
 use anyhow::Context;
-use lookalike::{
-    fit::{JudgedBy, Method},
-    image::metadata,
-    plan::FitOutcome,
-};
+use lookalike::{fit::Method, image::metadata, plan::FitOutcome};
 
 /// Writes everything that a fit leaves behind, `fit.json` last: it marks a finished fit.
 pub(crate) fn write_results(out: &OutFolder, record: &FitRecord<'_>, timing: &Timing) -> anyhow::Result<Pictures> {
@@ -28,14 +24,6 @@ pub(crate) fn write_results(out: &OutFolder, record: &FitRecord<'_>, timing: &Ti
     let text = serde_json::to_string_pretty(&record.json(timing)).context("fit.json")? + "\n";
     out.write("fit.json", text.as_bytes())?;
     Ok(pictures)
-}
-
-/// Which score selects and polishes, as `--judge` takes it.
-pub(crate) fn judge(method: &Method) -> &'static str {
-    match method.judge {
-        JudgedBy::Image => "image",
-        JudgedBy::Object => "object",
-    }
 }
 
 /// The parameters that a fit ends with: of polish, if it ran, else of the winner of stage two.

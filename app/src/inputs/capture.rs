@@ -1,57 +1,18 @@
-//! Everything a fit knows about its photo.
+//! The photo of a fit with its mask, shape and light.
 
 use super::{
     InputFile, LoadedEnvironment, LoadedGeometry, LoadedMask, LoadedPhoto, file::cannot_use, load_environment,
     load_mask, load_normals, load_photo, sphere_geometry,
 };
-use crate::settings::{self, BatchFit, EnvironmentSettings, FitSettings, ViewSettings};
+use crate::settings::{CaptureSettings, EnvironmentSettings};
 use anyhow::Context;
 use lookalike::{
     image::Encoding,
     light::Mapping,
-    scene::{Capture, CaptureInput, Circle, CircleSource, Geometry, Mask, Placement, SceneError},
+    scene::{Capture, CaptureInput, CircleSource, Geometry, Mask, Placement, SceneError},
 };
 use serde_json::{Value, json};
 use std::path::Path;
-
-/// The files of a capture and how to see them: the part of [`FitSettings`] that this needs.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct CaptureFiles<'a> {
-    /// The photo.
-    pub photo: &'a Path,
-    /// Which pixels show the object; none means all that the silhouette covers.
-    pub mask: Option<&'a Path>,
-    /// The light.
-    pub environment: &'a EnvironmentSettings,
-    /// Camera and shape.
-    pub view: &'a ViewSettings,
-    /// Where the sphere lies; none means fitted to the mask, else the inscribed circle.
-    pub sphere: Option<settings::Circle>,
-}
-
-impl<'a> From<&'a FitSettings> for CaptureFiles<'a> {
-    fn from(settings: &'a FitSettings) -> Self {
-        Self {
-            photo: &settings.photo,
-            mask: settings.mask.as_deref(),
-            environment: &settings.environment,
-            view: &settings.view,
-            sphere: settings.sphere,
-        }
-    }
-}
-
-impl<'a> From<&'a BatchFit> for CaptureFiles<'a> {
-    fn from(fit: &'a BatchFit) -> Self {
-        Self {
-            photo: &fit.photo,
-            mask: fit.mask.as_deref(),
-            environment: &fit.environment,
-            view: &fit.view,
-            sphere: fit.sphere,
-        }
-    }
-}
 
 /// A checked capture with the origins of its parts.
 #[derive(Debug, Clone)]
@@ -83,7 +44,7 @@ impl LoadedCapture {
     #[must_use]
     pub fn to_json(&self) -> Value {
         let mut environment = self.environment.to_json();
-        environment["mapping"] = json!(self.mapping.name());
+        environment["mapping"] = json!(self.mapping.to_string());
         environment["rotation_deg"] = json!(self.rotation_deg);
         let mut inputs = json!({ "photo": self.photo.to_json(), "environment": environment });
         for (role, file) in [("mask", &self.mask), ("normals", &self.normals)] {
@@ -99,7 +60,7 @@ impl LoadedCapture {
 ///
 /// # Errors
 /// Those of the loaders, and of [`Capture::new`] when the parts do not fit each other or nothing can be fitted to.
-pub fn load_capture(files: &CaptureFiles<'_>) -> anyhow::Result<LoadedCapture> {
+pub fn load_capture(files: &CaptureSettings) -> anyhow::Result<LoadedCapture> {
     load_capture_under(files, load_environment)
 }
 
@@ -108,23 +69,23 @@ pub fn load_capture(files: &CaptureFiles<'_>) -> anyhow::Result<LoadedCapture> {
 /// # Errors
 /// Those of [`load_capture`] and of `light`.
 pub fn load_capture_under(
-    files: &CaptureFiles<'_>,
+    files: &CaptureSettings,
     light: impl FnOnce(&EnvironmentSettings) -> anyhow::Result<LoadedEnvironment>,
 ) -> anyhow::Result<LoadedCapture> {
-    let LoadedPhoto { image, clipped, encoding, source, mut warnings, .. } = load_photo(files.photo)?;
+    let LoadedPhoto { image, clipped, encoding, source, mut warnings, .. } = load_photo(&files.photo)?;
     let (width, height) = (image.width(), image.height());
-    let mask = files.mask.map(|path| same_size(path, width, height)).transpose()?;
+    let mask = files.mask.as_deref().map(|path| same_size(path, width, height)).transpose()?;
     let mask_values = mask.as_ref().map(|loaded| &loaded.mask);
     let (shape, placement) = shape(files, mask_values, width, height)?;
-    let LoadedEnvironment { environment, mapping, source: map, warnings: of_map } = light(files.environment)?;
+    let LoadedEnvironment { environment, mapping, source: map, warnings: of_map } = light(&files.environment)?;
 
     warnings.extend(of_map);
     warnings.extend(shape.warnings);
     warnings.extend(placement.iter().filter_map(|placement| placement.warning.clone()));
     let (mask_source, mask) = mask.map(|loaded| (loaded.source, loaded.mask)).unzip();
     let input = CaptureInput { photo: image, clipped, mask, geometry: shape.geometry, environment };
-    let capture = Capture::new(input).with_context(|| cannot_use(files.photo, "photo"))?;
-    // Those of the normal map are there already, with its name.
+    let capture = Capture::new(input).with_context(|| cannot_use(&files.photo, "photo"))?;
+    // The warnings of the normal map are in the list already, with its name.
     let of_normals = capture.geometry().normal_map().map_or(&[][..], |map| map.warnings());
     warnings.extend(capture.warnings().iter().filter(|text| !of_normals.contains(text)).cloned());
     Ok(LoadedCapture {
@@ -153,15 +114,15 @@ fn same_size(path: &Path, width: usize, height: usize) -> anyhow::Result<LoadedM
 
 /// The sphere of the photo, or the shape of a normal map of the photo's size.
 fn shape(
-    files: &CaptureFiles<'_>,
+    files: &CaptureSettings,
     mask: Option<&Mask>,
     width: usize,
     height: usize,
 ) -> anyhow::Result<(LoadedGeometry, Option<Placement>)> {
     let Some(path) = &files.view.normals else {
         let place = || -> Result<(Geometry, Placement), SceneError> {
-            let placement = Placement::choose(files.sphere.map(circle), mask, width, height)?;
-            Ok((sphere_geometry(width, height, placement.circle, files.view)?, placement))
+            let placement = Placement::choose(files.sphere, mask, width, height)?;
+            Ok((sphere_geometry(width, height, placement.circle, &files.view)?, placement))
         };
         let (geometry, placement) = place().context("cannot place the sphere in the photo")?;
         let loaded = LoadedGeometry { geometry, normals: None, warnings: Vec::new() };
@@ -174,8 +135,4 @@ fn shape(
         return Err(error).with_context(|| cannot_use(path, "normal map"));
     }
     Ok((loaded, None))
-}
-
-fn circle(given: settings::Circle) -> Circle {
-    Circle { x: given.center_x_px, y: given.center_y_px, radius: given.radius_px }
 }

@@ -1,7 +1,7 @@
 //! The environment map.
 
 use super::file::{InputFile, cannot_use, read_with};
-use crate::settings::{EnvMapping, EnvironmentSettings};
+use crate::settings::EnvironmentSettings;
 use anyhow::{Context, bail};
 use lookalike::{
     image::{Decoded, Encoding, decode},
@@ -33,7 +33,7 @@ pub fn load_environment(settings: &EnvironmentSettings) -> anyhow::Result<Loaded
     let source = InputFile::of_image(path, &decoded.image);
     let (width, height) = (decoded.image.width(), decoded.image.height());
     let mapping = match settings.mapping {
-        Some(mapping) => Ok(self::mapping(mapping)),
+        Some(mapping) => Ok(mapping),
         None => Mapping::recognise(width, height),
     };
     let mapping = mapping.with_context(|| cannot_use(path, ROLE))?;
@@ -55,15 +55,6 @@ fn radiance(decoded: Decoded) -> anyhow::Result<Decoded> {
         );
     }
     Ok(decoded)
-}
-
-fn mapping(name: EnvMapping) -> Mapping {
-    match name {
-        EnvMapping::Latlong => Mapping::LatLong,
-        EnvMapping::Cross => Mapping::Cross,
-        EnvMapping::Angular => Mapping::Angular,
-        EnvMapping::MirrorBall => Mapping::MirrorBall,
-    }
 }
 
 const ROLE: &str = "environment map";

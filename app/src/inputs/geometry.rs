@@ -1,7 +1,7 @@
 //! The object's shape and the camera.
 
 use super::file::{InputFile, cannot_use, read_with};
-use crate::settings::{CameraSpec, ViewSettings};
+use crate::settings::ViewSettings;
 use anyhow::Context;
 use lookalike::{
     image::{Image, ImageError, decode, decode_normals},
@@ -21,17 +21,6 @@ pub struct LoadedGeometry {
     pub warnings: Vec<String>,
 }
 
-/// The camera of the settings.
-///
-/// # Errors
-/// If its field of view is one that no camera has.
-pub fn camera(spec: CameraSpec) -> Result<Camera, SceneError> {
-    match spec {
-        CameraSpec::Orthographic => Ok(Camera::Orthographic),
-        CameraSpec::Perspective { fov_deg } => Camera::perspective(fov_deg),
-    }
-}
-
 /// The built-in sphere in `circle` of an image of `width` x `height` pixels.
 ///
 /// # Errors
@@ -42,17 +31,16 @@ pub fn sphere_geometry(
     circle: Circle,
     view: &ViewSettings,
 ) -> Result<Geometry, SceneError> {
-    Geometry::sphere(width, height, circle, camera(view.camera)?)
+    Geometry::sphere(width, height, circle, view.camera)
 }
 
 /// Reads a map of normals, which brings its own size.
 ///
 /// # Errors
 /// If the file cannot be read or decoded, or most of its vectors are no normals that face the camera.
-pub fn load_normals(path: &Path, spec: CameraSpec) -> anyhow::Result<LoadedGeometry> {
+pub fn load_normals(path: &Path, camera: Camera) -> anyhow::Result<LoadedGeometry> {
     let map = read_with(path, ROLE, normals)?;
-    let build = || Geometry::normals(&map, camera(spec)?);
-    let geometry = build().with_context(|| cannot_use(path, ROLE))?;
+    let geometry = Geometry::normals(&map, camera).with_context(|| cannot_use(path, ROLE))?;
     let mut warnings: Vec<String> = geometry
         .normal_map()
         .map_or(&[][..], |map| map.warnings())

@@ -15,11 +15,11 @@ mod material;
 mod photo;
 mod warnings;
 
-pub use capture::{CaptureFiles, LoadedCapture, load_capture, load_capture_under};
+pub use capture::{LoadedCapture, load_capture, load_capture_under};
 pub use environment::{LoadedEnvironment, load_environment};
 pub use exposure::{load_display_exposure, resolve_display_exposure};
 pub use file::InputFile;
-pub use geometry::{LoadedGeometry, camera, load_normals, sphere_geometry};
+pub use geometry::{LoadedGeometry, load_normals, sphere_geometry};
 pub use material::{LoadedTable, flat_parameters, load_table};
 pub use photo::{LoadedMask, LoadedPhoto, load_image, load_mask, load_photo};
 pub use warnings::show_warnings;

@@ -45,7 +45,7 @@ pub fn load_image(path: &Path, role: &str) -> anyhow::Result<LoadedPhoto> {
     let is_blended = blend_over_black(&mut decoded);
     let mut warnings = decoded.warnings;
     if is_blended {
-        warnings.push("its transparent pixels are taken as seen over black".to_owned());
+        warnings.push("transparent pixels are composited over black".to_owned());
     }
     Ok(LoadedPhoto {
         source: InputFile::of_image(path, &decoded.image),

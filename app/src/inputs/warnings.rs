@@ -8,7 +8,7 @@ use std::{
 /// Shows each warning once, in order, as `warning: ...`.
 pub fn show_warnings(warnings: &[String]) {
     let colour = io::stderr().is_terminal() && env::var_os("NO_COLOR").is_none_or(|value| value.is_empty());
-    // Nobody is left to tell that stderr is closed.
+    // A closed stderr cannot be reported anywhere.
     let _ = io::stderr().write_all(render(warnings, colour).as_bytes());
 }
 

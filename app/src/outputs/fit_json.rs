@@ -4,11 +4,11 @@
 //! lives there.
 
 use super::conventions;
-use crate::settings::MethodSettings;
 use lookalike::{
     brdf::{Channels, Model},
     fit::{Judged, Method, Uncertainty},
     plan::FitOutcome,
+    render::subset::SampleCount,
     scene::Capture,
 };
 use serde_json::{Map, Value, json};
@@ -19,7 +19,6 @@ const SCHEMA: &str = "lookalike.fit/1";
 /// Everything that goes into the document.
 #[derive(Debug)]
 pub(crate) struct FitRecord<'a> {
-    pub(crate) settings: &'a MethodSettings,
     pub(crate) method: &'a Method,
     pub(crate) capture: &'a Capture,
     /// What the fit was made from.
@@ -83,19 +82,19 @@ impl FitRecord<'_> {
             "schema": SCHEMA,
             "software": { "name": "lookalike", "version": env!("CARGO_PKG_VERSION") },
             "model": model.name(),
-            "samples": match self.settings.samples {
-                crate::settings::Samples::Count(n) => json!(n.get()),
-                crate::settings::Samples::Full => json!("full"),
+            "samples": match self.method.samples {
+                SampleCount::Draws(draws) => json!(draws),
+                SampleCount::Full => json!("full"),
             },
-            "sampling": name_of(&self.settings.sampling),
+            "sampling": self.method.sampling.to_string(),
             "subsets": self.method.subsets,
             "seed": self.method.seed,
-            "search": name_of(&self.settings.search),
-            "integrator": self.settings.integrator.to_string(),
+            "search": self.method.search.to_string(),
+            "integrator": self.method.integration.to_string(),
             "start": format!("{:?}", self.method.start).to_lowercase(),
             "at_zero": format!("{:?}", self.method.compress).to_lowercase(),
             "gammas": self.method.gammas,
-            "judge": name_of(&self.settings.judge),
+            "judge": self.method.judge.to_string(),
             "display_exposure": self.display_exposure,
             "inputs": self.inputs,
             "geometry": self.capture.geometry().spec(),
@@ -175,11 +174,6 @@ fn uncertainty_json(model: &dyn Model, parameters: &[f64], uncertainty: &[Uncert
     });
     let relative = by_name(model, &relative.collect::<Vec<_>>());
     json!({ "relative": relative, "state": by_name(model, &state.collect::<Vec<_>>()) })
-}
-
-/// A choice as the command line calls it.
-pub(crate) fn name_of(choice: &impl clap::ValueEnum) -> String {
-    choice.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned())
 }
 
 fn merge(into: &mut Value, from: Value) {

@@ -12,7 +12,7 @@ mod summary;
 
 pub(crate) use claim::{ACCESS_FILE, BATCH_MARK, Claim, FIT_FILES, MARK, OldFiles, changed};
 pub(crate) use conventions::conventions;
-pub(crate) use fit_json::{FitRecord, Timing, name_of, parameters_json};
+pub(crate) use fit_json::{FitRecord, Timing, parameters_json};
 pub(crate) use folder::{ClaimedFolder, OutFolder};
 pub(crate) use pictures::{Pictures, write_pictures};
 pub(crate) use strip::{Panel, strip};

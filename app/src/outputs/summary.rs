@@ -24,7 +24,7 @@ pub(crate) fn print_result(text: &str) -> io::Result<()> {
 fn summary(record: &FitRecord<'_>, timing: &Timing, out: &str) -> String {
     let (model, outcome) = (record.method.model, record.outcome);
     let usable = record.capture.counts().usable;
-    let mut text = format!("{} on {} of {usable} usable pixels", model.name(), record.settings.samples);
+    let mut text = format!("{} on {} of {usable} usable pixels", model.name(), record.method.samples);
     let gammas = counted(record.method.gammas.len(), "gamma");
     let _ = writeln!(text, ", {gammas}, seed {}\n", record.method.seed);
     let mut rows = vec![header(model)];

@@ -6,7 +6,7 @@ use super::{
 };
 use indicatif::{MultiProgress, ProgressBar, ProgressStyle};
 use lookalike::fit::BestScore;
-use lookalike_coordinator::comm::RunEvent;
+use lookalike_coordinator::events::RunEvent;
 use std::{collections::BTreeMap, sync::Arc, time::Duration};
 
 pub(super) struct Bars {

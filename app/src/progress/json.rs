@@ -6,7 +6,7 @@ use super::{
     print_line,
 };
 use lookalike::graph::split_label;
-use lookalike_coordinator::comm::{NodeName, RunEvent, Site};
+use lookalike_coordinator::events::{NodeName, RunEvent, Site};
 use serde_json::{Value, json};
 use std::time::Instant;
 
@@ -76,7 +76,7 @@ fn of_fit(event: &FitEvent) -> Value {
 
 fn of_run(event: &RunEvent) -> Option<Value> {
     Some(match event {
-        RunEvent::Listening { address } => json!({ "event": "listening", "address": address }),
+        RunEvent::Listening { address, .. } => json!({ "event": "listening", "address": address }),
         RunEvent::Resumed { epoch, results } => json!({ "event": "resumed", "epoch": epoch, "results": results }),
         RunEvent::LocalWorkerStarted { process } => json!({ "event": "local-worker-started", "process": process }),
         RunEvent::WorkerJoined { worker, threads, process } => {

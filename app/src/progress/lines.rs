@@ -5,7 +5,7 @@ use super::{
     stage::{Stage, Tally},
 };
 use lookalike::fit::BestScore;
-use lookalike_coordinator::comm::RunEvent;
+use lookalike_coordinator::events::RunEvent;
 use std::{sync::Arc, time::Instant};
 
 pub(super) struct Lines {

@@ -9,7 +9,7 @@ use super::{
 };
 use indicatif::{MultiProgress, ProgressBar, ProgressStyle};
 use lookalike::{fit::BestScore, graph::NodeId, graph::split_label};
-use lookalike_coordinator::comm::RunEvent;
+use lookalike_coordinator::events::RunEvent;
 use std::{collections::BTreeMap, sync::Arc, time::Duration};
 
 /// Fits that have a line of their own, at most; with a small window, fewer.

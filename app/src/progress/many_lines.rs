@@ -5,7 +5,7 @@ use super::{
     fits::{FitCount, FitEvent},
     print_line, remark_of_many,
 };
-use lookalike_coordinator::comm::RunEvent;
+use lookalike_coordinator::events::RunEvent;
 use std::time::Instant;
 
 pub(super) struct ManyLines {

@@ -12,7 +12,7 @@ pub(crate) use fits::{FitCount, FitEvent};
 
 use crate::settings::ProgressKind;
 use lookalike::fit::BestScore;
-use lookalike_coordinator::comm::RunEvent;
+use lookalike_coordinator::events::RunEvent;
 use std::{
     io::{self, IsTerminal, Write as _},
     sync::Arc,
@@ -120,6 +120,9 @@ fn remark_of_many(event: &RunEvent) -> Option<String> {
 fn remark(event: &RunEvent) -> Option<String> {
     match event {
         RunEvent::Resumed { results, .. } => Some(format!("resuming the run: {results} results are there already")),
+        RunEvent::Listening { address, local_workers: 0 } => Some(format!(
+            "listening for workers, which connect to {address}; start one with `lookalike worker --access OUT/access.json`"
+        )),
         RunEvent::WaitingForWorkers { waited, limit } => Some(format!(
             "waiting for workers: {} s of at most {} s; start one with `lookalike worker --access OUT/access.json`",
             waited.as_secs(),

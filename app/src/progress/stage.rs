@@ -1,7 +1,7 @@
 //! The stages of a fit as a user sees them, counted from the events of its nodes.
 
 use lookalike::{graph::NodeId, nodes};
-use lookalike_coordinator::comm::{NodeName, RunEvent};
+use lookalike_coordinator::events::{NodeName, RunEvent};
 use std::collections::BTreeMap;
 
 /// One line of the display.
@@ -124,7 +124,7 @@ impl Tally {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use lookalike_coordinator::comm::Site;
+    use lookalike_coordinator::events::Site;
     use std::time::Duration;
 
     fn name(node: u64, kind: &str) -> NodeName {

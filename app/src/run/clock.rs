@@ -1,7 +1,7 @@
 //! Seconds per stage and per process, for people: nothing of it reaches a result.
 
 use lookalike::nodes;
-use lookalike_coordinator::comm::RunEvent;
+use lookalike_coordinator::events::RunEvent;
 use nix::sys::{
     resource::{Usage, UsageWho, getrusage},
     time::TimeVal,

@@ -8,4 +8,4 @@ mod running;
 pub(crate) use clock::{Clock, cpu_seconds};
 pub(crate) use failure::journal_failed;
 pub(crate) use resume::{is_finished, missing};
-pub(crate) use running::{invitation, run_to_end, runner_options};
+pub(crate) use running::{run_to_end, runner_options};

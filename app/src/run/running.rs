@@ -3,15 +3,15 @@
 use crate::{
     exit::Exit,
     outputs::{ACCESS_FILE, OutFolder},
-    settings::{ClusterSettings, ProgressKind},
+    settings::ClusterSettings,
 };
 use anyhow::Context;
 use lookalike::{graph::Planner, nodes};
 use lookalike_coordinator::{
-    comm::RunEvent,
-    core::RunSummary,
+    events::RunEvent,
     metrics::Metrics,
     runner::{self, RunnerOptions},
+    state::RunSummary,
 };
 use std::sync::Arc;
 
@@ -25,24 +25,6 @@ pub(crate) fn runner_options(cluster: &ClusterSettings, out: &OutFolder, seed: u
     options.policy = cluster.policy;
     options.policy.verify_seed = seed;
     options
-}
-
-/// What the user does now, when a run starts no worker itself and has begun to listen for others. Programs read the event.
-pub(crate) fn invitation(
-    event: &RunEvent,
-    cluster: &ClusterSettings,
-    out: &OutFolder,
-    shown: ProgressKind,
-) -> Option<String> {
-    let RunEvent::Listening { address } = event else { return None };
-    if cluster.workers.count() > 0 || shown == ProgressKind::Json {
-        return None;
-    }
-    let access = cluster.access.clone().unwrap_or_else(|| out.file(ACCESS_FILE));
-    Some(format!(
-        "listening on {address} and waiting for workers; start one with `lookalike worker --access {}`",
-        access.display()
-    ))
 }
 
 /// Runs a planner to its end. Its errors carry their exit code.

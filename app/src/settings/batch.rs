@@ -1,13 +1,11 @@
 //! The settings of `lookalike batch`.
 
-use super::{
-    Circle, ClusterSettings, DisplayExposure, EnvironmentSettings, MethodSettings, MetricsAddress, ProgressKind,
-    ViewSettings,
-};
+use super::{CaptureSettings, ClusterSettings, DisplayExposure, MetricsAddress, ProgressKind};
+use lookalike::fit::Method;
 use std::{ffi::OsString, path::PathBuf};
 
 /// Many fits as one run.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct BatchSettings {
     /// The file that lists the fits.
     pub manifest: PathBuf,
@@ -15,7 +13,7 @@ pub struct BatchSettings {
     pub fits: Vec<BatchFit>,
     /// The folder of results.
     pub out: PathBuf,
-    /// Go on with the run that is in the folder, if there is one.
+    /// Resume the run in the folder, if there is one.
     pub resume: bool,
     /// Replace files with our names in the folder, never an input of the run.
     pub force: bool,
@@ -25,7 +23,7 @@ pub struct BatchSettings {
     pub on_failure: OnFailure,
     /// Where metrics are served.
     pub metrics: Option<MetricsAddress>,
-    /// Who computes.
+    /// Where workers come from.
     pub cluster: ClusterSettings,
     /// How progress is shown.
     pub progress: ProgressKind,
@@ -41,24 +39,16 @@ pub struct JobSettings {
 }
 
 /// One photo of a batch, its light, and how to fit it.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct BatchFit {
     /// Its name, which is also that of its folder: a part of a path on any file system.
     pub name: String,
     /// The line of the manifest that asks for it.
     pub line: usize,
-    /// The photo.
-    pub photo: PathBuf,
-    /// Which pixels show the object; none means all that the silhouette covers.
-    pub mask: Option<PathBuf>,
-    /// The light.
-    pub environment: EnvironmentSettings,
-    /// Camera and shape.
-    pub view: ViewSettings,
-    /// Where the sphere lies; none means fitted to the mask, else the inscribed circle.
-    pub sphere: Option<Circle>,
+    /// The photo with its scene.
+    pub capture: CaptureSettings,
     /// How to fit.
-    pub method: MethodSettings,
+    pub method: Method,
     /// Exposure before the metric.
     pub display_exposure: DisplayExposure,
     /// A final CSSIM above this makes the exit code 1; finite, at or above 0.
@@ -68,19 +58,19 @@ pub struct BatchFit {
 /// Where what follows the searches of a fit runs: judging its candidates, polish, pictures.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, clap::ValueEnum)]
 pub enum StageTwo {
-    /// In the coordinator's own process
+    /// In the coordinator's process
     #[default]
     Coordinator,
-    /// On workers, each fit on one at a time
+    /// On workers, each fit on one of them at a time
     Workers,
 }
 
 /// What a batch does when one of its fits fails.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum OnFailure {
-    /// It goes on with the others.
+    /// The others continue.
     #[default]
     KeepGoing,
-    /// It ends.
+    /// The batch stops.
     FailFast,
 }

@@ -1,4 +1,4 @@
-//! Who computes: local worker processes, remote ones, or both (design section 8).
+//! Where workers come from: local processes, other machines, or both (design section 8).
 
 use anyhow::{Context, bail};
 use lookalike_coordinator::policy::Policy;
@@ -27,7 +27,7 @@ pub enum Workers {
     /// One per core that this process may use.
     #[default]
     PerCore,
-    /// So many; 0 waits for remote ones.
+    /// This many; with 0, only workers on other machines compute.
     Count(usize),
 }
 
@@ -46,7 +46,7 @@ impl Default for ClusterSettings {
 }
 
 impl ClusterSettings {
-    /// Where workers may join that the run does not start itself; none when it waits for no others.
+    /// Where workers that the run does not start itself may join; none when the run needs none.
     #[must_use]
     pub fn listen_for_others(&self) -> Option<SocketAddr> {
         let waits = self.workers.count() == 0 && self.access.is_none();

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 /// Two images and how to measure their difference.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CompareSettings {
-    /// The image that is right.
+    /// The reference image.
     pub reference: PathBuf,
     /// The image to judge.
     pub image: PathBuf,

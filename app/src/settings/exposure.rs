@@ -1,5 +1,4 @@
-//! Exposure: of the display transform before the metric (design section 6), and the gain between photo and map
-//! (design section 3).
+//! `--display-exposure`: the exposure of the display transform before the metric (design section 6).
 
 use anyhow::{Context, bail};
 use std::{fmt, path::PathBuf, str::FromStr};
@@ -52,51 +51,6 @@ impl fmt::Display for DisplayExposure {
     }
 }
 
-/// Whether a gain between the photo and the environment map is fitted.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, clap::ValueEnum)]
-pub enum GainKind {
-    /// Photo and map share one exposure.
-    #[default]
-    None,
-    /// One factor for all channels.
-    Scalar,
-    /// One factor per channel.
-    Rgb,
-}
-
-/// What pins the gain down: a gain is degenerate with the colours of a model that is linear in them.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Anchor {
-    /// The reflectance at normal incidence is known, in (0, 1].
-    F0(f64),
-    /// The gain is the smallest with which the material's albedo stays at or below 1.
-    AlbedoAtMostOne,
-    /// A photo of a grey ball taken under the same light.
-    GreyBall(PathBuf),
-}
-
-impl FromStr for Anchor {
-    type Err = anyhow::Error;
-
-    /// `f0=VALUE`, `albedo<=1`, or a path.
-    fn from_str(text: &str) -> anyhow::Result<Self> {
-        if text == "albedo<=1" {
-            return Ok(Self::AlbedoAtMostOne);
-        }
-        let Some(value) = text.strip_prefix("f0=") else {
-            if text.is_empty() {
-                bail!("expected f0=VALUE, albedo<=1 or a photo of a grey ball");
-            }
-            return Ok(Self::GreyBall(text.into()));
-        };
-        let f0: f64 = value.parse().ok().context("f0 must be a number")?;
-        if !(f0 > 0.0 && f0 <= 1.0) {
-            bail!("f0 must lie above 0 and at or below 1");
-        }
-        Ok(Self::F0(f0))
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -108,16 +62,6 @@ mod tests {
         }
         for text in ["0", "-1", "inf", "nan", "from:", "bright", ""] {
             assert!(text.parse::<DisplayExposure>().is_err(), "{text}");
-        }
-    }
-
-    #[test]
-    fn anchors_are_a_reflectance_a_bound_or_a_grey_ball() {
-        assert_eq!("f0=0.04".parse::<Anchor>().unwrap(), Anchor::F0(0.04));
-        assert_eq!("albedo<=1".parse::<Anchor>().unwrap(), Anchor::AlbedoAtMostOne);
-        assert_eq!("grey.exr".parse::<Anchor>().unwrap(), Anchor::GreyBall("grey.exr".into()));
-        for text in ["f0=0", "f0=2", "f0=", ""] {
-            assert!(text.parse::<Anchor>().is_err(), "{text}");
         }
     }
 }

@@ -9,7 +9,7 @@ use std::{
     str::FromStr,
 };
 
-/// An address to serve metrics on. Whoever can connect to it can read them.
+/// An address to serve metrics on. Everyone who can connect to it can read them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct MetricsAddress(pub SocketAddr);
 
@@ -17,9 +17,13 @@ impl MetricsAddress {
     /// Listens there.
     ///
     /// # Errors
-    /// If that cannot be done; it is bad input.
+    /// If the address cannot be listened on; the exit code is that of bad input.
     pub(crate) fn listen(self) -> anyhow::Result<Metrics> {
-        let cannot = || format!("cannot serve metrics on {self}; is the address this machine's, and the port free?");
+        let cannot = || {
+            format!(
+                "cannot serve metrics on {self}; check that the address belongs to this machine and that the port is free"
+            )
+        };
         Metrics::listen(self.0).with_context(cannot).context(Exit::BadInput)
     }
 }

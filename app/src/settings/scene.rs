@@ -1,7 +1,33 @@
-//! What surrounds the object and how it is seen: shared by `fit`, `check` and `render`.
+//! A photo, what surrounds its object and how it is seen.
 
-use super::{CameraSpec, EnvMapping};
-use std::path::PathBuf;
+use lookalike::{
+    light::Mapping,
+    scene::{Camera, Circle},
+};
+use std::path::{Path, PathBuf};
+
+/// A photo with everything that is known of its scene.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CaptureSettings {
+    /// The photo.
+    pub photo: PathBuf,
+    /// Which pixels show the object; none means all that the silhouette covers.
+    pub mask: Option<PathBuf>,
+    /// The light.
+    pub environment: EnvironmentSettings,
+    /// Camera and shape.
+    pub view: ViewSettings,
+    /// Where the sphere lies; none means fitted to the mask, else the inscribed circle.
+    pub sphere: Option<Circle>,
+}
+
+impl CaptureSettings {
+    /// The files that it is read from.
+    pub(crate) fn files(&self) -> Vec<&Path> {
+        let others = [&self.mask, &self.view.normals].into_iter().filter_map(|path| path.as_deref());
+        [self.photo.as_path(), &self.environment.path].into_iter().chain(others).collect()
+    }
+}
 
 /// The environment map.
 #[derive(Debug, Clone, PartialEq)]
@@ -9,7 +35,7 @@ pub struct EnvironmentSettings {
     /// The image file.
     pub path: PathBuf,
     /// Its layout; none means by its shape (2:1 is lat-long, 3:4 is a cross, all else is an error).
-    pub mapping: Option<EnvMapping>,
+    pub mapping: Option<Mapping>,
     /// Rotation of the map about +Y in degrees, finite.
     pub rotation_deg: f64,
 }
@@ -18,7 +44,7 @@ pub struct EnvironmentSettings {
 #[derive(Debug, Clone, PartialEq)]
 pub struct ViewSettings {
     /// The projection.
-    pub camera: CameraSpec,
+    pub camera: Camera,
     /// World-space unit normals that replace the built-in sphere.
     pub normals: Option<PathBuf>,
 }

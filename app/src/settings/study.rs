@@ -10,13 +10,13 @@ pub struct StudySettings {
     pub study: PathBuf,
     /// The folder of results.
     pub out: PathBuf,
-    /// Go on with the run that is in the folder, if there is one.
+    /// Resume the run in the folder, if there is one.
     pub resume: bool,
     /// Replace files with our names in the folder, never an input of the run.
     pub force: bool,
     /// Where metrics are served.
     pub metrics: Option<MetricsAddress>,
-    /// Who computes.
+    /// Where workers come from.
     pub cluster: ClusterSettings,
     /// How progress is shown.
     pub progress: ProgressKind,

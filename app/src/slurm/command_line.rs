@@ -15,7 +15,7 @@ pub fn command_line(typed: &[OsString]) -> anyhow::Result<Vec<String>> {
             // The script asks for --resume itself.
             Some("--slurm" | "--resume") => {}
             Some(text) => command.push(text.to_owned()),
-            None => bail!("a job script is text, and the argument {argument:?} is not UTF-8"),
+            None => bail!("a job script holds UTF-8 only, but the argument {argument:?} is not UTF-8; rename the file"),
         }
     }
     Ok(command)

@@ -1,5 +1,5 @@
 //! A batch or a study as a job of Slurm (design section 8, "Beyond one machine"): the job script with the command line in it, and its
-//! submission. Where the job runs, with how much and until when, is Slurm's to say, and its options are passed on as they are.
+//! submission. Slurm decides where the job runs, with how much and until when; its options are passed on unchanged.
 
 mod command_line;
 mod script;
@@ -29,7 +29,7 @@ pub struct SlurmJob {
     pub out: PathBuf,
 }
 
-/// A job that Slurm took.
+/// A job that Slurm accepted.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Submitted {
     /// Its number.
@@ -47,9 +47,9 @@ impl Submitted {
         let (job, log) = (&self.job, self.log.display());
         let out = self.script.parent().unwrap_or(&self.script).display();
         format!(
-            "job {job} is submitted\n\
-             squeue --jobs={job} tells where it is, lookalike status {out} how far; it writes to {log}\n\
-             scancel {job} ends it; sbatch {} goes on with it",
+            "job {job} is submitted; its log is {log}\n\
+             squeue --jobs={job} shows the job, lookalike status {out} the progress of the run\n\
+             scancel {job} stops it; sbatch {} resumes it",
             self.script.display()
         )
     }
@@ -59,13 +59,13 @@ impl SlurmJob {
     /// Writes the job script into the folder of results and submits it with `sbatch`, a name or a path.
     ///
     /// # Errors
-    /// When the script cannot be written, `sbatch` is not there, or it refuses the job; then its words are in the error.
+    /// When the script cannot be written, `sbatch` cannot be run, or it refuses the job; its own message is in the error.
     pub fn submit(&self, sbatch: &str) -> anyhow::Result<Submitted> {
         let script = self.write()?;
         let output = Command::new(sbatch).arg("--parsable").arg(&script).current_dir(&self.folder).output();
         let output = output.map_err(|error| not_started(&error, sbatch, &script))?;
         refused(&output, sbatch).with_context(|| {
-            format!("the job was not submitted; its script is {}, to be mended and submitted by hand", script.display())
+            format!("the job was not submitted; correct its script {} and submit it with sbatch", script.display())
         })?;
         let job = job_number(&output, sbatch)?;
         Ok(Submitted { log: self.out.join(format!("slurm-{job}.out")), job, script })
@@ -82,7 +82,7 @@ impl SlurmJob {
     }
 }
 
-/// What went wrong, where the job was not taken. Warnings of one that was taken are passed on.
+/// The error of `sbatch`, if it refused the job. Its warnings about an accepted job are printed.
 fn refused(output: &Output, sbatch: &str) -> anyhow::Result<()> {
     let said = String::from_utf8_lossy(&output.stderr).trim().to_owned();
     if !output.status.success() {
@@ -95,13 +95,14 @@ fn refused(output: &Output, sbatch: &str) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// What `sbatch --parsable` says: the number, and on clusters of clusters a semicolon and a name. Some sites greet before that.
+/// The job number in the output of `sbatch --parsable`: its last line, up to a semicolon, which a cluster's name may follow. Some sites
+/// print a greeting first.
 fn job_number(output: &Output, sbatch: &str) -> anyhow::Result<String> {
     let answer = String::from_utf8_lossy(&output.stdout);
     let last = answer.lines().map(str::trim).rfind(|line| !line.is_empty()).unwrap_or_default();
     let number = last.split(';').next().unwrap_or_default();
     if number.is_empty() || !number.bytes().all(|byte| byte.is_ascii_digit()) {
-        bail!("{sbatch} took the job, but its number is not in {:?}: see squeue", answer.trim());
+        bail!("{sbatch} accepted the job, but its number is not in {:?}; look it up with squeue", answer.trim());
     }
     Ok(number.to_owned())
 }
@@ -109,8 +110,8 @@ fn job_number(output: &Output, sbatch: &str) -> anyhow::Result<String> {
 fn not_started(error: &io::Error, sbatch: &str, script: &Path) -> anyhow::Error {
     if error.kind() == io::ErrorKind::NotFound {
         anyhow::anyhow!(
-            "cannot find {sbatch}, which submits jobs to Slurm; is this a machine of the cluster? The job script is written: \
-             submit {} where sbatch is",
+            "cannot find {sbatch}, which submits jobs to Slurm; run this on a login node of the cluster, or submit the job \
+             script {} there",
             script.display()
         )
     } else {

@@ -23,7 +23,9 @@ impl SlurmJob {
         for argument in &self.command {
             let flag = argument.split('=').next().unwrap_or_default();
             if OF_THE_SCRIPT.contains(&flag) {
-                bail!("{flag} is not for a job of Slurm: its script starts a worker on each node and tells it the way");
+                bail!(
+                    "{flag} is not for a job of Slurm: the job script starts a worker on each node and gives it the address; leave {flag} out"
+                );
             }
         }
         let command = self.command.iter().map(|argument| quoted(argument)).collect::<Vec<_>>().join(" ");
@@ -46,7 +48,7 @@ impl SlurmJob {
                 continue;
             }
             if let Some(option) = options.iter().find(|option| option.contains(['\n', '\r'])) {
-                bail!("an option of sbatch is one line, found {option:?}");
+                bail!("an option of sbatch must be one line, found {option:?}");
             }
             let line = options.iter().map(|option| quoted_for_sbatch(option)).collect::<Vec<_>>().join(" ");
             directives.push_str(&format!("#SBATCH {line}\n"));
@@ -56,7 +58,9 @@ impl SlurmJob {
 }
 
 fn text_of(path: &Path) -> anyhow::Result<&str> {
-    path.to_str().with_context(|| format!("a job script is text, and the path {} is not UTF-8", path.display()))
+    path.to_str().with_context(|| {
+        format!("a job script holds UTF-8 only, but the path {} is not UTF-8; rename it", path.display())
+    })
 }
 
 /// One word of a shell's command line.

@@ -93,10 +93,13 @@ fn what_sbatch_says_reaches_the_user_with_the_exit_code() {
     let error = job.submit("no-such-sbatch").unwrap_err();
     assert!(error.to_string().starts_with("cannot find no-such-sbatch"), "{error}");
     assert_eq!(error.downcast_ref::<Exit>(), None);
-    // It took the job, whatever it says.
+    // Its exit code says that it accepted the job.
     let silent = sbatch(folder.path(), "echo welcome");
     let error = format!("{:#}", job.submit(&silent).unwrap_err());
-    assert!(error.contains("took the job, but its number is not in \"welcome\": see squeue"), "{error}");
+    assert!(
+        error.contains("accepted the job, but its number is not in \"welcome\"; look it up with squeue"),
+        "{error}"
+    );
     assert!(!error.contains("not submitted"), "{error}");
     for banner in ["echo 'Welcome to Vega'; echo 4711", "echo; echo '1 job(s) of yours wait'; echo '4711;east'; echo"] {
         assert_eq!(job.submit(&sbatch(folder.path(), banner)).unwrap().job, "4711", "{banner}");

@@ -30,7 +30,7 @@ use crate::{
     inputs::{load_environment, show_warnings},
     outputs::{Claim, ClaimedFolder, OldFiles, OutFolder, print_result},
     progress::Ending,
-    run::{invitation, journal_failed, run_to_end, runner_options},
+    run::{journal_failed, run_to_end, runner_options},
     settings::{EnvironmentSettings, StudySettings},
 };
 use anyhow::Context;
@@ -43,8 +43,8 @@ use lookalike::{
     plan::encode_light,
 };
 use lookalike_coordinator::{
-    comm::RunEvent,
-    journal::{self, Finished, FitLedger, JOURNAL_FILE, JournalOptions, RunIdentity},
+    events::RunEvent,
+    journal::{self, Finished, JOURNAL_FILE, JournalOptions, PartLedger, RunIdentity},
     metrics::Metrics,
 };
 use lookalike_report::measured::{About, StudyData};
@@ -123,18 +123,14 @@ fn run_cells(
         path: inputs.out.file(JOURNAL_FILE),
         identity: identity(inputs)?,
         resume: settings.resume,
-        survivors: true,
-        best: None,
-        fits: FitLedger::default(),
+        score: None,
+        parts: PartLedger::default(),
     });
     let mut workers = 0;
     let run = run_to_end(options, Many::new(supply), metrics, |event| {
         seconds.note(event);
         workers += u32::from(matches!(event, RunEvent::WorkerJoined { .. }));
         progress.event(event);
-        if let Some(text) = invitation(event, &settings.cluster, &inputs.out, settings.progress) {
-            progress.say(&text);
-        }
         progress.complete(lock(tally).complete);
     });
     let problem = run.as_ref().err().map(|error| format!("{error:#}"));
@@ -164,7 +160,7 @@ fn end(out: &OutFolder, failed: usize) -> anyhow::Result<()> {
     let path = out.file(JOURNAL_FILE);
     if failed > 0 {
         let ended = format!("{failed} cells of the study failed");
-        return journal::settle(&path, &FitLedger::default(), Some(&ended)).map_err(journal_failed);
+        return journal::settle(&path, &PartLedger::default(), Some(&ended)).map_err(journal_failed);
     }
     let names = ["results.md", "results.json", "report.html"];
     journal::finish(&path, &Finished { outputs: out.hashes(names)? }).map_err(journal_failed)

@@ -5,7 +5,7 @@ use crate::{
     settings::ProgressKind,
 };
 use indicatif::{ProgressBar, ProgressStyle};
-use lookalike_coordinator::comm::RunEvent;
+use lookalike_coordinator::events::RunEvent;
 use std::{
     io::{self, IsTerminal},
     time::{Duration, Instant},
@@ -48,14 +48,6 @@ impl Progress {
         match &self.kind {
             Kind::Bar(bar) => bar.suspend(|| self.display.event(event)),
             Kind::Lines | Kind::Silent => self.display.event(event),
-        }
-    }
-
-    /// A line for people.
-    pub(super) fn say(&mut self, text: &str) {
-        match &self.kind {
-            Kind::Bar(bar) => bar.suspend(|| self.display.say(text)),
-            Kind::Lines | Kind::Silent => self.display.say(text),
         }
     }
 

@@ -3,7 +3,7 @@
 
 use crate::outputs::OutFolder;
 use anyhow::Context;
-use lookalike_coordinator::comm::RunEvent;
+use lookalike_coordinator::events::RunEvent;
 use std::{
     collections::{BTreeMap, BTreeSet},
     fs::{self, File, OpenOptions},

@@ -1,8 +1,8 @@
-//! The best score of a fit so far, to be watched from elsewhere while it runs.
+//! The best score of a fit so far, readable from other threads while the fit runs.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// A score that one side sets and others read; for display only, nothing of it reaches a result.
+/// A score that the fit sets and other threads read. For display only; it does not reach a result.
 #[derive(Debug)]
 pub struct BestScore(AtomicU64);
 

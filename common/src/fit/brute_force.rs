@@ -11,8 +11,8 @@ use crate::{
 };
 use std::ops::ControlFlow;
 
-/// Minimises a score over the model's whole box from `start`, with at most `limit` evaluations, else MATLAB's 2000 per parameter;
-/// `observe` sees every evaluation and may end the search. A value that is not finite is a rejected point.
+/// Minimises a score over the model's whole box from `start`, with at most `limit` evaluations (by default MATLAB's 2000 per parameter).
+/// `observe` is called at every evaluation and may end the search. A point whose value is not finite is rejected.
 ///
 /// # Errors
 /// When the start lies outside the box, or its score is not finite.

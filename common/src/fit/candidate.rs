@@ -1,4 +1,4 @@
-//! Candidates of stage one, and what stage two needs to judge them.
+//! Candidates of stage one; which of them are nearly equal, and which widths their full-resolution table must span.
 
 use crate::{
     brdf::{Model, Scale, flat_bounds},
@@ -9,22 +9,22 @@ use crate::{
 /// The outcome of one search.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Candidate {
-    /// The exponent it was searched with.
+    /// The gamma of the search.
     pub gamma: f64,
     /// Which pixel subset, from 0.
     pub subset: u32,
     /// Flat parameter vector.
     pub parameters: Vec<f64>,
-    /// Eq. 1 there.
+    /// The value of Eq. 1 at the parameters.
     pub cost: f64,
-    /// Evaluations of Eq. 1, the scan included; a start counts once.
+    /// Evaluations of Eq. 1, including the scan; a start counts once.
     pub evaluations: usize,
     /// Why the search ended.
     pub termination: Termination,
 }
 
-/// Candidates nearer to each other than this share of every parameter's range (of its logarithmic range, where a parameter is searched
-/// by its logarithm) get one rendering.
+/// Candidates that differ in every parameter by at most this share of its range share one rendering. The range is that of the logarithm
+/// for parameters that are searched by their logarithm.
 pub const SAME: f64 = 1e-6;
 
 /// For every candidate the index of the first one that is the same within [`SAME`]: near-equal candidates are judged once.
@@ -50,8 +50,8 @@ pub fn distinct(model: &dyn Model, candidates: &[Candidate]) -> Vec<usize> {
 /// Margin around the candidates' widths that full-resolution tables cover (design section 7).
 const MARGIN: f64 = 1.25;
 
-/// The span of lobe widths that full-resolution tables need for these parameter vectors: 25 % beyond the outermost, within the
-/// model's bounds; at least a factor of 1.25^2 in all.
+/// The span of lobe widths that a full-resolution table needs for these parameter vectors: 25 % beyond the outermost widths, within the
+/// model's bounds, and at least a ratio of 1.25^2.
 ///
 /// Returns `None` for a model without widths.
 #[must_use]
@@ -81,7 +81,7 @@ mod tests {
     }
 
     #[test]
-    fn near_equal_candidates_are_judged_once_and_chains_do_not_drift() {
+    fn near_equal_candidates_are_judged_once_and_compared_with_the_first() {
         let step = 0.9e-6;
         let candidates: Vec<Candidate> = (0..4).map(|i| candidate(0.2 + step * f64::from(i))).collect();
         assert_eq!(distinct(&Ggx, &candidates), [0, 0, 2, 2]);
@@ -99,7 +99,7 @@ mod tests {
     }
 
     #[test]
-    fn the_margin_is_one_of_widths_whatever_the_parameter() {
+    fn the_margin_is_a_ratio_of_widths_for_exponents_too() {
         let alpha = |n: f64| (2.0 / (n + 2.0)).sqrt();
         let point = |n: f64| vec![0.1, 0.2, 0.3, 0.04, 0.04, 0.04, n];
         let span = |points: &[Vec<f64>]| needed_span(&BlinnPhong, points.iter().map(|p| &p[..])).unwrap();
@@ -109,7 +109,7 @@ mod tests {
     }
 
     #[test]
-    fn exponents_are_near_by_their_logarithm() {
+    fn exponents_are_compared_by_their_logarithm() {
         let with = |n: f64| Candidate { parameters: vec![0.1, 0.2, 0.3, 0.04, 0.04, 0.04, n], ..candidate(0.1) };
         assert_eq!(distinct(&BlinnPhong, &[with(5.0), with(5.05), with(9e4), with(9e4 + 0.1)]), [0, 1, 2, 2]);
     }

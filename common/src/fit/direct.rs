@@ -1,5 +1,5 @@
-//! The pixels of stage one by the direct integrator, as in the paper: each evaluation of Eq. 1 is a rendering. Thousands of times
-//! slower than a transport table (docs/accuracy.md), and independent of it.
+//! The pixels of stage one by the direct integrator, as in the paper: each evaluation of Eq. 1 is a rendering. This is thousands of
+//! times slower than a transport table (docs/accuracy.md), and independent of it.
 
 use crate::{
     brdf::{Material, Model, flat_bounds},
@@ -8,7 +8,7 @@ use crate::{
     scene::Geometry,
 };
 
-/// What renders the pixels of a subset.
+/// Renders the pixels of a subset by the direct integrator.
 #[derive(Debug, Clone, Copy)]
 pub struct DirectPixels<'a> {
     /// The object and the camera.
@@ -17,20 +17,20 @@ pub struct DirectPixels<'a> {
     pub light: &'a LightDistribution,
     /// The pixels, in the subset's order.
     pub pixels: &'a [Pixel],
-    /// Samples per pixel. The same ones in every evaluation, so that the cost is a function of the parameters alone.
+    /// Samples per pixel. They are the same in every evaluation, so the cost is a function of the parameters alone.
     pub samples: u32,
     /// Seed of the run.
     pub seed: u64,
 }
 
 impl DirectPixels<'_> {
-    /// The radiance of every pixel at a flat parameter vector: three channels of one value per pixel, linear Rec. 709. Values beyond
-    /// a bound count as at the bound.
+    /// The radiance of every pixel at a flat parameter vector: three channels of one value per pixel, linear Rec. 709. Values
+    /// beyond a bound are clamped to it.
     pub(super) fn radiance(&self, model: &'static dyn Model, parameters: &[f64], out: &mut Planes) {
         let (lower, upper) = flat_bounds(model.parameters());
         let inside = parameters.iter().zip(lower.iter().zip(&upper)).map(|(x, (l, u))| x.clamp(*l, *u)).collect();
         let Ok(material) = Material::new(model, inside) else {
-            // Not a number: the search says that its cost is none.
+            // A parameter is not a number: neither is the cost, and the search reports it.
             out.iter_mut().for_each(|plane| plane.fill(f64::NAN));
             return;
         };

@@ -1,6 +1,6 @@
-//! Where stage three starts. Eq. 1 may have no minimum at all near the lobe that looks best: blue acrylic under Eucalyptus Grove gets a
-//! wide lobe at every gamma, while CSSIM is a sixth lower with a sharp one. So CSSIM is searched on a coarse picture from a few very
-//! different lobes, and the best of what is found there is where polish starts from on the full picture.
+//! Finds the start of stage three. Eq. 1 may have no minimum near the lobe of lowest CSSIM: blue acrylic under Eucalyptus Grove gets a
+//! wide lobe at every gamma, although CSSIM is a sixth lower with a sharp lobe. So CSSIM is minimised on a coarse picture from a few
+//! very different lobes; polish at full resolution starts from the best result.
 
 use super::{
     method::JudgedBy,
@@ -19,13 +19,13 @@ use std::ops::ControlFlow;
 /// Most evaluations of CSSIM on the coarse picture, from each start.
 pub(crate) const MAX_EXPLORATIONS: usize = 300;
 
-/// The lobes that are tried beside that of the winner, as widths of GGX.
+/// The lobes that are tried in addition to the winner's, as widths of GGX.
 const WIDTHS: [f64; 2] = [0.03, 0.1];
 
-/// The sharpest lobe that a coarse picture can tell from a mirror, as a width of GGX.
+/// The sharpest lobe that differs visibly from a mirror on a coarse picture, as a width of GGX.
 const SHARPEST: f64 = 0.015;
 
-/// How far from a bound, as a share of its range, a start keeps away: at a bound the search may not see what lies inside.
+/// Smallest distance of a start from a bound, as a share of the range: a search that starts at a bound may stay there.
 const INSIDE: f64 = 0.01;
 
 /// The starts: the winner, the winner with other lobes, and the paper's generic start.
@@ -51,7 +51,7 @@ pub(crate) fn starts(model: &dyn Model, won: &[f64]) -> Vec<Vec<f64>> {
     starts
 }
 
-/// Explores from every start; the lowest score wins, the first of equals.
+/// Searches from every start and returns the result of lowest score, the first of equal ones.
 ///
 /// # Errors
 /// When no start can be rendered and scored.
@@ -79,14 +79,14 @@ pub(crate) fn explore(
     best.map(|best| Polished { evaluations, ..best }).ok_or(failure)
 }
 
-/// The span of widths whose lobes a coarse picture shows; `None` for a model without widths.
+/// The span of widths whose lobes differ visibly on a coarse picture; `None` for a model without widths.
 pub(crate) fn explored_span(model: &dyn Model) -> Option<(f64, f64)> {
     let widths: Vec<f64> = grid(model)?.into_iter().filter(|(_, alpha)| *alpha >= SHARPEST).map(|(w, _)| w).collect();
     let (low, high) = (widths.iter().copied().reduce(f64::min)?, widths.iter().copied().reduce(f64::max)?);
     (low < high).then_some((low, high))
 }
 
-/// The width of the lobe that is about as wide as GGX of this alpha.
+/// The model's width whose lobe is about as wide as GGX of this alpha.
 fn width_of(model: &dyn Model, alpha: f64) -> f64 {
     let distance = |a: f64| (ln(a) - ln(alpha)).abs();
     let nearest = grid(model).unwrap_or_default().into_iter().min_by(|a, b| distance(a.1).total_cmp(&distance(b.1)));

@@ -1,24 +1,34 @@
 //! The settings of the method, with their defaults (design sections 1, 2 and 10).
 
+use super::gammas::Gammas;
 use crate::{
     brdf::{MODELS, Model},
+    choice::choice,
     render::subset::{SampleCount, Sampling},
 };
+use std::{fmt, str::FromStr};
 use thiserror::Error;
 
 /// How Eq. 1 is minimised.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum SearchKind {
-    /// Generalised pattern search, the paper's.
+    /// Generalised pattern search, as in the paper.
     Pattern,
     /// Levenberg-Marquardt with bounds on analytic derivatives.
+    #[default]
     LeastSquares,
 }
 
+choice! { SearchKind:
+    LeastSquares = "least-squares", "Levenberg-Marquardt from the best points of a scan; several minima are kept";
+    Pattern = "pattern", "Pattern search, as in the paper";
+}
+
 /// How stage one renders its pixels.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Integration {
-    /// By a transport table, which is integrated once.
+    /// From a transport table, which is integrated once.
+    #[default]
     Tables,
     /// By the direct integrator, for every evaluation, as in the paper.
     Direct {
@@ -27,60 +37,106 @@ pub enum Integration {
     },
 }
 
+/// A text that is no [`Integration`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
+#[error("expected tables, direct or direct:SAMPLES with 1 to {MOST_SAMPLES} samples per pixel")]
+pub struct UnknownIntegration;
+
+/// Samples per pixel of `direct` unless it says how many.
+const DIRECT_SAMPLES: u32 = 256;
+
+/// Most samples per pixel that a text may ask for.
+const MOST_SAMPLES: u32 = 1 << 20;
+
+impl FromStr for Integration {
+    type Err = UnknownIntegration;
+
+    /// `tables`, `direct`, or `direct:SAMPLES`.
+    fn from_str(text: &str) -> Result<Self, UnknownIntegration> {
+        match text.split_once(':') {
+            None if text == "tables" => Ok(Self::Tables),
+            None if text == "direct" => Ok(Self::Direct { samples: DIRECT_SAMPLES }),
+            Some(("direct", samples)) => match samples.parse() {
+                Ok(samples @ 1..=MOST_SAMPLES) => Ok(Self::Direct { samples }),
+                _ => Err(UnknownIntegration),
+            },
+            _ => Err(UnknownIntegration),
+        }
+    }
+}
+
+impl fmt::Display for Integration {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Tables => write!(f, "tables"),
+            Self::Direct { samples } => write!(f, "direct:{samples}"),
+        }
+    }
+}
+
 /// Where a search starts.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Start {
     /// The best points of a scan over widths (design section 2).
+    #[default]
     Scan,
-    /// The paper's one point, [`Parameter::start`](crate::brdf::Parameter::start).
+    /// The single start of the paper, [`Parameter::start`](crate::brdf::Parameter::start).
     Paper,
 }
 
-/// What Eq. 1 compares: the power `1/gamma`, how it continues at and below zero, and what studies put in its place.
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// The function that Eq. 1 applies to radiance: the power `1/gamma` with a rule for values at and below zero, or an alternative for
+/// studies.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub enum Compress {
-    /// Continues as its tangent line.
+    /// The power; below its knee, its tangent line.
+    #[default]
     Tangent,
-    /// Of `max(x, 0)`, the paper's.
+    /// The power of `max(x, 0)`, as in the paper.
     Clamp,
-    /// Of the radiance clamped to what a display shows, between 0 and this radiance.
+    /// The power of the radiance clamped to the range of a display, from 0 to `white`.
     ClampTo {
         /// The radiance of white, above 0.
         white: f64,
     },
-    /// Instead of a power, the logarithm [`Compression::logarithm`](crate::metric::cost::Compression::logarithm); gamma says nothing.
+    /// The logarithm [`Compression::logarithm`](crate::metric::cost::Compression::logarithm); gamma has no effect.
     Logarithm,
 }
 
 /// Which score selects and polishes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum JudgedBy {
-    /// CSSIM over the whole image, the paper's.
+    /// CSSIM over the whole image, as in the paper.
+    #[default]
     Image,
     /// CSSIM over windows centred on the object.
     Object,
 }
 
-/// How to fit.
+choice! { JudgedBy:
+    Image = "image", "The mean over the whole image, as in the paper";
+    Object = "object", "The mean over the windows centred on the object";
+}
+
+/// The settings of a fit.
 #[derive(Debug, Clone)]
 pub struct Method {
     /// The BRDF model.
     pub model: &'static dyn Model,
-    /// Exponents of stage one, ascending.
+    /// Gammas of stage one, ascending.
     pub gammas: Vec<f64>,
     /// Pixels of stage one.
     pub samples: SampleCount,
-    /// How they are drawn.
+    /// How these pixels are drawn.
     pub sampling: Sampling,
     /// Independent subsets, at least 1.
     pub subsets: u32,
     /// How Eq. 1 is minimised.
     pub search: SearchKind,
-    /// How its pixels are rendered.
+    /// How stage one renders its pixels.
     pub integration: Integration,
     /// Where searches start.
     pub start: Start,
-    /// What Eq. 1 compares.
+    /// The function that Eq. 1 applies to radiance.
     pub compress: Compress,
     /// Whether stage three runs.
     pub polish: bool,
@@ -94,22 +150,22 @@ impl Default for Method {
     fn default() -> Self {
         Self {
             model: MODELS[0],
-            gammas: (10..=30).map(|tenth| f64::from(tenth) / 10.0).collect(),
-            samples: SampleCount::Draws(256),
-            sampling: Sampling::Importance,
+            gammas: Gammas::DEFAULT.values(),
+            samples: SampleCount::default(),
+            sampling: Sampling::default(),
             subsets: 1,
-            search: SearchKind::LeastSquares,
-            integration: Integration::Tables,
-            start: Start::Scan,
-            compress: Compress::Tangent,
+            search: SearchKind::default(),
+            integration: Integration::default(),
+            start: Start::default(),
+            compress: Compress::default(),
             polish: true,
-            judge: JudgedBy::Image,
+            judge: JudgedBy::default(),
             seed: 0,
         }
     }
 }
 
-/// Most searches of one fit: their candidates travel to stage two in one message.
+/// Most searches of one fit: their candidates are sent to stage two in one message.
 pub const MOST_SEARCHES: usize = 5000;
 
 /// What is wrong with a method.
@@ -122,27 +178,27 @@ pub enum MethodError {
         /// The values given.
         found: Vec<f64>,
     },
-    /// Nothing to draw.
+    /// No pixels.
     #[error("the number of samples must be at least 1, found 0; the paper uses 256")]
     NoSamples,
-    /// Nothing to search.
+    /// No subsets.
     #[error("the number of subsets must be at least 1, found 0")]
     NoSubsets,
     /// All subsets would be the same.
-    #[error(
-        "all pixels taken {subsets} times are {subsets} times the same: leave out the subsets, or give a number of samples"
-    )]
+    #[error("{subsets} subsets of all pixels would be equal: use 1 subset, or give a number of samples")]
     SameSubsets {
         /// The number of subsets.
         subsets: u32,
     },
-    /// The direct integrator gives no derivatives.
+    /// The direct integrator has no derivatives.
     #[error(
         "the direct integrator (--integrator direct) has no derivatives, which least squares needs: use --search pattern"
     )]
     NoDerivatives,
-    /// Gammas times subsets.
-    #[error("{found} searches (gammas times subsets) are more than the {MOST_SEARCHES} that one fit may have")]
+    /// Too many gammas times subsets.
+    #[error(
+        "{found} searches (gammas times subsets) are more than the limit of {MOST_SEARCHES}: use fewer gammas or subsets"
+    )]
     TooManySearches {
         /// Gammas times subsets.
         found: usize,
@@ -150,7 +206,7 @@ pub enum MethodError {
 }
 
 impl Method {
-    /// Checks what types cannot.
+    /// Checks the settings that their types do not.
     ///
     /// # Errors
     /// Names the setting that is out of range.
@@ -184,4 +240,39 @@ impl Method {
 #[must_use]
 pub fn gamma_range(gammas: &[f64]) -> Option<(f64, f64)> {
     Some((*gammas.first()?, *gammas.last()?))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{choice::Choice, light::Mapping};
+    use std::error::Error;
+
+    fn names_round_trip<T: Choice + fmt::Display + FromStr<Err: Error>>() {
+        for (value, name, _) in T::TABLE {
+            assert_eq!(value.to_string(), *name);
+            assert_eq!(name.parse::<T>().unwrap().to_string(), *name);
+        }
+        let error = T::from_str("no-such-name").err().unwrap().to_string();
+        assert!(T::TABLE.iter().all(|(_, name, _)| error.contains(name)), "{error}");
+    }
+
+    #[test]
+    fn choices_parse_what_they_print_and_errors_list_the_names() {
+        names_round_trip::<SearchKind>();
+        names_round_trip::<JudgedBy>();
+        names_round_trip::<Sampling>();
+        names_round_trip::<Mapping>();
+    }
+
+    #[test]
+    fn integrators_are_tables_or_direct_with_samples() {
+        let parse = |text: &str| text.parse::<Integration>();
+        assert_eq!(parse("tables").unwrap(), Integration::default());
+        assert_eq!(parse("direct").unwrap(), parse("direct:256").unwrap());
+        assert_eq!(parse("direct:32").unwrap().to_string(), "direct:32");
+        for text in ["", "table", "direct:", "direct:0", "direct:-1", "direct:1e3", "direct:4294967296", "tables:3"] {
+            assert!(parse(text).is_err(), "{text}");
+        }
+    }
 }

@@ -1,9 +1,9 @@
-//! The method of \[BP20b\], as pure functions that read like its section 3:
+//! The method of \[BP20b\], as pure functions in the order of its section 3:
 //!
 //! 1. a pixel subset ([`crate::render::subset`]) and its transport table,
 //! 2. stage one, [`search_gamma`]: for each gamma, minimise Eq. 1 over the parameters,
 //! 3. stage two, [`judge_candidates`]: render the candidates in full, keep the one of lowest CSSIM,
-//! 4. stage three, [`polish`]: a short search on CSSIM itself, from the winner or from another lobe that looks better on a coarse picture.
+//! 4. stage three, [`polish`]: a short search on CSSIM itself, from the winner or from a lobe of lower CSSIM on a coarse picture.
 //!
 //! [`crate::nodes`] wraps these steps as nodes of the job graph, and [`crate::plan`] joins them.
 
@@ -12,6 +12,7 @@ mod brute_force;
 mod candidate;
 mod direct;
 pub(crate) mod explore;
+mod gammas;
 mod method;
 mod objective;
 pub(crate) mod polish;
@@ -24,7 +25,11 @@ pub use best::BestScore;
 pub use brute_force::brute_force;
 pub use candidate::{Candidate, SAME, distinct, needed_span};
 pub use direct::DirectPixels;
-pub use method::{Compress, Integration, JudgedBy, MOST_SEARCHES, Method, MethodError, SearchKind, Start, gamma_range};
+pub use gammas::{Gammas, GammasError};
+pub use method::{
+    Compress, Integration, JudgedBy, MOST_SEARCHES, Method, MethodError, SearchKind, Start, UnknownIntegration,
+    gamma_range,
+};
 pub use objective::Objective;
 pub use polish::{MAX_EVALUATIONS, Polished, polish};
 pub use stage_one::{SearchFailure, search_gamma};

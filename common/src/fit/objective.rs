@@ -1,4 +1,4 @@
-//! Eq. 1 for one gamma as a function of the parameters, by the transport table of the pixel subset.
+//! Eq. 1 for one gamma as a function of the parameters, computed from the transport table of the pixel subset.
 
 use super::direct::DirectPixels;
 use crate::{
@@ -12,7 +12,7 @@ use crate::{
     search::{NormalEquations, least_squares::LeastSquaresProblem},
 };
 
-/// What stage one minimises.
+/// The function that stage one minimises.
 #[derive(Debug)]
 pub struct Objective<'a> {
     model: &'static dyn Model,
@@ -31,7 +31,7 @@ impl<'a> Objective<'a> {
     /// The objective of one gamma. `photo` holds the subset's pixels, linear Rec. 709, in its order.
     ///
     /// # Panics
-    /// When table, subset and photo are not about the same number of pixels.
+    /// If table, subset and photo differ in their number of pixels.
     #[must_use]
     pub fn new(
         model: &'static dyn Model,
@@ -56,10 +56,10 @@ impl<'a> Objective<'a> {
         }
     }
 
-    /// The same cost, its pixels rendered by the direct integrator. Derivatives remain those of the table.
+    /// The same cost with pixels rendered by the direct integrator. Derivatives are still those of the table.
     ///
     /// # Panics
-    /// When it is about another number of pixels.
+    /// If `direct` has another number of pixels.
     #[must_use]
     pub fn rendered_by(self, direct: DirectPixels<'a>) -> Self {
         assert_eq!(direct.pixels.len(), self.table.pixels, "table and direct integrator differ");
@@ -123,15 +123,16 @@ impl LeastSquaresProblem for Objective<'_> {
     }
 }
 
-/// A value of the photo as Eq. 1 sees it. Radiance is not negative; a colour outside the gamut of Rec. 709, or noise around
-/// black, may be. At gamma = 3 the tangent below the knee is so steep (about 1e4 at a mean of 0.2) that one channel at -0.01 would
-/// outweigh all other pixels, so the photo's negative values count as 0 (a deviation from design section 1, which treats A and B
-/// alike; B keeps its order below 0).
+/// A value of the photo as used in Eq. 1. A photo may have negative values, from colours outside the gamut of Rec. 709 or from noise
+/// around black. At gamma = 3 the tangent below the knee is so steep (about 1e4 at a mean of 0.2) that one channel at -0.01 would
+/// outweigh all other pixels, so the photo's negative values count as 0. This deviates from design section 1, which treats A and B
+/// alike; negative values of B keep their order.
 pub(super) fn observed(value: f32) -> f64 {
     f64::from(value).max(0.0)
 }
 
-/// For every term of a lobe that has a width: the entry that the width follows from, the term, the width and its derivative by the entry.
+/// For every term of a lobe that has a width: the entry that determines the width, the term, the width, and its derivative with respect
+/// to the entry.
 fn width_entries(model: &dyn Model, point: &[f64]) -> Vec<(usize, usize, f64, f64)> {
     let mut list = Vec::new();
     let mut first = 0;
@@ -184,7 +185,7 @@ mod tests {
     }
 
     #[test]
-    fn a_negative_channel_of_the_photo_weighs_no_more_than_a_black_one() {
+    fn a_negative_channel_of_the_photo_counts_as_black() {
         let model = MODELS[0];
         let table = table(model, 2);
         let subset = PixelSubset { pixels: vec![[0, 0], [1, 0]], weights: vec![1.0; 2] };

@@ -1,8 +1,8 @@
 //! Stage three, always reported apart: a short search on CSSIM itself from the winner of stage two, on the full-resolution table around
 //! the winner's width (design section 2).
 //!
-//! The design asks for a pattern search. CSSIM is smooth in the parameters, though its valleys are narrow: a projected quasi-Newton
-//! search ends in a few hundred evaluations where a pattern search of 7,000 ends (docs/results.md).
+//! The design asks for a pattern search. CSSIM is smooth in the parameters, though its valleys are narrow: in a few hundred evaluations
+//! a projected quasi-Newton search reaches the score that a pattern search reaches in 7,000 (docs/results.md).
 
 use super::{
     method::{JudgedBy, SearchKind},
@@ -36,14 +36,14 @@ pub struct Polished {
     pub evaluations: usize,
     /// Why the search ended.
     pub termination: Termination,
-    /// The width ended within a step of the table's edge that is not the model's bound: a wider table may find better.
+    /// Whether the width ended at an edge of the table that is not the model's bound: a wider table may give a better match.
     pub at_table_edge: bool,
 }
 
-/// Polishes the best of `starts`; `observe` sees every iteration of the search and may end it.
+/// Polishes the best of `starts`. `observe` is called at every iteration and may end the search.
 ///
-/// Scores of different tables cannot be compared, so whoever goes on with another table gives all that was found so far as
-/// starts: the outcome scores no worse than any of them *on this table*.
+/// Scores on different tables cannot be compared. To continue on another table, pass all results so far as starts: the outcome scores
+/// no worse than any of them *on this table*.
 ///
 /// # Errors
 /// When there is no start, or none can be rendered and scored.
@@ -57,7 +57,7 @@ pub fn polish(
 ) -> Result<Polished, SearchError> {
     let (bounds, table_is_tighter) = polish_bounds(view)?;
     let objective = |point: &[f64]| {
-        // A rendering that cannot be scored is a rejected point.
+        // A point whose rendering cannot be scored is rejected.
         judge.score(&view.render(point)).map_or(f64::NAN, |s| by.pick(s.cssim, s.cssim_object))
     };
     let (start, compared) = best_start(starts, &bounds, objective)?;
@@ -81,7 +81,7 @@ pub fn polish(
     })
 }
 
-/// The start of lowest score, the first of equals, and how many evaluations that took: none where there is no choice.
+/// The start of lowest score (the first of equal ones), and the number of evaluations: 0 for a single start.
 fn best_start(
     starts: &[Vec<f64>],
     bounds: &Bounds,
@@ -104,8 +104,8 @@ fn best_start(
 /// A width in this outermost share of the table's logarithmic span counts as at its edge.
 const EDGE: f64 = 0.02;
 
-/// The model's box with the width of the main lobe cut to the table's span; whether that is tighter than the model's lower and upper
-/// bound.
+/// The model's box with the main lobe's width restricted to the table's span, and whether the span is tighter than the model's lower
+/// and upper bound.
 fn polish_bounds(view: &FullView<'_>) -> Result<(Bounds, [bool; 2]), SearchError> {
     let model_bounds = search_bounds(view.model, SearchKind::LeastSquares)?;
     let (mut lower, mut upper) = (model_bounds.lower().to_vec(), model_bounds.upper().to_vec());
@@ -114,7 +114,7 @@ fn polish_bounds(view: &FullView<'_>) -> Result<(Bounds, [bool; 2]), SearchError
     if let (Some(width), Some(span)) = (main, view.table.span()) {
         let (entry, (first, last)) = (width.entry, width.entries(span));
         tighter = [first > lower[entry] * (1.0 + 1e-9), last < upper[entry] * (1.0 - 1e-9)];
-        // Where the table reaches the model's bound, its outermost knot may miss it by a rounding: the bound counts.
+        // If the table reaches the model's bound, its outermost knot may differ from the bound by rounding; then the bound is used.
         if tighter[0] {
             lower[entry] = first;
         }
@@ -122,7 +122,7 @@ fn polish_bounds(view: &FullView<'_>) -> Result<(Bounds, [bool; 2]), SearchError
             upper[entry] = last;
         }
     }
-    // Where a reflectance is small, small steps of it are seen.
+    // Small steps of a reflectance are visible where the reflectance is small.
     let is_width = |entry| view.model.lobes().iter().any(|b| b.width.is_some_and(|width| width.entry == entry));
     let scale = |(entry, role)| match role {
         Role::Width => Scale::Logarithmic,

@@ -1,9 +1,9 @@
 //! Starts for the least-squares search (design section 2).
 //!
-//! For every width of the main lobe's grid, and every scanned value of the parameters that multiply others, the remaining
-//! parameters enter linearly: at gamma = 1 their best values are a small bounded linear least-squares problem, one per
-//! channel where no scalar joins them. Terms of fixed weight move to the right-hand side. A model where one of these multiplies another gives coordinates in which
-//! they do not (`Model::scan_weights`).
+//! For every width of the main lobe's grid, and every scanned value of the parameters that multiply others, the remaining parameters
+//! enter linearly. At gamma = 1 their best values solve a small bounded linear least-squares problem, one per channel if no scalar
+//! couples the channels. Terms of fixed weight move to the right-hand side. A model in which one linear parameter multiplies another
+//! provides coordinates in which it does not (`Model::scan_weights`).
 
 use super::objective::{flat_roles, observed};
 use crate::{
@@ -14,8 +14,8 @@ use crate::{
 };
 use std::ops::Range;
 
-/// All points of the scan, in the order of widths, then scanned values. Of points that make the same material, such as those that differ
-/// in a lobe of no weight, the first.
+/// All points of the scan, in the order of widths, then scanned values. Of several points that give the same material, such as points
+/// that differ only in a lobe of zero weight, only the first.
 pub(super) fn scan(model: &dyn Model, table: &TransportTable, weights: &[f64], photo: &[[f32; 3]]) -> Vec<Vec<f64>> {
     let grids = grids(model, table);
     let mut terms: Vec<Planes> = (0..term_count(model)).map(|_| table.planes()).collect();
@@ -32,14 +32,14 @@ pub(super) fn scan(model: &dyn Model, table: &TransportTable, weights: &[f64], p
         {
             points.push(point);
         }
-        // Odometer over the grids, the last running fastest.
+        // Next combination of grid values; the last grid varies fastest.
         let Some(digit) = (0..grids.len()).rev().find(|&d| index[d] + 1 < grids[d].1.len()) else { return points };
         index[digit] += 1;
         index[digit + 1..].fill(0);
     }
 }
 
-/// Whether two points have the same weights, and the same widths of all lobes that have any weight.
+/// Whether two points have the same weights, and the same widths of all lobes whose weight is not zero.
 fn same(model: &dyn Model, a: &[f64], b: &[f64]) -> bool {
     const EQUAL: f64 = 1e-9;
     let weights = |point: &[f64]| {
@@ -68,14 +68,14 @@ fn grids(model: &dyn Model, table: &TransportTable) -> Vec<(usize, Vec<f64>)> {
             let of_entry = |b: &BasisLobe| b.width.filter(|width| width.entry == entry);
             let (lobe, width) = model.lobes().iter().enumerate().find_map(|(l, b)| Some((l, of_entry(b)?)))?;
             let values = table.lobes[lobe].knots?.widths().into_iter().map(width.inverse);
-            // The outermost knots equal the bounds up to a rounding.
+            // The outermost knots equal the bounds up to rounding.
             Some((entry, values.map(|x| x.clamp(lower[entry], upper[entry])).collect()))
         }
     });
     scanned.collect()
 }
 
-/// Fills the linear entries of `point` with the bounded least-squares solution at gamma = 1; false when there is none.
+/// Fills the linear entries of `point` with the bounded least-squares solution at gamma = 1; false if there is no solution.
 fn solve_linear(model: &dyn Model, terms: &[Planes], weights: &[f64], photo: &[[f32; 3]], point: &mut [f64]) -> bool {
     let (lower, upper) = flat_bounds(model.parameters());
     let fixed = weights_with(model, point, None);
@@ -101,7 +101,7 @@ fn solve_linear(model: &dyn Model, terms: &[Planes], weights: &[f64], photo: &[[
     true
 }
 
-/// The weights of the scan where one linear entry, or none, is 1 and all that are not solved for yet are 0.
+/// The weights of the scan with one linear entry at 1 (or no entry), and all entries that are not solved yet at 0.
 fn weights_with(model: &dyn Model, point: &[f64], entry: Option<usize>) -> Vec<Rgb> {
     let mut probe = point.to_vec();
     if let Some(entry) = entry {
@@ -112,8 +112,8 @@ fn weights_with(model: &dyn Model, point: &[f64], entry: Option<usize>) -> Vec<R
     weights
 }
 
-/// The least-squares problems: which channels each sees, and the entries it solves for. Where all linear parameters are colours the
-/// channels know nothing of each other; a linear scalar joins them.
+/// The least-squares problems: the channels of each, and the entries that it solves for. If all linear parameters are colours, the
+/// channels are independent; a linear scalar couples them.
 fn systems(model: &dyn Model) -> Vec<(Range<usize>, Vec<usize>)> {
     let (mut of_channel, mut scalars, mut first) = ([const { Vec::new() }; 3], Vec::new(), 0);
     for parameter in model.parameters() {

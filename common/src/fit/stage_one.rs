@@ -20,29 +20,29 @@ use crate::{
 };
 use thiserror::Error;
 
-/// Why a search gave no candidate.
+/// Why a search has no candidate.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum SearchFailure {
     /// The search itself failed.
     #[error("gamma {gamma}: {source}")]
     Search {
-        /// The exponent.
+        /// The gamma of the search.
         gamma: f64,
-        /// Why.
+        /// The cause.
         source: SearchError,
     },
     /// The scan found no start of finite cost.
     #[error("gamma {gamma}: no start of the scan has a finite cost; the photo's values may be out of range")]
     NoStart {
-        /// The exponent.
+        /// The gamma of the search.
         gamma: f64,
     },
 }
 
-/// Minimises `C(A, B, gamma)` over the parameters. `photo` holds the subset's pixels, `mean_radiance` the photo's mean
-/// luminance over all usable pixels (it places the knee of the compression, the same for every gamma and subset). With `direct` the
-/// cost is that of direct renderings, and the table says only where to start.
+/// Minimises `C(A, B, gamma)` over the parameters. `photo` holds the subset's pixels. `mean_radiance` is the photo's mean luminance over
+/// all usable pixels; it sets the knee of the compression, the same for every gamma and subset. With `direct`, the cost is that of
+/// direct renderings, and the table is used for the starts only.
 ///
 /// # Errors
 /// When no search from any start succeeds.
@@ -77,7 +77,7 @@ pub fn search_gamma(
             Ok(Found { point: m.point, value: m.value, termination: m.termination })
         }),
         SearchKind::Pattern => {
-            // Pattern search costs thousands of evaluations: one start.
+            // Pattern search takes thousands of evaluations, so it gets one start.
             let options = MultiStartOptions { refine: 1, ..options };
             multi_start::refine_best(&starts, &bounds, &options, |start| {
                 let n = bounds.dimension();
@@ -99,7 +99,7 @@ pub fn search_gamma(
     })
 }
 
-/// What a search with `gamma` minimises. Coordinator and workers build it here, so that both find the same cost, bit for bit.
+/// The objective of a search with `gamma`. Coordinator and workers both call this function, so they compute the same cost bit for bit.
 pub(crate) fn objective_of<'a>(
     method: &Method,
     gamma: f64,
@@ -117,7 +117,7 @@ pub(crate) fn objective_of<'a>(
     Objective::new(method.model, table, subset, photo, compression)
 }
 
-/// A search evaluates its start, which was evaluated and counted before it.
+/// The evaluations of a search without its start, which was evaluated and counted before.
 fn beyond_its_start(evaluations: usize) -> usize {
     evaluations.saturating_sub(1)
 }
@@ -143,8 +143,8 @@ pub(super) fn paper_start(model: &dyn Model) -> Vec<f64> {
     model.parameters().iter().flat_map(|p| std::iter::repeat_n(p.start, p.channels.count())).collect()
 }
 
-/// The box of a model's parameters. Least squares moves widths by their logarithm, in which the table is gridded; pattern search
-/// moves as the model's parameters say.
+/// The box of a model's parameters. Least squares steps in the logarithm of widths, in which the table's grid is even; pattern search
+/// uses the scale that the model declares for each parameter.
 pub(super) fn search_bounds(model: &dyn Model, search: SearchKind) -> Result<Bounds, SearchError> {
     let (lower, upper) = flat_bounds(model.parameters());
     let declared = model.parameters().iter().flat_map(|p| std::iter::repeat_n(p.scale, p.channels.count()));

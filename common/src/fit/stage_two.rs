@@ -16,7 +16,7 @@ use crate::{
 };
 use rayon::prelude::*;
 
-/// Everything needed to turn parameters into a full image.
+/// Renders full images from parameters.
 #[derive(Debug)]
 pub struct FullView<'a> {
     /// The model.
@@ -25,9 +25,9 @@ pub struct FullView<'a> {
     pub table: &'a TransportTable,
     /// The pixels that see the object.
     pub pixels: &'a [Pixel],
-    /// How much of each pixel of the image shows the object, `height x width`.
+    /// The share of each pixel of the image that the object covers, `height x width`.
     pub coverage: &'a [f32],
-    /// The image shows one pixel, the middle, of every square of so many columns and rows of the scene's pixels; 1 for all of them.
+    /// The image has the middle pixel of every square of `stride` x `stride` pixels of the scene; 1 for all pixels.
     pub stride: u32,
     /// Columns of the image.
     pub width: usize,
@@ -75,8 +75,8 @@ impl JudgedBy {
     }
 }
 
-/// Renders and scores every candidate; near-equal ones share a score. `each` is told whenever another candidate is done, in any
-/// order and from any thread.
+/// Renders and scores every candidate; near-equal ones share a score. `each` is called once per finished candidate, in any order and
+/// from any thread.
 ///
 /// # Errors
 /// When a rendering cannot be scored (not finite).

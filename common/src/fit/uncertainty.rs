@@ -1,21 +1,20 @@
 //! How well the photo determines each parameter of a candidate.
 //!
-//! A candidate minimises Eq. 1, a weighted sum of squares whose residuals are the noise of the photo and what the model cannot
-//! express. Its weights say how pixels were drawn, not how precise they are, so `s^2 (J^T W J)^-1` would be wrong, and the
-//! standard errors come from the sandwich ([`Sandwich`]): `A^-1 B A^-1` with `A = sum_p w_p J_p^T J_p` and
-//! `B = sum_p (w_p J_p^T r_p)(w_p J_p^T r_p)^T`, `J_p` the derivatives of the three compressed channels of pixel p by the
-//! parameters at the candidate's gamma, `r_p` their residuals. The channels of a pixel err together; pixels are independent draws.
-//! (A pixel that was drawn twice counts as one of twice the weight, which is a little too cautious.)
+//! A candidate minimises Eq. 1, a weighted sum of squares whose residuals are the noise of the photo and the error of the model. Its
+//! weights are those of the sampling, not of the precision of pixels, so `s^2 (J^T W J)^-1` would be wrong. The standard errors come
+//! from the sandwich estimator ([`Sandwich`]): `A^-1 B A^-1` with `A = sum_p w_p J_p^T J_p` and
+//! `B = sum_p (w_p J_p^T r_p)(w_p J_p^T r_p)^T`, `J_p` the derivatives of the three compressed channels of pixel p with
+//! respect to the parameters at the candidate's gamma, `r_p` their residuals. The errors of a pixel's channels are correlated; pixels are
+//! independent draws. (A pixel that was drawn twice counts as one of twice the weight, which makes the errors slightly too large.)
 //!
-//! Parameters at a bound are held there while the others are judged. Whether the bound means anything is asked for each of them by
-//! itself: where the data would not hold it in place if it were free, it is not determined either. (The width of a highlight that is
-//! not there drifts to an end of its range.)
+//! Parameters at a bound are held there while the others are judged. Each of them is then freed alone: if its standard error is too
+//! large, it is undetermined, not at its bound. (Without a highlight, the width of the highlight drifts to an end of its range.)
 //!
-//! Derivatives at one point do not show that a parameter matters only where another one is not zero, as the Fresnel reflectance of
-//! a highlight whose strength may be nothing but noise. So all of this is asked again wherever any other parameter may lie within two
-//! standard errors: what is not determined everywhere there is not determined.
+//! Derivatives at one point do not show that a parameter has an effect only if another one is not zero, such as the Fresnel reflectance
+//! of a highlight whose strength may be zero within its error. So the test is repeated with each parameter moved by two standard errors
+//! either way: a parameter that is undetermined at any of these points is undetermined.
 //!
-//! What this is not: an error by light or geometry that is not what it is said to be.
+//! Not included: errors of the light and of the geometry.
 
 use super::{method::SearchKind, objective::Objective, stage_one::search_bounds};
 use crate::{
@@ -23,14 +22,14 @@ use crate::{
     search::{NormalEquations, Sandwich, SearchError, least_squares::LeastSquaresProblem},
 };
 
-/// What the photo says of one entry of the flat parameter vector.
+/// How well the photo determines one entry of the flat parameter vector.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Uncertainty {
     /// The parameter is known to this standard error, in its own unit.
     StandardError(f64),
-    /// The parameter is at its lower or upper bound, and the photo holds it there.
+    /// The parameter is at its lower or upper bound, and would stay near it if it were free.
     AtBound,
-    /// Much of the parameter's range matches the photo as well.
+    /// A large part of the parameter's range matches the photo equally well.
     Undetermined,
 }
 
@@ -44,20 +43,21 @@ impl Uncertainty {
     }
 }
 
-/// How far from the minimum a parameter may lie, in standard errors.
+/// Distance from the minimum at which the test is repeated, in standard errors.
 const REACH: f64 = 2.0;
 
-/// A parameter counts as undetermined when its standard error is beyond this share of its range (of the range's logarithm for
-/// widths): the values within two standard errors are then half of all that the model allows.
+/// A parameter counts as undetermined if its standard error is above this share of its range (of the logarithmic range for widths): the
+/// values within two standard errors are then half of the range.
 pub const LARGEST_SHARE: f64 = 0.125;
 
-/// Nearer to a bound than this share of the range is at the bound: a pattern search ends within its last mesh of it.
+/// A parameter nearer to a bound than this share of the range counts as at the bound: a pattern search ends within its last mesh size
+/// of it.
 const AT_BOUND: f64 = 1e-5;
 
 /// The uncertainty of every entry of the flat vector `point`, a minimum of `objective`.
 ///
 /// # Errors
-/// When the model's bounds make no box.
+/// If the model's bounds are not a valid box.
 pub(crate) fn uncertainties(
     model: &dyn Model,
     objective: &mut Objective<'_>,
@@ -69,7 +69,7 @@ pub(crate) fn uncertainties(
         (AT_BOUND..=1.0 - AT_BOUND).contains(&t)
     };
     let inside: Vec<bool> = (0..point.len()).map(is_inside).collect();
-    // One for the parameters inside, and one for each at its bound: what if it alone were free as well?
+    // One set of free parameters for those inside, and one more for each parameter at its bound, with that parameter free as well.
     let mut freed = vec![inside.clone()];
     for i in (0..point.len()).filter(|&i| !inside[i]) {
         freed.push((0..point.len()).map(|j| inside[j] || j == i).collect());
@@ -85,7 +85,7 @@ pub(crate) fn uncertainties(
             match share <= LARGEST_SHARE {
                 true if inside[i] => Uncertainty::StandardError(error),
                 true => Uncertainty::AtBound,
-                // Also where the share is not a number.
+                // Also if the share is not a number.
                 false => Uncertainty::Undetermined,
             }
         };
@@ -113,8 +113,8 @@ fn residuals(objective: &mut Objective<'_>, point: &[f64]) -> Vec<f64> {
     residuals
 }
 
-/// The standard errors of all parameters for each set of free ones, 0 where not free, by the derivatives at `place` and the
-/// residuals at the minimum.
+/// The standard errors of all parameters for each set of free ones (0 for the others), from the derivatives at `place` and the residuals
+/// at the minimum.
 fn standard_errors(
     objective: &mut Objective<'_>,
     place: &[f64],
@@ -131,7 +131,7 @@ fn standard_errors(
             sandwiches.iter_mut().for_each(Sandwich::close_group);
             pixel = p;
         }
-        // The rows are the same everywhere.
+        // The rows come in the same order at every place.
         let residual = residuals.next().copied().unwrap_or(f64::NAN);
         sandwiches.iter_mut().for_each(|sandwich| sandwich.add_row(row, residual));
     });

@@ -8,9 +8,8 @@ use thiserror::Error;
 
 /// The largest blob that may exist, in bytes (256 MiB).
 ///
-/// The largest output the design foresees is a full-resolution transport table of about 64 MB; four times that leaves
-/// room without letting one peer ask another for unbounded memory. Blobs travel in parts, so this bounds what a
-/// receiver collects, not a single frame.
+/// The largest output in the design is a full-resolution transport table of about 64 MB. Four times that leaves room, and a peer still
+/// cannot make another allocate unbounded memory. Blobs are sent in parts, so this limits the assembled blob, not a single frame.
 pub const MAX_BLOB_BYTES: usize = 256 << 20;
 
 /// The name of a blob: the BLAKE3 hash of its bytes.
@@ -39,15 +38,15 @@ impl fmt::Debug for BlobHash {
     }
 }
 
-/// Bytes that are not what their name says.
+/// Bytes whose hash is not the announced one.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[error("blob of {bytes} bytes: expected hash {expected}, found {found}; the sender or the transfer is faulty")]
 pub struct HashMismatch {
     /// The name under which the bytes were announced.
     pub expected: BlobHash,
-    /// The hash of the bytes that came.
+    /// The hash of the received bytes.
     pub found: BlobHash,
-    /// How many bytes came.
+    /// Number of received bytes.
     pub bytes: usize,
 }
 
@@ -55,7 +54,7 @@ pub struct HashMismatch {
 #[derive(Clone)]
 pub struct Blob {
     hash: BlobHash,
-    // Not `Arc<[u8]>`: that would copy every output once more, and outputs reach 64 MB.
+    // Not `Arc<[u8]>`, which would need a copy of every output, and outputs reach 64 MB.
     bytes: Arc<Vec<u8>>,
 }
 
@@ -69,7 +68,7 @@ impl Blob {
     /// The blob of these bytes, which a peer announced as `expected`.
     ///
     /// # Errors
-    /// When the hash of the bytes is another one.
+    /// If the bytes have another hash.
     pub fn verified(expected: BlobHash, bytes: Vec<u8>) -> Result<Self, HashMismatch> {
         let blob = Self::new(bytes);
         if blob.hash == expected {
@@ -100,7 +99,7 @@ impl fmt::Debug for Blob {
     }
 }
 
-/// Equal names are equal bytes.
+/// Blobs of equal hash have equal bytes.
 impl PartialEq for Blob {
     fn eq(&self, other: &Self) -> bool {
         self.hash == other.hash

@@ -1,4 +1,4 @@
-//! What a running node may use besides its inputs: the wish to stop, a place to report progress, decoded inputs.
+//! The context of a running node: cancellation, progress, and the cache of decoded inputs.
 
 use std::any::Any;
 use std::sync::Arc;
@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
 use super::{Blob, DecodedCache, NodeFailure};
 
-/// The surroundings of one execution of one node. Nothing in it may change the output.
+/// The context of one execution of one node. Nothing in it may change the output.
 #[derive(Clone, Debug)]
 pub struct RunContext {
     cancelled: Arc<AtomicBool>,
@@ -21,12 +21,12 @@ impl RunContext {
         Self { cancelled: Arc::default(), progress_permille: Arc::default(), decoded }
     }
 
-    /// Ask the node to stop: its output is not wanted any more.
+    /// Ask the node to stop because its output is no longer needed.
     pub fn cancel(&self) {
         self.cancelled.store(true, Ordering::Relaxed);
     }
 
-    /// Whether the output is not wanted any more.
+    /// Whether the output is no longer needed.
     #[must_use]
     pub fn is_cancelled(&self) -> bool {
         self.cancelled.load(Ordering::Relaxed)
@@ -35,18 +35,18 @@ impl RunContext {
     /// For use with `?` between the steps of a long node.
     ///
     /// # Errors
-    /// [`NodeFailure::Cancelled`] once the output is not wanted any more.
+    /// [`NodeFailure::Cancelled`] once the output is no longer needed.
     pub fn check(&self) -> Result<(), NodeFailure> {
         if self.is_cancelled() { Err(NodeFailure::Cancelled) } else { Ok(()) }
     }
 
-    /// Tell how much of the node is done, as `done` of `total` steps; the user sees it about once a second.
+    /// Report progress as `done` of `total` steps; it is shown to the user about once a second.
     pub fn report(&self, done: u64, total: u64) {
         let permille = done.saturating_mul(1000).checked_div(total).unwrap_or(1000).min(1000);
         self.progress_permille.store(u32::try_from(permille).unwrap_or(1000), Ordering::Relaxed);
     }
 
-    /// What [`report`](Self::report) said last, in thousandths; 0 before.
+    /// The last reported progress in thousandths; 0 before the first [`report`](Self::report).
     #[must_use]
     pub fn progress_permille(&self) -> u32 {
         self.progress_permille.load(Ordering::Relaxed)

@@ -1,4 +1,4 @@
-//! Decoded inputs, shared by the nodes of one process: 21 searches read one table, it is decoded once.
+//! Decoded inputs, shared by the nodes of one process: a table that 21 searches read is decoded once.
 
 use std::any::{Any, TypeId};
 use std::collections::BTreeMap;
@@ -7,7 +7,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use super::{Blob, BlobHash};
 
-/// A bounded cache of decoded blobs, keyed by blob and type; the least recently used entries go first.
+/// A bounded cache of decoded blobs, keyed by blob and type; the least recently used entries are dropped first.
 pub struct DecodedCache {
     bound_bytes: usize,
     entries: Mutex<Entries>,
@@ -27,20 +27,19 @@ struct Entry {
 }
 
 impl DecodedCache {
-    /// An empty cache. `bound_bytes` bounds the sum of the *encoded* sizes, which stand for the decoded ones.
+    /// An empty cache. `bound_bytes` limits the sum of the *encoded* sizes, as an estimate of the decoded ones.
     #[must_use]
     pub fn new(bound_bytes: usize) -> Self {
         Self { bound_bytes, entries: Mutex::default() }
     }
 
-    /// The decoded form of `blob`: from the cache, else made by `decode` and kept.
+    /// The decoded form of `blob`: from the cache, otherwise from `decode`, and then cached.
     ///
-    /// No lock is held while `decode` runs: a decoder that uses rayon may be interrupted by another node on the same
-    /// thread that wants the same blob, and would wait for itself. So two nodes that start together may both decode;
-    /// the first to finish is kept, and both get that one.
+    /// No lock is held while `decode` runs. Inside a decoder that uses rayon, the same thread may start another node that reads the
+    /// same blob, which would deadlock. So two nodes that start together may both decode; the first result is cached, and both get it.
     ///
     /// # Errors
-    /// Those of `decode`; nothing is kept then.
+    /// Those of `decode`; an error is not cached.
     pub fn get_or_decode<T: Any + Send + Sync, E>(
         &self,
         blob: &Blob,
@@ -61,7 +60,7 @@ impl DecodedCache {
     }
 
     fn lock(&self) -> MutexGuard<'_, Entries> {
-        // A panic cannot leave the entries half changed in a way that matters: at worst one is missing.
+        // A panic while the lock is held leaves the entries usable: at worst one is missing.
         self.entries.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }

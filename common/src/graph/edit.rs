@@ -1,12 +1,12 @@
-//! What a planner may do to a graph: add to it, read from it, and let go of what it needs no more.
+//! The access of a planner to a graph: add nodes and blobs, read outputs, release what is no longer needed.
 
 use super::{Blob, BlobHash, Graph, NodeId, NodeSpec, PlanError, sharing::PartEdit};
 
-/// What a planner may do to a graph.
+/// The access of a planner to a graph.
 ///
-/// Everything that a planner adds is held for it until it is released. A node that nobody holds and that no open node waits for is
-/// cancelled; a blob that nobody holds and that no open node reads is let go. A planner that never releases anything keeps
-/// everything to the end of the run, which is a mistake only of memory.
+/// Every node and blob that a planner adds is held for it until it is released. A node that is not held and that no open node waits for
+/// is cancelled; a blob that is not held and that no open node reads is dropped. A planner that never releases anything is correct, but
+/// uses more memory.
 #[derive(Debug)]
 pub struct GraphEdit<'graph> {
     graph: &'graph mut Graph,
@@ -15,17 +15,17 @@ pub struct GraphEdit<'graph> {
 }
 
 impl<'graph> GraphEdit<'graph> {
-    /// Let a planner edit `graph`.
+    /// The access of the only planner of `graph`.
     pub fn new(graph: &'graph mut Graph) -> Self {
         Self { graph, part: None }
     }
 
-    /// The same graph on behalf of one of several planners.
+    /// The access of one of several planners of the same graph.
     pub(super) fn on_behalf<'part>(&'part mut self, part: PartEdit<'part>) -> GraphEdit<'part> {
         GraphEdit { graph: self.graph, part: Some(part) }
     }
 
-    /// Keep a blob, so that nodes can name it as an input.
+    /// Hold a blob, so that nodes can name it as an input.
     ///
     /// # Errors
     /// When it is longer than [`MAX_BLOB_BYTES`](super::MAX_BLOB_BYTES).
@@ -33,7 +33,8 @@ impl<'graph> GraphEdit<'graph> {
         self.keep(Blob::new(bytes))
     }
 
-    /// Keep a blob that was hashed before: large ones cost time, and several planners may share one.
+    /// As [`add_blob`](Self::add_blob), for a blob that is already hashed, because hashing a large one takes time and several planners
+    /// may share it.
     ///
     /// # Errors
     /// When it is longer than [`MAX_BLOB_BYTES`](super::MAX_BLOB_BYTES).
@@ -44,12 +45,12 @@ impl<'graph> GraphEdit<'graph> {
         }
     }
 
-    /// Add a node. Of the nodes that are ready, those of the lowest [`priority`](NodeSpec::priority) run first, then those that
-    /// were added first. On behalf of one of several planners, a node that another one has added may be given back: with
-    /// the same kind, parameters, inputs and place it has the same output.
+    /// Add a node. Ready nodes run in ascending order of [`priority`](NodeSpec::priority), then in the order in which they were added.
+    /// With several planners, the returned node may be one that another planner has added: with the same kind, parameters, inputs and
+    /// placement it has the same output.
     ///
     /// # Errors
-    /// When an input is unknown or was released, or a size limit is passed.
+    /// If an input is unknown or was released, or a size limit is exceeded.
     pub fn add_node(&mut self, spec: NodeSpec) -> Result<NodeId, PlanError> {
         match &mut self.part {
             Some(part) => part.add_node(self.graph, spec),
@@ -57,7 +58,7 @@ impl<'graph> GraphEdit<'graph> {
         }
     }
 
-    /// Hold a node no more: neither read its output again nor add a node that reads it.
+    /// Release a node. Afterwards the planner must neither read its output nor add a node that reads it.
     pub fn release(&mut self, node: NodeId) {
         match &mut self.part {
             Some(part) => part.release(self.graph, node),
@@ -65,7 +66,7 @@ impl<'graph> GraphEdit<'graph> {
         }
     }
 
-    /// Hold a blob that was added no more.
+    /// Release a blob that was added.
     pub fn release_blob(&mut self, hash: BlobHash) {
         match &mut self.part {
             Some(part) => part.release_blob(self.graph, hash),
@@ -85,13 +86,13 @@ impl<'graph> GraphEdit<'graph> {
         self.graph.output(node)
     }
 
-    /// A blob by its name.
+    /// A blob by its hash.
     #[must_use]
     pub fn blob(&self, hash: BlobHash) -> Option<&Blob> {
         self.graph.blob(hash)
     }
 
-    /// How many nodes are ready or running, of those that workers run.
+    /// How many nodes placed on workers are ready or running.
     #[must_use]
     pub fn ready_for_workers(&self) -> usize {
         self.graph.ready_for_workers()

@@ -6,11 +6,11 @@ use thiserror::Error;
 
 use super::{BlobHash, FailureReason, NodeId};
 
-/// Why a plan cannot go on.
+/// Why a plan cannot continue.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum PlanError {
-    /// A node failed, and the planner cannot do without it.
+    /// A node failed whose output the planner needs.
     #[error("{kind} {label:?} failed: {reason}")]
     NodeFailed {
         /// The kind of the node.
@@ -21,7 +21,7 @@ pub enum PlanError {
         reason: FailureReason,
     },
     /// A node names a blob that the graph does not hold.
-    #[error("{label:?} wants blob {hash}, which was not added; add it before the node")]
+    #[error("{label:?} needs blob {hash}, which was not added; add it before the node")]
     UnknownBlob {
         /// The label of the new node.
         label: String,
@@ -29,7 +29,7 @@ pub enum PlanError {
         hash: BlobHash,
     },
     /// A node names an input node that does not exist.
-    #[error("{label:?} wants the output of {node}, which does not exist; add it before the node")]
+    #[error("{label:?} needs the output of {node}, which does not exist; add it before this node")]
     UnknownInput {
         /// The label of the new node.
         label: String,
@@ -38,7 +38,7 @@ pub enum PlanError {
     },
     /// A node names an input node whose output was released.
     #[error(
-        "{label:?} wants the output of {node}, which was released; release a node after the last one that reads it was added"
+        "{label:?} needs the output of {node}, which was released; release a node only after adding every node that reads it"
     )]
     Released {
         /// The label of the new node.
@@ -56,8 +56,8 @@ pub enum PlanError {
         /// The largest size allowed.
         limit: usize,
     },
-    /// A number in an output is not what its recomputation gives: the output is wrong, or was made for another input.
-    #[error("{what} is said to be {claimed:?}, but is {recomputed:?}")]
+    /// A number in an output differs from its recomputation: the output is wrong, or was computed from another input.
+    #[error("{what}: the output says {claimed:?}, recomputation gives {recomputed:?}")]
     NotVerified {
         /// Which number, such as `the cost of gamma 1.3`.
         what: String,
@@ -66,21 +66,21 @@ pub enum PlanError {
         /// The number that was computed again.
         recomputed: f64,
     },
-    /// An output is not one of its node: it does not decode, or is of another shape, or holds values that cannot be.
+    /// An output that its node cannot have: it does not decode, has another shape, or has impossible values.
     #[error("expected {expected}, found {found}")]
     WrongOutput {
-        /// What the node was asked for.
+        /// The output that was requested.
         expected: String,
-        /// What its output is.
+        /// The output that was received.
         found: String,
     },
-    /// The planner's own error: an output is not what it should be.
+    /// An error of the planner itself.
     #[error("{message}")]
     Unusable {
         /// What is wrong and what to do about it: lower case, no full stop.
         message: String,
     },
-    /// The planner's own error, with its cause.
+    /// An error of the planner itself, with its cause.
     #[error(transparent)]
     Other(Box<dyn StdError + Send + Sync>),
 }

@@ -22,7 +22,7 @@ pub enum Execution {
     Parallel,
 }
 
-/// Run the planner's graph to its end in this process, whatever the placement of its nodes says.
+/// Run the planner's graph to its end in this process, regardless of the placement of its nodes.
 ///
 /// # Errors
 /// Those of the planner, which by default ends the run when a node fails.
@@ -34,7 +34,7 @@ pub fn run_in_process<P: Planner>(mut planner: P, registry: &Registry, execution
     planner.start(&mut GraphEdit::new(&mut graph))?;
     loop {
         notify(&mut planner, &mut graph, &mut ready)?;
-        // Some may have been cancelled since they became ready.
+        // A node may have been cancelled after it became ready.
         let next = std::iter::from_fn(|| ready.pop_first()).map(|(_, node)| node).filter(|node| graph.is_open(*node));
         let chosen: Vec<NodeId> = match execution {
             Execution::Sequential => next.take(1).collect(),
@@ -58,7 +58,7 @@ pub fn run_in_process<P: Planner>(mut planner: P, registry: &Registry, execution
     }
 }
 
-/// Tell the planner of all that happened, which may make more happen, and collect what became ready.
+/// Report all changes to the planner, which may cause more changes, and collect the nodes that became ready.
 fn notify<P: Planner>(
     planner: &mut P,
     graph: &mut Graph,
@@ -94,7 +94,7 @@ fn run_node(
     registry: &Registry,
     decoded: &Arc<DecodedCache>,
 ) -> Result<Blob, NodeFailure> {
-    let missing = || NodeFailure::new("its inputs are not there, though it was ready: a mistake in the job graph");
+    let missing = || NodeFailure::new("an input of a ready node is missing: a bug in the job graph, please report it");
     let spec = graph.spec(node).ok_or_else(missing)?;
     let inputs = graph.input_blobs(node).ok_or_else(missing)?;
     registry.run(&spec.kind, &spec.parameters, &inputs, &RunContext::new(Arc::clone(decoded)))

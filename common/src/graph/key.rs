@@ -1,17 +1,17 @@
-//! Keys: what a node computes, whatever its number.
+//! Keys: identify what a node computes, independently of its number.
 
 use std::fmt;
 
 use super::BlobHash;
 
-/// Names what a node computes: the BLAKE3 hash of its kind, its parameters and the hashes of its inputs, in order.
+/// Identifies what a node computes: the BLAKE3 hash of its kind, its parameters and the hashes of its inputs, in order.
 ///
-/// Nodes are pure functions, so nodes of one key have one output, in whichever run or order they were added. Label,
-/// number and placement are no part of it.
+/// Nodes are pure functions, so nodes of equal key have equal outputs, in any run and in any order of addition. Label, number and
+/// placement are not part of the key.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct NodeKey(pub [u8; 32]);
 
-/// Begins what is hashed: keys of another layout would begin with another tag.
+/// Prefix of the hashed bytes; another layout of keys would need another tag.
 const TAG: &[u8] = b"lookalike node 1\0";
 
 impl NodeKey {
@@ -43,7 +43,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn key_depends_on_every_part_and_on_where_one_ends() {
+    fn key_depends_on_every_part_and_on_the_boundaries_between_parts() {
         let [a, b] = [BlobHash([1; 32]), BlobHash([2; 32])];
         let key = |kind: &str, parameters: &[u8], inputs: &[BlobHash]| NodeKey::of(kind, parameters, inputs.to_vec());
         let keys = [

@@ -1,13 +1,13 @@
 //! Many planners as one: the parts of a run, such as the fits of a batch, share a graph.
 //!
-//! - Parts begin one by one, in order, when the workers need more to do, so that hundreds of them need not be in memory.
+//! - Parts start one by one, in order, when the workers need more nodes, so that hundreds of parts need not be in memory at once.
 //! - Nodes of earlier parts run first, so that early parts end early.
-//! - A node that two parts ask for runs once; equal blobs are one blob anyway.
-//! - A node that fails ends its part; the others go on. What only that part wanted is cancelled.
-//! - A part ends when it waits for nothing any more, as a run does. What it held is released, and forgotten for good once what was made
-//!   of it is safe.
+//! - A node that two parts add runs once. Equal blobs are one blob in any case.
+//! - A failed node ends its parts; the other parts continue. Nodes that only the ended parts need are cancelled.
+//! - A part ends when it waits for no node, as a run does. Then everything it holds is released, and its outputs are forgotten once its
+//!   result is safe.
 //!
-//! What a part makes of its outputs does not depend on the other parts: alone, it would get the same ones.
+//! The result of a part does not depend on the other parts: run alone, it would get the same outputs.
 
 use std::collections::BTreeMap;
 
@@ -15,36 +15,37 @@ use thiserror::Error;
 
 use super::{
     Blob, FailureReason, GraphEdit, NodeId, NodeSpec, PlanError, Planner,
+    part_label::split_label,
     sharing::{PartId, Sharing},
 };
 
-/// A part that can begin.
+/// A part that can start.
 #[derive(Debug)]
 pub struct Part<P> {
-    /// Its number, which no other part has: parts of lower numbers go first.
+    /// Its unique number: nodes of lower numbers run first.
     pub number: u32,
-    /// Its name, which goes before the labels of its nodes. Without ": "; at most [`MAX_PART_NAME_BYTES`].
+    /// Its name, which is put in front of the labels of its nodes. Must not contain ": "; at most
+    /// [`MAX_PART_NAME_BYTES`](super::MAX_PART_NAME_BYTES).
     pub name: String,
-    /// What plans its nodes.
+    /// The planner of its nodes.
     pub planner: P,
-    /// It holds its nodes until the run ends, for the parts that ask for the same, even when it waits for nothing any more; it never counts as
-    /// completed.
+    /// Whether it holds its nodes until the run ends, even if it waits for none, for other parts that add equal nodes. Such a part never
+    /// completes.
     pub stays: bool,
 }
 
-/// The answer to "what is next?".
+/// The answer of [`Parts::next`].
 #[derive(Debug)]
 pub enum Next<P> {
-    /// This part.
+    /// The next part.
     Part(Box<Part<P>>),
-    /// There are more, but the next one is not ready to begin: whoever runs the graph is to be told when it is, with
-    /// [`Planner::look_again`].
+    /// The next part is not ready to start. [`Planner::look_again`] must be called when it is.
     NotYet,
     /// No more parts.
     End,
 }
 
-/// Why a part gave up.
+/// Why a part failed.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum PartFailure {
@@ -58,39 +59,40 @@ pub enum PartFailure {
         /// Why it failed.
         reason: FailureReason,
     },
-    /// Its planner cannot go on.
+    /// Its planner returned an error.
     #[error(transparent)]
     Plan(PlanError),
 }
 
-/// Where the parts of a run come from, and where they go.
+/// The source of the parts of a run, and the receiver of their results.
 pub trait Parts {
-    /// What plans a part.
+    /// The planner of a part.
     type Planner: Planner;
 
-    /// The next part in order. With `wait`, there is nothing else to do: [`Next::NotYet`] is no answer then.
+    /// The next part in order. With `wait`, no part is active: the call must block until the next part is ready, and must not return
+    /// [`Next::NotYet`].
     ///
     /// # Errors
-    /// What ends the run.
+    /// An error ends the run.
     fn next(&mut self, wait: bool) -> Result<Next<Self::Planner>, PlanError>;
 
-    /// Whether another part should begin, beside `active` ones with `ready` nodes that workers may run or are running.
+    /// Whether another part should start, given the number of `active` parts and of nodes that are `ready` for workers or running on them.
     fn wants_more(&self, active: usize, ready: usize) -> bool;
 
-    /// A part has ended well.
+    /// A part has completed.
     ///
     /// # Errors
-    /// What ends the run.
+    /// An error ends the run.
     fn completed(&mut self, part: Part<Self::Planner>) -> Result<(), PlanError>;
 
-    /// A part has given up.
+    /// A part has failed.
     ///
     /// # Errors
-    /// What ends the run.
+    /// An error ends the run.
     fn failed(&mut self, part: Part<Self::Planner>, failure: PartFailure) -> Result<(), PlanError>;
 
-    /// The parts that have become safe since the last call: they have ended well, and never have to be run again, whatever happens to
-    /// this run. What only they needed is forgotten for good.
+    /// The parts that have become safe since the last call: they have completed and will not run again, even if this run is resumed. The
+    /// outputs that only they needed are forgotten.
     fn newly_safe(&mut self) -> Vec<u32> {
         Vec::new()
     }
@@ -111,20 +113,20 @@ impl<S: Parts> Many<S> {
         Self { parts, active: BTreeMap::new(), sharing: Sharing::default(), is_exhausted: false }
     }
 
-    /// What the parts came from.
+    /// The source of the parts.
     pub fn into_parts(self) -> S {
         self.parts
     }
 
-    /// Forget what nobody will need again, and let parts begin as long as there is too little to do.
-    fn go_on(&mut self, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
+    /// Forget outputs that will not be needed again, and start parts while the workers need more nodes.
+    fn start_more(&mut self, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
         for number in self.parts.newly_safe() {
             self.sharing.settle(number, graph.graph());
         }
-        self.begin_parts(graph)
+        self.start_parts(graph)
     }
 
-    fn begin_parts(&mut self, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
+    fn start_parts(&mut self, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
         while !self.is_exhausted {
             let is_idle = self.active.is_empty();
             if !is_idle && !self.parts.wants_more(self.active.len(), graph.ready_for_workers()) {
@@ -135,10 +137,12 @@ impl<S: Parts> Many<S> {
                     let number = part.number;
                     self.active.insert(number, *part);
                     self.advance(number, graph, |planner, graph| planner.start(graph))?;
-                    self.tell_late(graph)?;
+                    self.notify_late(graph)?;
                 }
                 Next::NotYet if is_idle => {
-                    return Err(PlanError::new("a part was waited for and did not come: a mistake in the plan"));
+                    return Err(PlanError::new(
+                        "the next part is not ready after waiting for it: a bug in the plan, please report it",
+                    ));
                 }
                 Next::NotYet => return Ok(()),
                 Next::End => self.is_exhausted = true,
@@ -147,7 +151,7 @@ impl<S: Parts> Many<S> {
         Ok(())
     }
 
-    /// Let a planner do something, and see what has become of its part.
+    /// Call a planner, then end its part if it waits for no node or has failed.
     fn advance(
         &mut self,
         number: PartId,
@@ -160,39 +164,39 @@ impl<S: Parts> Many<S> {
                 self.end(number, graph).map_or(Ok(()), |part| self.parts.completed(part))
             }
             Ok(()) => Ok(()),
-            // A worker has lied or is broken: whatever else it sent is worth no more.
+            // A worker is faulty, so all its other results are suspect: this ends the run.
             Err(error @ (PlanError::NotVerified { .. } | PlanError::WrongOutput { .. })) => Err(error),
-            Err(error) => self.give_up(number, PartFailure::Plan(error), graph),
+            Err(error) => self.fail_part(number, PartFailure::Plan(error), graph),
         }
     }
 
-    /// Take a part out of the run, with all that it holds.
+    /// Remove a part from the run and release everything that it holds.
     fn end(&mut self, number: PartId, graph: &mut GraphEdit<'_>) -> Option<Part<S::Planner>> {
         self.sharing.release_all(number, graph.graph());
         self.active.remove(&number)
     }
 
-    fn give_up(&mut self, number: PartId, failure: PartFailure, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
+    fn fail_part(&mut self, number: PartId, failure: PartFailure, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
         self.end(number, graph).map_or(Ok(()), |part| self.parts.failed(part, failure))
     }
 
-    fn tell(
+    fn notify(
         &mut self,
         number: PartId,
         node: NodeId,
         output: &Blob,
         graph: &mut GraphEdit<'_>,
     ) -> Result<(), PlanError> {
-        self.sharing.told(number, node);
+        self.sharing.notified(number, node);
         self.advance(number, graph, |planner, graph| planner.completed(node, output, graph))
     }
 
-    /// Tell planners of nodes that were complete before they asked for them.
-    fn tell_late(&mut self, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
+    /// Notify planners of nodes that had completed before they added them.
+    fn notify_late(&mut self, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
         while let Some((number, node)) = self.sharing.next_late() {
-            // It is there: the part holds it.
+            // The output is available, because the part holds the node.
             if let Some(output) = graph.output(node).cloned() {
-                self.tell(number, node, &output, graph)?;
+                self.notify(number, node, &output, graph)?;
             }
         }
         Ok(())
@@ -201,52 +205,34 @@ impl<S: Parts> Many<S> {
 
 impl<S: Parts> Planner for Many<S> {
     fn start(&mut self, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
-        self.go_on(graph)
+        self.start_more(graph)
     }
 
     fn completed(&mut self, node: NodeId, output: &Blob, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
         for number in self.sharing.end(node) {
-            self.tell(number, node, output, graph)?;
+            self.notify(number, node, output, graph)?;
         }
-        self.tell_late(graph)?;
-        self.go_on(graph)
+        self.notify_late(graph)?;
+        self.start_more(graph)
     }
 
     fn failed(&mut self, node: NodeId, reason: &FailureReason, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
         let (kind, label) = graph.spec(node).map(|spec| (spec.kind.clone(), spec.label.clone())).unwrap_or_default();
         for number in self.sharing.end(node) {
             let (kind, label) = (kind.clone(), split_label(&label).1.to_owned());
-            self.give_up(number, PartFailure::Node { kind, label, reason: reason.clone() }, graph)?;
+            self.fail_part(number, PartFailure::Node { kind, label, reason: reason.clone() }, graph)?;
         }
-        self.go_on(graph)
+        self.start_more(graph)
     }
 
-    /// The next part may be there, or one has become safe.
+    /// The next part may be ready, or a part may have become safe.
     fn look_again(&mut self, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
-        self.go_on(graph)
+        self.start_more(graph)
     }
 
     fn is_verified_by_repetition(&self, spec: &NodeSpec) -> bool {
         self.active.get(&spec.priority).is_none_or(|part| part.planner.is_verified_by_repetition(spec))
     }
-}
-
-/// The longest name of a part, in bytes: with the label of a node behind it, it stays within
-/// [`MAX_NAME_BYTES`](super::MAX_NAME_BYTES).
-pub const MAX_PART_NAME_BYTES: usize = 160;
-
-/// What lies between the name of a part and the label of one of its nodes.
-const SEPARATOR: &str = ": ";
-
-/// The label of a node of a part.
-pub(super) fn part_label(part: &str, label: &str) -> String {
-    format!("{part}{SEPARATOR}{label}")
-}
-
-/// The name of the part in a label, if there is one, and the rest.
-#[must_use]
-pub fn split_label(label: &str) -> (Option<&str>, &str) {
-    label.split_once(SEPARATOR).map_or((None, label), |(part, rest)| (Some(part), rest))
 }
 
 #[cfg(test)]

@@ -1,9 +1,9 @@
-//! The job graph: typed nodes, the blobs they read and write, and who depends on whom.
+//! The job graph: typed nodes, the blobs that they read and write, and their dependencies.
 //!
-//! A run is a [`Graph`] of nodes. A node is a pure function of its parameters and its input blobs; what it is called on
-//! the wire (`kind`) picks the one [`NodeType`] of the [`Registry`] that knows how to run it. Its output becomes a blob
-//! named by its BLAKE3 hash, so the same bytes are stored and sent once, and any two computations of a node can be
-//! compared bit for bit. A [`Planner`] decides which nodes there are: it is told of each finished node and may add more.
+//! A run is a [`Graph`] of nodes. A node is a pure function of its parameters and its input blobs; its `kind` selects the [`NodeType`]
+//! of the [`Registry`] that runs it. Its output becomes a blob named by its BLAKE3 hash, so equal bytes are stored and sent once, and
+//! two computations of a node can be compared bit for bit. A [`Planner`] decides which nodes there are: it is called for each finished
+//! node and may add more.
 //!
 //! ```text
 //!   Planner --add_node--> Waiting --inputs there--> Ready --output--> Completed --> Planner::completed
@@ -11,12 +11,11 @@
 //!                            +---an input failed------+--failure--> Failed -------> Planner::failed
 //! ```
 //!
-//! A planner holds what it adds until it says that it needs it no more; what nobody holds or reads is let go, so that a run of
-//! hundreds of fits keeps only what is under way. [`Many`] planners can share a graph.
+//! A planner holds the nodes and blobs that it adds until it releases them. Blobs that are neither held nor read by an open node are
+//! dropped, so a run of hundreds of fits stores only those of the fits in progress. [`Many`] planners can share a graph.
 //!
-//! What it is not: payloads are opaque here (no rendering, no parameters of a BRDF), and nothing knows of workers,
-//! leases, sockets or time. [`run_in_process`] runs a graph without any of these: it gives the result that every
-//! distributed run must reproduce bit for bit.
+//! Payloads are opaque here (no rendering, no parameters of a BRDF), and there are no workers, leases, sockets or time.
+//! [`run_in_process`] runs a graph in one process: every distributed run must reproduce its result bit for bit.
 
 mod blob;
 mod context;
@@ -27,6 +26,7 @@ mod in_process;
 mod key;
 mod many;
 mod node;
+mod part_label;
 mod planner;
 mod registry;
 mod sharing;
@@ -40,12 +40,12 @@ pub use edit::GraphEdit;
 pub use error::PlanError;
 pub use in_process::{Execution, run_in_process};
 pub use key::NodeKey;
-use many::part_label;
-pub use many::{MAX_PART_NAME_BYTES, Many, Next, Part, PartFailure, Parts, split_label};
+pub use many::{Many, Next, Part, PartFailure, Parts};
 pub use node::{
     FailureReason, Input, MAX_INPUTS, MAX_NAME_BYTES, MAX_PARAMETER_BYTES, NodeFailure, NodeId, NodeSpec, Placement,
     WorkerId,
 };
+pub use part_label::{MAX_PART_NAME_BYTES, split_label};
 pub use planner::Planner;
 pub use registry::{NodeType, Registry};
 pub use state::{Change, Completion, Graph, NodeState};

@@ -1,4 +1,4 @@
-//! What a node is: its description, its place and the ways it can fail.
+//! Nodes: their description, their placement and their failures.
 
 use std::fmt;
 
@@ -9,7 +9,7 @@ use super::BlobHash;
 /// The longest `kind` and `label`, in bytes.
 pub const MAX_NAME_BYTES: usize = 256;
 
-/// The largest `parameters` of a node, in bytes (1 MiB): an assignment has to fit into one frame of the wire.
+/// The largest `parameters` of a node, in bytes (1 MiB): an assignment must fit into one frame of the protocol.
 pub const MAX_PARAMETER_BYTES: usize = 1 << 20;
 
 /// The most inputs of one node.
@@ -25,7 +25,7 @@ impl fmt::Display for NodeId {
     }
 }
 
-/// One connection of one worker process; a worker that reconnects gets a new one. Never used twice in a run.
+/// One connection of one worker process; a worker that reconnects gets a new number. Numbers are not reused within a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct WorkerId(pub u64);
 
@@ -54,7 +54,7 @@ pub enum Input {
 }
 
 impl Input {
-    /// The node whose output it is.
+    /// The node whose output this input is.
     #[must_use]
     pub fn node(&self) -> Option<NodeId> {
         match *self {
@@ -69,50 +69,50 @@ impl Input {
 pub struct NodeSpec {
     /// The name of its [`NodeType`](super::NodeType), at most [`MAX_NAME_BYTES`].
     pub kind: String,
-    /// What people read, such as `search gamma 1.3`; at most [`MAX_NAME_BYTES`]; reaches no result.
+    /// For people, such as `search gamma 1.3`; at most [`MAX_NAME_BYTES`]. Does not affect any result.
     pub label: String,
-    /// Small parameters, encoded as the node type wants them; at most [`MAX_PARAMETER_BYTES`].
+    /// Small parameters in the encoding of the node type; at most [`MAX_PARAMETER_BYTES`].
     pub parameters: Vec<u8>,
-    /// Input blobs in the order in which the node type gets them; at most [`MAX_INPUTS`].
+    /// Inputs in the order in which the node type receives them; at most [`MAX_INPUTS`].
     pub inputs: Vec<Input>,
     /// Where it runs.
     pub placement: Placement,
-    /// Of the nodes that are ready, those of the lowest number run first, and of these the ones that were added first. Reaches no
-    /// result. In a run of [`Many`](super::Many) planners it is the number of the part.
+    /// Ready nodes run in ascending order of priority, then in the order in which they were added. Does not affect any result. In a run
+    /// of [`Many`](super::Many) planners it is the number of the part.
     pub priority: u32,
 }
 
-/// Why a node gave no output. Nodes are pure functions, so it is never retried.
+/// Why an execution of a node has no output. It is not retried, because nodes are pure functions.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum NodeFailure {
-    /// The node cannot compute its output: its inputs do not allow one.
+    /// The node cannot compute an output from its inputs.
     #[error("{message}")]
     Application {
         /// What is wrong and what to do about it: lower case, no full stop.
         message: String,
     },
-    /// The node panicked: a mistake in the program, whatever its inputs are.
+    /// The node panicked: a bug in the program, regardless of the inputs.
     #[error("it panicked: {message}; this is a bug in lookalike, please report it")]
     Panicked {
-        /// What the panic said.
+        /// The message of the panic.
         message: String,
     },
-    /// The process that should run the node has no node type of its kind: a mistake in the program, or another build.
+    /// The process that should run the node has no node type of its kind: a bug in the program, or a different build.
     #[error(
-        "{message}; this is a bug in lookalike, please report it, unless coordinator and worker are not of one build"
+        "{message}; this is a bug in lookalike, please report it, unless coordinator and worker are different builds"
     )]
     UnknownKind {
-        /// Which kind, and which there are.
+        /// The unknown kind, and the known ones.
         message: String,
     },
-    /// The node noticed that nobody wants its output any more and gave up. Not a failure of the run.
-    #[error("cancelled: its output is not wanted any more")]
+    /// The node stopped because its output is no longer needed. Not a failure of the run.
+    #[error("cancelled: its output is no longer needed")]
     Cancelled,
 }
 
 impl FailureReason {
-    /// Whether nothing went wrong: nobody wanted its output any more.
+    /// Whether this is a cancellation and not an error.
     #[must_use]
     pub fn is_cancellation(&self) -> bool {
         matches!(self, Self::Node(NodeFailure::Cancelled))
@@ -127,7 +127,7 @@ impl NodeFailure {
     }
 }
 
-/// Why a node has no output and never will.
+/// Why a node will never have an output.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum FailureReason {
@@ -136,8 +136,8 @@ pub enum FailureReason {
     Node(NodeFailure),
     /// Worker processes died while they executed it.
     #[error(
-        "{crashes} worker processes died while they executed it and nothing else; see their last lines on stderr, \
-         and whether memory ran out"
+        "{crashes} worker processes died while they executed it alone; see their last lines on stderr, \
+         and check whether memory ran out"
     )]
     Crashed {
         /// How many deaths were counted.

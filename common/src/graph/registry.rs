@@ -1,4 +1,4 @@
-//! Node types by name: a new kind of node is one implementation and one `with`.
+//! Node types by name. A new kind of node needs one implementation of [`NodeType`] and one call of [`Registry::with`].
 
 use std::any::Any;
 use std::collections::BTreeMap;
@@ -10,20 +10,20 @@ use super::{Blob, MAX_BLOB_BYTES, NodeFailure, RunContext};
 
 /// One kind of node: a pure function from parameters and input blobs to output bytes.
 ///
-/// Pure means bit for bit: the same parameters and inputs give the same bytes on any machine, with any number of
-/// threads, in any order. Results of two workers are compared, and a difference ends the run.
+/// Pure means that the same parameters and inputs give the same bytes on any machine, with any number of threads, in any order. Results
+/// of two workers are compared, and a difference ends the run.
 pub trait NodeType: Send + Sync {
-    /// The name by which specifications pick this type; at most [`MAX_NAME_BYTES`](super::MAX_NAME_BYTES).
+    /// The name of this type in specifications; at most [`MAX_NAME_BYTES`](super::MAX_NAME_BYTES).
     fn kind(&self) -> &'static str;
 
     /// Compute the output, at most [`MAX_BLOB_BYTES`] long. Runs on a rayon pool, so parallel iterators use its threads.
     ///
     /// # Errors
-    /// What makes an output impossible. It is shown to the user and never retried.
+    /// If there is no output for these inputs. The error is shown to the user; the node is not retried.
     fn run(&self, parameters: &[u8], inputs: &[Blob], context: &RunContext) -> Result<Vec<u8>, NodeFailure>;
 }
 
-/// The node types that a process can run. Coordinator and workers of a run hold the same ones.
+/// The node types that a process can run. Coordinator and workers of a run must have the same ones.
 #[derive(Clone, Default)]
 pub struct Registry {
     types: BTreeMap<&'static str, Arc<dyn NodeType>>,
@@ -33,7 +33,7 @@ impl Registry {
     /// This registry with one more node type.
     ///
     /// # Panics
-    /// When its kind is taken: two meanings of one name are a mistake in the program, not in its input.
+    /// If its kind is already registered, which is a bug in the program.
     #[must_use]
     pub fn with(mut self, node_type: impl NodeType + 'static) -> Self {
         let kind = node_type.kind();
@@ -47,10 +47,10 @@ impl Registry {
         self.types.keys().copied()
     }
 
-    /// Run one node and hash its output. A panic of the node becomes a failure: the process goes on.
+    /// Run one node and hash its output. A panic of the node is caught and becomes a failure.
     ///
     /// # Errors
-    /// What the node says; an unknown kind; a panic; an output beyond [`MAX_BLOB_BYTES`].
+    /// The failure of the node; an unknown kind; a panic; an output longer than [`MAX_BLOB_BYTES`].
     pub fn run(
         &self,
         kind: &str,
@@ -63,7 +63,7 @@ impl Registry {
             let message = format!("unknown node kind {kind:?}, this process knows {known:?}");
             return Err(NodeFailure::UnknownKind { message });
         };
-        // Unwind safety: a node only reads its arguments, and the context holds atomics and a cache that survives panics.
+        // Unwind safety: a node only reads its arguments; the context has atomics and a cache that tolerates panics.
         let output = catch_unwind(AssertUnwindSafe(|| node_type.run(parameters, inputs, context)))
             .unwrap_or_else(|panic| Err(NodeFailure::Panicked { message: panic_text(&*panic).to_owned() }))?;
         if output.len() > MAX_BLOB_BYTES {

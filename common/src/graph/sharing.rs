@@ -1,25 +1,25 @@
-//! Who holds what, where several planners share a graph: nodes that are the same are run once, and go when the last planner
-//! that asked for them has let go of them.
+//! Which planner holds which nodes and blobs, if several planners share a graph. Equal nodes run once, and are released with the last
+//! planner that holds them.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
-use super::{Blob, BlobHash, Graph, Input, NodeId, NodeSpec, Placement, PlanError};
+use super::{Blob, BlobHash, Graph, Input, NodeId, NodeSpec, Placement, PlanError, part_label::part_label};
 
 /// The number of a planner among those that share a graph.
 pub(super) type PartId = u32;
 
-/// The books of all planners.
+/// The nodes and blobs of all planners.
 #[derive(Debug, Default)]
 pub(super) struct Sharing {
-    /// Nodes by what decides their output.
+    /// Nodes by the hash of everything that determines their output and placement.
     by_key: BTreeMap<BlobHash, NodeId>,
     nodes: BTreeMap<NodeId, Shared>,
     holdings: BTreeMap<PartId, Holdings>,
-    /// Nodes that were complete before a planner asked for them: it has to be told.
+    /// Nodes that had completed before a planner added them; the planner must still be notified.
     late: VecDeque<(PartId, NodeId)>,
-    /// Everything that planners whose results are not safe have ever asked for.
+    /// All nodes that planners have ever added, for the planners whose results are not safe yet.
     asked: BTreeMap<PartId, BTreeSet<NodeId>>,
-    /// How many of these planners have asked for a node.
+    /// How many of these planners have added a node.
     users: BTreeMap<NodeId, usize>,
 }
 
@@ -27,48 +27,48 @@ pub(super) struct Sharing {
 #[derive(Debug)]
 struct Shared {
     key: BlobHash,
-    /// In the order in which they asked for it.
+    /// The parts that hold it, in the order in which they added it.
     parts: Vec<PartId>,
-    /// Whether its end was told to those who held it then.
-    is_told: bool,
+    /// Whether it has ended and its holders were notified.
+    is_notified: bool,
 }
 
-/// What a planner holds.
+/// The nodes and blobs that a planner holds.
 #[derive(Debug, Default)]
 struct Holdings {
     nodes: BTreeSet<NodeId>,
     blobs: BTreeSet<BlobHash>,
-    /// Nodes of whose end it has not been told.
+    /// Nodes whose end it was not notified of.
     awaited: BTreeSet<NodeId>,
 }
 
 impl Sharing {
-    /// The planners that wait for the end of a node, which will not be told again.
+    /// The planners to notify of the end of a node. Called once per node.
     pub(super) fn end(&mut self, node: NodeId) -> Vec<PartId> {
         let Some(shared) = self.nodes.get_mut(&node) else { return Vec::new() };
-        shared.is_told = true;
+        shared.is_notified = true;
         shared.parts.clone()
     }
 
-    /// A planner that is to be told of the completion of a node that it asked for too late.
+    /// A planner to notify of a node that had completed before the planner added it.
     pub(super) fn next_late(&mut self) -> Option<(PartId, NodeId)> {
         self.late.pop_front()
     }
 
-    /// A planner was told of the end of a node.
-    pub(super) fn told(&mut self, part: PartId, node: NodeId) {
+    /// A planner was notified of the end of a node.
+    pub(super) fn notified(&mut self, part: PartId, node: NodeId) {
         if let Some(holdings) = self.holdings.get_mut(&part) {
             holdings.awaited.remove(&node);
         }
     }
 
-    /// Whether a planner waits for nothing any more.
+    /// Whether a planner waits for no node.
     pub(super) fn is_idle(&self, part: PartId) -> bool {
         self.holdings.get(&part).is_none_or(|holdings| holdings.awaited.is_empty())
     }
 
-    /// What a planner has made of its nodes is safe: nodes that no other one has asked for, or only such whose results are safe too,
-    /// are forgotten.
+    /// The result of a planner is safe: the outputs of its nodes are forgotten, except nodes that a planner has added whose result is not
+    /// safe yet.
     pub(super) fn settle(&mut self, part: PartId, graph: &mut Graph) {
         for node in self.asked.remove(&part).unwrap_or_default() {
             let Some(users) = self.users.get_mut(&node) else { continue };
@@ -80,14 +80,14 @@ impl Sharing {
         }
     }
 
-    /// A planner asks for a node.
+    /// Records that a planner adds a node.
     fn ask(&mut self, part: PartId, node: NodeId) {
         if self.asked.entry(part).or_default().insert(node) {
             *self.users.entry(node).or_default() += 1;
         }
     }
 
-    /// A planner needs nothing any more.
+    /// Releases everything that a planner holds.
     pub(super) fn release_all(&mut self, part: PartId, graph: &mut Graph) {
         let Some(holdings) = self.holdings.remove(&part) else { return };
         self.late.retain(|(other, _)| *other != part);
@@ -98,7 +98,7 @@ impl Sharing {
         holdings.blobs.into_iter().for_each(|hash| graph.release_blob(hash));
     }
 
-    /// Strike a planner off those that hold a node.
+    /// Removes a planner from the holders of a node.
     fn forget(&mut self, part: PartId, node: NodeId) {
         let Some(shared) = self.nodes.get_mut(&node) else { return };
         shared.parts.retain(|other| *other != part);
@@ -112,13 +112,13 @@ impl Sharing {
         }
     }
 
-    /// An edit on behalf of a planner, whose labels get its name in front.
+    /// The access of a planner; its name is put in front of labels.
     pub(super) fn part<'part>(&'part mut self, part: PartId, name: &'part str) -> PartEdit<'part> {
         PartEdit { sharing: self, part, name }
     }
 }
 
-/// What edits a graph on behalf of one planner, and keeps the books.
+/// Edits a graph on behalf of one planner, and records what the planner holds.
 #[derive(Debug)]
 pub(super) struct PartEdit<'part> {
     sharing: &'part mut Sharing,
@@ -145,18 +145,18 @@ impl PartEdit<'_> {
         if let Some(node) = self.join(graph, key) {
             return Ok(node);
         }
-        let label = super::part_label(self.name, &spec.label);
+        let label = part_label(self.name, &spec.label);
         let node = graph.add_node(NodeSpec { label, priority: part, ..spec })?;
         self.sharing.by_key.insert(key, node);
-        self.sharing.nodes.insert(node, Shared { key, parts: vec![part], is_told: false });
+        self.sharing.nodes.insert(node, Shared { key, parts: vec![part], is_notified: false });
         self.sharing.ask(part, node);
         self.holdings().nodes.insert(node);
         self.holdings().awaited.insert(node);
         Ok(node)
     }
 
-    /// Hold the node of this key that another part has added, if its output can still be had. A planner that adds two equal nodes
-    /// gets two, as it would alone.
+    /// Holds the node of this key that another part has added, if its output is still available. A planner that adds two equal nodes gets
+    /// two nodes, as it would alone.
     fn join(&mut self, graph: &mut Graph, key: BlobHash) -> Option<NodeId> {
         let node = *self.sharing.by_key.get(&key)?;
         if self.holdings().nodes.contains(&node) || !graph.hold(node) {
@@ -168,7 +168,7 @@ impl PartEdit<'_> {
         self.holdings().awaited.insert(node);
         let shared = self.sharing.nodes.get_mut(&node)?;
         shared.parts.push(part);
-        if shared.is_told {
+        if shared.is_notified {
             self.sharing.late.push_back((part, node));
         }
         Some(node)
@@ -191,7 +191,7 @@ impl PartEdit<'_> {
     }
 }
 
-/// The name of everything that decides the output of a node, and of its place, for a planner may want it in another.
+/// The hash of everything that determines the output of a node, and of its placement, because two planners may need different ones.
 fn key(spec: &NodeSpec) -> BlobHash {
     let mut hasher = blake3::Hasher::new();
     let mut field = |bytes: &[u8]| {

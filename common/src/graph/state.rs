@@ -1,10 +1,9 @@
-//! The graph itself: nodes, their states, the blobs, and the changes that its owner has not yet looked at.
+//! The graph itself: nodes, their states, the blobs, and the queue of changes that its owner has not read.
 //!
-//! A node is *held* by whoever added it until it is released, and so is a blob. What nobody holds is not kept: an output or a blob
-//! goes with the last open node that reads it, an open node is cancelled with the last open node that waits for it.
+//! A node or a blob is *held* from its addition until its release. A blob or an output that is not held is dropped when the last open
+//! node that reads it closes. An open node that is not held is cancelled when the last open node that waits for it closes.
 //!
-//! Inputs can only name nodes that exist, so the graph has no cycles by construction and drains by itself: as long as a
-//! node is open, some node is ready.
+//! Inputs can only name existing nodes, so the graph has no cycles, and as long as a node is open, some node is ready.
 
 use std::collections::VecDeque;
 
@@ -13,51 +12,51 @@ use super::{
     NodeId, NodeKey, NodeSpec, Placement, PlanError, store::BlobStore,
 };
 
-/// Where a node is on its way.
+/// The state of a node.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum NodeState {
-    /// Some input is not there yet.
+    /// Some input is missing.
     Waiting,
-    /// All inputs are there; it may run, or is running.
+    /// All inputs are available; it can run, or is running.
     Ready,
-    /// It has an output, the blob of this name.
+    /// It has an output, the blob of this hash.
     Completed(BlobHash),
-    /// It has no output and never will.
+    /// It will never have an output.
     Failed(FailureReason),
 }
 
-/// Something that happened to a node, in the order in which it happened.
+/// A change of a node. Changes are queued in the order in which they happened.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Change {
     /// It was added.
     Added(NodeId),
-    /// Its inputs are all there.
+    /// All its inputs are available.
     Ready(NodeId),
-    /// Its output is there.
+    /// It has an output.
     Completed(NodeId),
-    /// It failed, itself or through an input.
+    /// It failed, or an input of it failed.
     Failed(NodeId),
-    /// Its output will never be needed again, not even by a run that begins anew from what this one has left.
+    /// Its output will never be needed again, not even when the run is resumed.
     Forgotten(NodeId),
 }
 
-/// What became of an output that was handed to [`Graph::complete`].
+/// The answer of [`Graph::complete`] to an output.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Completion {
     /// It is the node's output.
     Accepted,
-    /// The node already has this very output, bit for bit.
+    /// The node already has an output, which is equal bit for bit.
     Duplicate,
-    /// The node already has another output: some computation was not a pure function of its inputs.
+    /// The node already has a different output: one of the computations was wrong or not a pure function of its inputs.
     Different {
-        /// The output that came first and stays.
+        /// The first output, which is kept.
         first: BlobHash,
     },
-    /// The node has failed, or is waiting for inputs, or is unknown: it cannot have an output.
+    /// The node has failed, is waiting for inputs, or is unknown, so it cannot have an output.
     Refused,
 }
 
-/// The nodes of a run, the blobs they read and write, and the changes since the owner last asked.
+/// The nodes of a run, the blobs that they read and write, and the queue of unread changes.
 #[derive(Debug, Default)]
 pub struct Graph {
     nodes: Vec<Node>,
@@ -73,16 +72,16 @@ struct Node {
     state: NodeState,
     awaited_inputs: usize,
     dependents: Vec<NodeId>,
-    /// How many hold the node: each may read its output or add nodes that read it.
+    /// How often the node is held. A holder may read its output and add nodes that read it.
     holders: usize,
 }
 
-/// What the inputs of a new node are like.
+/// The inputs of a new node, by their state.
 #[derive(Default)]
 struct Inputs {
-    /// Blobs that are there.
+    /// Available blobs.
     read: Vec<BlobHash>,
-    /// Nodes that are open.
+    /// Open nodes.
     awaited: Vec<NodeId>,
     /// A node that has failed.
     failed: Option<NodeId>,
@@ -95,8 +94,8 @@ impl Graph {
         Self::default()
     }
 
-    /// Keep a blob until it is released, so that nodes can name it as an input. Equal bytes are kept once, and released as often
-    /// as they were added.
+    /// Hold a blob, so that nodes can name it as an input. Equal bytes are stored once, and must be released as often as they were
+    /// added.
     ///
     /// # Errors
     /// When it is longer than [`MAX_BLOB_BYTES`].
@@ -104,7 +103,7 @@ impl Graph {
         self.add(Blob::new(bytes))
     }
 
-    /// Keep a blob that was hashed before, as [`add_blob`](Self::add_blob) does.
+    /// As [`add_blob`](Self::add_blob), for a blob that is already hashed.
     ///
     /// # Errors
     /// When it is longer than [`MAX_BLOB_BYTES`].
@@ -115,15 +114,15 @@ impl Graph {
         Ok(hash)
     }
 
-    /// Hold a blob that was added no more: once no open node reads it, it is let go.
+    /// Release a blob that was added: it is dropped once no open node reads it.
     pub fn release_blob(&mut self, hash: BlobHash) {
         self.blobs.release(hash);
     }
 
-    /// Add a node, and hold it. It is ready at once if its inputs are there, and failed at once if one of them has failed.
+    /// Add a node, and hold it. It is ready at once if all its inputs are available, and failed at once if one of them has failed.
     ///
     /// # Errors
-    /// When an input is unknown or was released, or a size limit is passed.
+    /// If an input is unknown or was released, or a size limit is exceeded.
     pub fn add_node(&mut self, spec: NodeSpec) -> Result<NodeId, PlanError> {
         check_limit("kind", spec.kind.len(), MAX_NAME_BYTES)?;
         check_limit("label", spec.label.len(), MAX_NAME_BYTES)?;
@@ -172,7 +171,7 @@ impl Graph {
         Ok(Inputs { read, awaited, failed })
     }
 
-    /// Hold a node once more, unless it is too late: it has failed, or its output was let go. Whether it is held.
+    /// Hold a node once more. Returns false, without effect, if it has failed or its output was dropped.
     pub fn hold(&mut self, node: NodeId) -> bool {
         let output = match self.state(node) {
             Some(NodeState::Completed(hash)) if self.blob(*hash).is_some() => Some(*hash),
@@ -187,8 +186,8 @@ impl Graph {
         true
     }
 
-    /// Hold a node once less. When nobody holds it any more, its output is let go once no open node reads it; an open node is
-    /// cancelled unless another open node waits for it.
+    /// Release a node once. After the last release, its output is dropped once no open node reads it, and an open node is cancelled
+    /// unless another open node waits for it.
     pub fn release(&mut self, node: NodeId) {
         let Some(held) = self.get_mut(node) else { return };
         if held.holders == 0 {
@@ -204,14 +203,14 @@ impl Graph {
         }
     }
 
-    /// Whether a node is open though nobody holds it and no open node waits for it.
+    /// Whether a node is open, is not held, and no open node waits for it.
     fn is_unwanted(&self, node: NodeId) -> bool {
         let is_awaited = |held: &Node| held.dependents.iter().any(|dependent| self.is_open(*dependent));
         self.is_open(node) && self.get(node).is_some_and(|held| held.holders == 0 && !is_awaited(held))
     }
 
-    /// Say that the output of a completed node will never be needed again, not even by a run that begins anew from what this one has
-    /// left. It has to be released as well.
+    /// Declare that the output of a completed node will never be needed again, not even when the run is resumed. This does not release
+    /// the node.
     pub fn forget(&mut self, node: NodeId) {
         if matches!(self.state(node), Some(NodeState::Completed(_))) {
             self.changes.push_back(Change::Forgotten(node));
@@ -225,14 +224,14 @@ impl Graph {
         self.changes.push_back(Change::Ready(node));
     }
 
-    /// Close an open node: what it reads may go.
+    /// Close an open node and release its inputs.
     fn close(&mut self, node: NodeId, state: NodeState) {
         let closed = self.at_mut(node);
         let was_ready = closed.state == NodeState::Ready && closed.spec.placement == Placement::Worker;
         closed.state = state;
         self.open -= 1;
         self.ready_for_workers -= usize::from(was_ready);
-        // The specification stays where it is while its inputs are looked at.
+        // Take the inputs out of the node, because the loop borrows the graph; they are put back below.
         let inputs = std::mem::take(&mut self.at_mut(node).spec.inputs);
         for input in &inputs {
             match *input {
@@ -248,7 +247,7 @@ impl Graph {
         self.at_mut(node).spec.inputs = inputs;
     }
 
-    /// Hand in an output of a node. Any computation of a ready node will do: all of them are equal.
+    /// Take an output of a node. It may come from any computation of the node, because all of them are equal.
     pub fn complete(&mut self, node: NodeId, output: Blob) -> Completion {
         match self.state(node) {
             Some(NodeState::Ready) => {}
@@ -274,11 +273,11 @@ impl Graph {
         Completion::Accepted
     }
 
-    /// Close an open node without an output, and with it every node that waits for it; what only they were waiting for and nobody
-    /// holds is cancelled. Does nothing to a closed node.
+    /// Fail an open node and every node that waits for it. Nodes that are not held and that only these were waiting for are cancelled.
+    /// No effect on a closed node.
     pub fn fail(&mut self, node: NodeId, reason: FailureReason) {
         let mut failing = VecDeque::from([(node, reason)]);
-        // The inputs of what has failed.
+        // Inputs of the failed nodes.
         let mut inputs = Vec::new();
         loop {
             while let Some((node, reason)) = failing.pop_front() {
@@ -299,7 +298,7 @@ impl Graph {
         }
     }
 
-    /// The oldest change that was not looked at yet.
+    /// Takes the oldest unread change.
     pub fn next_change(&mut self) -> Option<Change> {
         self.changes.pop_front()
     }
@@ -316,7 +315,7 @@ impl Graph {
         Some(&self.get(node)?.spec)
     }
 
-    /// The output of a completed node, unless it was let go.
+    /// The output of a completed node, unless it was dropped.
     #[must_use]
     pub fn output(&self, node: NodeId) -> Option<&Blob> {
         match self.state(node)? {
@@ -325,7 +324,7 @@ impl Graph {
         }
     }
 
-    /// A blob by its name.
+    /// A blob by its hash.
     #[must_use]
     pub fn blob(&self, hash: BlobHash) -> Option<&Blob> {
         self.blobs.get(hash)
@@ -341,7 +340,7 @@ impl Graph {
         self.get(node)?.spec.inputs.iter().map(blob_of).collect()
     }
 
-    /// What a node computes; `None` while an input is missing. It stays the same when blobs are gone.
+    /// The key of what a node computes; `None` while an input has no output. It remains available after blobs are dropped.
     #[must_use]
     pub fn key(&self, node: NodeId) -> Option<NodeKey> {
         let spec = self.spec(node)?;
@@ -362,13 +361,13 @@ impl Graph {
         matches!(self.state(node), Some(NodeState::Waiting | NodeState::Ready))
     }
 
-    /// How many nodes are ready or running, of those that workers run.
+    /// How many nodes placed on workers are ready or running.
     #[must_use]
     pub fn ready_for_workers(&self) -> usize {
         self.ready_for_workers
     }
 
-    /// The size of all blobs that are kept, in bytes. Looks at every one of them.
+    /// The size of all stored blobs, in bytes; takes time linear in their number.
     #[must_use]
     pub fn blob_bytes(&self) -> usize {
         self.blobs.bytes()
@@ -386,7 +385,7 @@ impl Graph {
         self.nodes.is_empty()
     }
 
-    /// Whether no node is open and no change is unread: nothing more can happen.
+    /// Whether no node is open and no change is unread, so that the run is over.
     #[must_use]
     pub fn is_drained(&self) -> bool {
         self.open == 0 && self.changes.is_empty()
@@ -405,7 +404,7 @@ impl Graph {
         self.nodes.get_mut(usize::try_from(node.0).ok()?)
     }
 
-    /// A node that is known to exist because this graph itself wrote its number down.
+    /// A node that is known to exist because its number comes from this graph.
     fn at_mut(&mut self, node: NodeId) -> &mut Node {
         let index = usize::try_from(node.0).unwrap_or(usize::MAX);
         &mut self.nodes[index]

@@ -1,10 +1,10 @@
-//! The blobs of a graph, each with a count of who needs it: the last one to let go of it frees it.
+//! The blobs of a graph, each with a reference count; a blob is dropped when its count reaches 0.
 
 use std::collections::BTreeMap;
 
 use super::{Blob, BlobHash};
 
-/// Blobs by name. Equal bytes are kept once.
+/// Blobs by hash. Equal bytes are stored once.
 #[derive(Debug, Default)]
 pub(super) struct BlobStore {
     held: BTreeMap<BlobHash, Held>,
@@ -13,27 +13,27 @@ pub(super) struct BlobStore {
 #[derive(Debug)]
 struct Held {
     blob: Blob,
-    /// One for every time it was added or is an output that is held, and one for every open node that reads it, as often as it
-    /// does.
+    /// One for every time it was added, one for every held node whose output it is, and one for every time it is an input of an open
+    /// node.
     uses: usize,
 }
 
 impl BlobStore {
-    /// Need a blob once more.
+    /// Add `uses` to the count of a blob, and store the blob if it is new.
     pub(super) fn add(&mut self, blob: Blob, uses: usize) {
         if uses > 0 {
             self.held.entry(blob.hash()).or_insert(Held { blob, uses: 0 }).uses += uses;
         }
     }
 
-    /// Need a blob that is here once more; nothing happens if it is not.
+    /// Add 1 to the count of a stored blob; no effect on an unknown one.
     pub(super) fn retain(&mut self, hash: BlobHash) {
         if let Some(held) = self.held.get_mut(&hash) {
             held.uses += 1;
         }
     }
 
-    /// Need a blob once less.
+    /// Subtract 1 from the count of a blob.
     pub(super) fn release(&mut self, hash: BlobHash) {
         if let Some(held) = self.held.get_mut(&hash) {
             held.uses -= 1;
@@ -43,12 +43,12 @@ impl BlobStore {
         }
     }
 
-    /// A blob by its name.
+    /// A blob by its hash.
     pub(super) fn get(&self, hash: BlobHash) -> Option<&Blob> {
         self.held.get(&hash).map(|held| &held.blob)
     }
 
-    /// The size of all blobs together.
+    /// The size of all blobs together, in bytes.
     pub(super) fn bytes(&self) -> usize {
         self.held.values().map(|held| held.blob.len()).sum()
     }

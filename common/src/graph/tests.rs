@@ -3,7 +3,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use super::*;
 
-/// Adds up its parameters and all bytes of its inputs; the sum as eight bytes.
+/// Outputs the sum of its parameters and of all bytes of its inputs, as eight bytes.
 struct Sum;
 
 impl NodeType for Sum {
@@ -18,7 +18,7 @@ impl NodeType for Sum {
     }
 }
 
-/// Fails or panics, as its parameters say.
+/// Fails or panics, depending on its parameters.
 struct Trouble;
 
 impl NodeType for Trouble {
@@ -32,7 +32,7 @@ impl NodeType for Trouble {
     }
 }
 
-/// Fans out over a blob, then adds one node that joins the outputs, then stops.
+/// Adds one node per byte of a blob, then one node that joins their outputs.
 #[derive(Default)]
 struct FanOut {
     width: u8,
@@ -83,13 +83,13 @@ fn changes(graph: &mut Graph) -> Vec<Change> {
 fn planner_that_adds_nodes_runs_to_its_end_in_both_orders() {
     for execution in [Execution::Sequential, Execution::Parallel] {
         let planner = run_in_process(FanOut { width: 5, ..FanOut::default() }, &registry(), execution).unwrap();
-        // The leaves give 10, 11, 12, 13, 14, each one low byte: their join is 60.
+        // The leaves output 10, 11, 12, 13 and 14, so their join is 60.
         assert_eq!(planner.total, Some(60), "{execution:?}");
     }
 }
 
 #[test]
-fn node_becomes_ready_when_its_last_input_is_there() {
+fn node_becomes_ready_when_its_last_input_is_available() {
     let mut graph = Graph::new();
     let first = graph.add_node(spec("sum", &[1], vec![])).unwrap();
     let second = graph.add_node(spec("sum", &[2], vec![])).unwrap();
@@ -109,7 +109,7 @@ fn node_becomes_ready_when_its_last_input_is_there() {
 }
 
 #[test]
-fn key_of_a_node_is_known_with_its_inputs_and_does_not_know_its_number() {
+fn key_of_a_node_depends_on_its_inputs_and_not_on_its_number() {
     let join_of = |outputs: [u8; 2], labels: [&str; 2]| {
         let mut graph = Graph::new();
         let leaves = labels.map(|label| graph.add_node(NodeSpec { label: label.into(), ..spec("sum", &[1], vec![]) }));
@@ -141,7 +141,7 @@ fn second_output_is_compared_bit_for_bit() {
 }
 
 #[test]
-fn failure_takes_along_every_node_that_waits_for_it() {
+fn failure_fails_every_node_that_waits_for_it() {
     let mut graph = Graph::new();
     let root = graph.add_node(spec("trouble", &[], vec![])).unwrap();
     let child = graph.add_node(spec("sum", &[], vec![Input::OutputOf(root)])).unwrap();
@@ -222,7 +222,7 @@ fn input_is_decoded_once_per_type_and_kept_within_the_bound() {
     let as_text = cache.get_or_decode(&small, |bytes| Ok::<_, NodeFailure>(format!("{}", bytes.len()))).unwrap();
     assert_eq!(*as_text, "40");
     decode(&medium);
-    // 40 (number) + 40 (text) + 50 is beyond 100: the number of `small` was used longest ago.
+    // 40 (number) + 40 (text) + 50 is over 100: the number of `small` is the least recently used.
     decode(&small);
     assert_eq!(decodings.load(Ordering::Relaxed), 3);
     assert_eq!(*decode(&large), 60);
@@ -248,7 +248,7 @@ fn context_tells_cancellation_and_progress() {
 }
 
 #[test]
-fn outputs_go_when_nobody_holds_them_and_the_last_reader_is_done() {
+fn outputs_are_dropped_when_they_are_not_held_and_the_last_reader_is_done() {
     let mut graph = Graph::new();
     let blob = graph.add_blob(vec![1; 100]).unwrap();
     assert_eq!(graph.add_blob(vec![1; 100]).unwrap(), blob);
@@ -263,7 +263,7 @@ fn outputs_go_when_nobody_holds_them_and_the_last_reader_is_done() {
     assert_eq!(graph.input_blobs(second).unwrap().len(), 2);
     graph.complete(second, Blob::new(vec![8; 3]));
     assert_eq!((graph.blob_bytes(), graph.output(first)), (3, None));
-    // Its name stays, to compare a second output with.
+    // Its hash remains, to compare a second output with it.
     assert_eq!(graph.complete(first, Blob::new(vec![7; 10])), Completion::Duplicate);
     let late = graph.add_node(spec("sum", &[3], vec![Input::OutputOf(first)]));
     assert!(matches!(late, Err(PlanError::Released { node, .. }) if node == first));
@@ -276,7 +276,7 @@ fn outputs_go_when_nobody_holds_them_and_the_last_reader_is_done() {
 }
 
 #[test]
-fn open_nodes_that_nobody_wants_are_cancelled_with_what_only_they_waited_for() {
+fn unneeded_open_nodes_are_cancelled_with_the_inputs_of_only_these() {
     let mut graph = Graph::new();
     let [shared, own] = [1, 2].map(|byte| graph.add_node(spec("sum", &[byte], vec![])).unwrap());
     let both = [shared, own].map(Input::OutputOf).to_vec();
@@ -299,7 +299,7 @@ fn open_nodes_that_nobody_wants_are_cancelled_with_what_only_they_waited_for() {
 }
 
 #[test]
-fn failure_lets_go_of_what_was_read_and_cancels_what_nobody_holds() {
+fn failure_drops_inputs_and_cancels_nodes_that_are_not_held() {
     let mut graph = Graph::new();
     let blob = graph.add_blob(vec![1; 100]).unwrap();
     let held = graph.add_node(spec("sum", &[1], vec![])).unwrap();

@@ -139,6 +139,15 @@ impl Mapping {
     }
 }
 
+impl crate::choice::Choice for Mapping {
+    const TABLE: &'static [(Self, &'static str, &'static str)] = &[
+        (Self::LatLong, "latlong", "Latitude and longitude (equirectangular), 2:1; the image's centre is +Z"),
+        (Self::Cross, "cross", "Vertical cross of the six faces of a cube, 3:4"),
+        (Self::Angular, "angular", "Debevec's angular map, square"),
+        (Self::MirrorBall, "mirror-ball", "A mirror ball as this camera sees it, square"),
+    ];
+}
+
 impl std::fmt::Display for Mapping {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str(self.name())

@@ -1,5 +1,5 @@
-//! `appraise`: what studies ask of given parameter vectors: their CSSIM, and Eq. 1, with the tangent below its knee, over all pixels that
-//! the object covers wholly, for some gammas.
+//! `appraise`: scores given parameter vectors, for studies: CSSIM, and Eq. 1 (with the tangent below its knee) for several gammas over
+//! all pixels that the object covers completely.
 //!
 //! Inputs: the view; the shards of the full-resolution table, in order.
 

@@ -1,7 +1,7 @@
 //! `brute-force`: the baseline of studies, pattern search on CSSIM at full resolution from one start.
 //!
-//! Inputs: the view; then the shards of the full-resolution table over the model's whole range of widths, or, for renderings by the direct
-//! integrator, the environment, and the normal map, if the surface has one.
+//! Inputs: the view; then the shards of the full-resolution table over the model's whole range of widths. With the direct integrator,
+//! instead of the shards: the environment, and the normal map if the surface has one.
 
 use super::{
     search::{DirectScene, DirectWire},
@@ -23,7 +23,7 @@ use std::ops::ControlFlow;
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(crate) struct BruteForceParameters {
     pub(crate) start: Vec<f64>,
-    /// Most evaluations; 0 leaves the limit to the search.
+    /// Most evaluations; 0 for the limit of the search.
     pub(crate) max_evaluations: u32,
     pub(crate) direct: Option<DirectWire>,
 }
@@ -56,7 +56,7 @@ impl NodeType for BruteForce {
                 search(&parameters, &view, context, &|point| direct_image(&view, &scene, point))?
             }
         };
-        // A search that was told to stop is not a result.
+        // A cancelled search has no result.
         context.check()?;
         write("brute force", &outcome)
     }
@@ -79,11 +79,11 @@ fn search(
     let minimum = brute_force(view.model, value, &parameters.start, limit, &mut observe)
         .map_err(|error| NodeFailure::new(format!("brute force: {error}")))?;
     let score =
-        score(&minimum.point).ok_or_else(|| NodeFailure::new("brute force ended where nothing can be scored"))?;
+        score(&minimum.point).ok_or_else(|| NodeFailure::new("brute force ended at a point that cannot be scored"))?;
     Ok(PolishedWire::of_minimum(minimum, &score))
 }
 
-/// The image of a flat parameter vector over black by the direct integrator; `None` where there is no such material.
+/// The image of a flat parameter vector over black by the direct integrator; `None` for parameters outside the model.
 fn direct_image(view: &View, scene: &DirectScene, parameters: &[f64]) -> Option<Image> {
     let material = Material::new(view.model, parameters.to_vec()).ok()?;
     let DirectScene { geometry, light, samples, seed } = scene;

@@ -1,4 +1,4 @@
-//! `explore`: searches on CSSIM over a coarse picture from very different lobes; its parameters and its output are those of `polish`.
+//! `explore`: searches on CSSIM over a coarse picture from several very different lobes. Parameters and output are those of `polish`.
 
 use super::{PolishParameters, view::Scene};
 use crate::{
@@ -21,7 +21,7 @@ impl NodeType for Explore {
         let scene = Scene::read(inputs, context)?;
         starts.iter().try_for_each(|start| check_parameters("starts", scene.view.model, start))?;
         let total = u64::from(max_evaluations) * starts.len() as u64;
-        // Evaluations of earlier starts, and of this one so far: a new start begins to count from 1.
+        // Evaluations of the earlier starts, and of the current one so far: the search counts from 1 again at every start.
         let (mut before, mut last) = (0, 0);
         let mut observe = |progress: &crate::search::Progress<'_>| {
             let now = progress.evaluations as u64;
@@ -35,7 +35,7 @@ impl NodeType for Explore {
         let (view, limit) = (scene.full(), max_evaluations as usize);
         let found = explore(&view, &scene.view.judge, scene.view.by, &starts, limit, &mut observe)
             .map_err(|error| NodeFailure::new(format!("explore: {error}")))?;
-        // A search that was told to stop is not a result.
+        // A cancelled search has no result.
         context.check()?;
         write("explore", &PolishedWire::of(found))
     }

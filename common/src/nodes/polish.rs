@@ -1,4 +1,4 @@
-//! `polish`: stage three, a short search on CSSIM from the winner, or from what `explore` has found.
+//! `polish`: stage three, a short search on CSSIM from the winner or from the result of `explore`.
 
 use super::view::Scene;
 use crate::{
@@ -11,7 +11,7 @@ use std::ops::ControlFlow;
 
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(crate) struct PolishParameters {
-    /// What polish may start from: the best of them on this node's table.
+    /// Possible starts; the search starts from the best of them on this node's table.
     pub(crate) starts: Vec<Vec<f64>>,
     pub(crate) max_evaluations: u32,
 }
@@ -35,7 +35,7 @@ impl NodeType for Polish {
         let (view, limit) = (scene.full(), max_evaluations as usize);
         let polished = polish(&view, &scene.view.judge, scene.view.by, &starts, limit, &mut observe)
             .map_err(|error| NodeFailure::new(format!("polish: {error}")))?;
-        // A search that was told to stop is not a result.
+        // A cancelled search has no result.
         context.check()?;
         write("polish", &PolishedWire::of(polished))
     }

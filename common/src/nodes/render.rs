@@ -1,7 +1,7 @@
-//! `render`: a full image by the direct integrator, of a measured material or of a model: the photos of studies, and what one direct
-//! rendering costs.
+//! `render`: a full image by the direct integrator, of a measured material or of a model. Studies use it for their photos, and to
+//! measure the time of one direct rendering.
 //!
-//! Inputs: environment; for a measured material its file in MERL's format.
+//! Inputs: the environment; for a measured material, its file in MERL's format.
 
 use crate::{
     brdf::{self, Material, Reflectance, merl::MerlTable},
@@ -19,7 +19,7 @@ pub(crate) struct RenderParameters {
     pub(crate) geometry: GeometrySpec,
     pub(crate) samples: u32,
     pub(crate) seed: u64,
-    /// Model and flat parameters; else the second input is the material.
+    /// Model and flat parameters; `None` if the second input is a measured material.
     pub(crate) material: Option<(String, Vec<f64>)>,
 }
 

@@ -1,7 +1,7 @@
 //! `search`: stage one for one gamma on one pixel subset.
 //!
-//! Inputs: subset with the photo's values; the shards of its transport table, in order; for the direct integrator then the
-//! environment, and the normal map, if the surface has one.
+//! Inputs: the subset with the photo's values; the shards of its transport table, in order. With the direct integrator, after those: the
+//! environment, and the normal map if the surface has one.
 
 use super::view::concatenated;
 use crate::{
@@ -29,7 +29,7 @@ pub(crate) struct SearchParameters {
     pub(crate) direct: Option<DirectWire>,
 }
 
-/// [`Compress`].
+/// The wire form of [`Compress`].
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub(crate) enum CompressWire {
     Tangent,
@@ -93,7 +93,7 @@ impl DirectScene {
         Ok(Self { geometry, light, samples: wire.samples, seed: wire.seed })
     }
 
-    /// These pixels of it, all inside the image.
+    /// The renderer of these pixels, which must be inside the image.
     fn pixels<'a>(&'a self, pixels: &'a [Pixel]) -> Result<DirectPixels<'a>, NodeFailure> {
         let (geometry, light) = (&self.geometry, &*self.light);
         let outside = |p: &&Pixel| p[0] as usize >= geometry.width() || p[1] as usize >= geometry.height();

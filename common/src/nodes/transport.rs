@@ -1,6 +1,6 @@
 //! `transport` and `transport-full`: integrates the transport table of a range of pixels.
 //!
-//! Inputs: environment; list of pixels (an encoded `Vec<Pixel>`); normal map, if the surface has one.
+//! Inputs: the environment; the list of pixels (an encoded `Vec<Pixel>`); the normal map if the surface has one.
 
 use crate::{
     brdf,
@@ -21,7 +21,7 @@ pub(crate) struct TransportParameters {
     pub(crate) knots: KnotsWire,
     pub(crate) tolerance: f64,
     pub(crate) footprint: f64,
-    /// First pixel of the list, and how many.
+    /// Index of the first pixel in the list, and number of pixels.
     pub(crate) range: (u32, u32),
 }
 

@@ -1,7 +1,7 @@
-//! What the nodes share that render and score images (`select`, `explore`, `polish`, `report`, `brute-force`, `appraise`): the photo, the
-//! judge, and a table of its pixels.
+//! Common inputs of the nodes that render and score images (`select`, `explore`, `polish`, `report`, `brute-force`, `appraise`): the
+//! photo, the judge, and a table of the photo's pixels.
 //!
-//! Inputs of all: the view; the shards of the table, in order.
+//! Their inputs: the view; the shards of the table, in order.
 
 use crate::{
     brdf::{self, Model, lobe_terms},
@@ -20,12 +20,12 @@ use std::sync::Arc;
 pub(crate) struct ViewWire {
     pub(crate) model: String,
     pub(crate) photo: ImageWire,
-    /// One value in [0, 1] per pixel: renderings are multiplied by it, and pixels without it are not scored. A photo over black
-    /// holds its coverage already: to multiply it again would darken its edge against that of every rendering.
+    /// One value in [0, 1] per pixel. Renderings are multiplied by it, and pixels with coverage 0 are not scored. The photo is not
+    /// multiplied: it is over black, so its pixels contain the coverage already.
     pub(crate) coverage: Vec<f32>,
     pub(crate) exposure: f64,
     pub(crate) judge_object: bool,
-    /// The photo shows one pixel, the middle, of every square of so many columns and rows of the scene's pixels; 1 for all of them.
+    /// The photo has the middle pixel of every square of `stride` x `stride` pixels of the scene; 1 for all pixels.
     pub(crate) stride: u32,
     /// The pixels of the full-resolution table.
     pub(crate) pixels: Vec<Pixel>,
@@ -45,7 +45,7 @@ pub(super) struct View {
     pub(super) height: usize,
 }
 
-/// A view with the table that fills it.
+/// A view with the transport table of its pixels.
 #[derive(Debug)]
 pub(super) struct Scene {
     pub(super) view: Arc<View>,
@@ -92,7 +92,7 @@ impl View {
     }
 }
 
-/// The table of consecutive shards, made for the lobes of `model`.
+/// Joins consecutive shards into one table, which must be for the lobes of `model`.
 pub(super) fn concatenated(
     model: &dyn Model,
     shards: &[Blob],
@@ -106,7 +106,7 @@ pub(super) fn concatenated(
     joined(model, &tables)
 }
 
-/// The table of consecutive shards that are decoded already.
+/// As [`concatenated`], for shards that are already decoded.
 pub(crate) fn joined(model: &dyn Model, shards: &[&TransportTable]) -> Result<TransportTable, NodeFailure> {
     let fits = |table: &TransportTable| {
         let lobes = table.lobes.iter().zip(model.lobes());
@@ -117,7 +117,7 @@ pub(crate) fn joined(model: &dyn Model, shards: &[&TransportTable]) -> Result<Tr
     };
     TransportTable::concatenate(shards).filter(fits).ok_or_else(|| {
         NodeFailure::new(format!(
-            "the shards of a transport table do not belong together or to {}, or there are none",
+            "expected shards of one transport table of {}, found none or shards of different tables",
             model.name()
         ))
     })

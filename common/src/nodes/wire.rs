@@ -1,4 +1,4 @@
-//! Wire forms of the method's inputs and outputs: plain data, decoded into valid types or refused.
+//! Wire forms of the method's inputs and outputs: plain data, which is checked when it is decoded into the library's types.
 
 use crate::{
     brdf::{Model, flat_bounds},
@@ -18,7 +18,7 @@ use crate::{
 };
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 
-/// Decodes a payload; what is wrong with it becomes the node's failure.
+/// Decodes a payload; an error becomes the node's failure.
 pub(crate) fn read<T: DeserializeOwned>(what: &str, bytes: &[u8]) -> Result<T, NodeFailure> {
     decode(bytes).map_err(|error| NodeFailure::new(format!("{what}: {error}")))
 }
@@ -29,7 +29,7 @@ pub(crate) fn write<T: Serialize>(what: &str, value: &T) -> Result<Vec<u8>, Node
 }
 
 fn refused(what: &str, found: impl std::fmt::Display) -> NodeFailure {
-    NodeFailure::new(format!("{what}: {found}; were its bytes written by another version?"))
+    NodeFailure::new(format!("{what}: {found}; was it written by another version?"))
 }
 
 fn index(value: usize) -> u32 {
@@ -172,7 +172,7 @@ impl CandidateWire {
         }
     }
 
-    /// The candidate, once it is one of `model`: as many parameters as it has, finite and inside their bounds.
+    /// The candidate, after a check that its parameters are those of `model`: the right number, finite and inside their bounds.
     pub(crate) fn candidate(self, model: &dyn Model) -> Result<Candidate, NodeFailure> {
         check_parameters("candidate", model, &self.parameters)?;
         if !self.cost.is_finite() {
@@ -189,7 +189,7 @@ impl CandidateWire {
     }
 }
 
-/// The scores of the candidates, in their order: whole image, object.
+/// The scores of the candidates, in order: over the whole image, over the object.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct ScoresWire(pub(crate) Vec<(f64, f64)>);
 
@@ -222,7 +222,7 @@ impl PolishedWire {
         }
     }
 
-    /// A minimum that a pattern search on the score has found.
+    /// The minimum of a pattern search on the score.
     pub(crate) fn of_minimum(minimum: Minimum, score: &Score) -> Self {
         Self {
             parameters: minimum.point,
@@ -234,7 +234,7 @@ impl PolishedWire {
         }
     }
 
-    /// The outcome, once its parameters are some of `model`.
+    /// The outcome, after a check that its parameters are those of `model`.
     pub(crate) fn polished(self, model: &dyn Model) -> Result<Polished, NodeFailure> {
         check_parameters("polish", model, &self.parameters)?;
         Ok(Polished {
@@ -252,7 +252,7 @@ pub(crate) fn check_parameters(what: &str, model: &dyn Model, parameters: &[f64]
     let (lower, upper) = flat_bounds(model.parameters());
     let inside = parameters.iter().zip(lower.iter().zip(&upper)).all(|(p, (l, u))| (l..=u).contains(&p));
     if parameters.len() != lower.len() || !inside {
-        return Err(refused(what, format!("parameters {parameters:?} are none of {}", model.name())));
+        return Err(refused(what, format!("the parameters {parameters:?} do not fit {}", model.name())));
     }
     Ok(())
 }
@@ -303,10 +303,10 @@ mod tests {
             evaluations: 1,
             termination: "because".to_owned(),
         };
-        assert!(candidate.clone().candidate(&Ggx).unwrap_err().to_string().contains("none of ggx"));
+        assert!(candidate.clone().candidate(&Ggx).unwrap_err().to_string().contains("do not fit ggx"));
         let inside = CandidateWire { parameters: vec![0.5; 7], ..candidate };
         assert!(inside.clone().candidate(&Ggx).unwrap_err().to_string().contains("because"));
         let outside = CandidateWire { parameters: vec![f64::NAN; 7], ..inside };
-        assert!(outside.candidate(&Ggx).unwrap_err().to_string().contains("none of ggx"));
+        assert!(outside.candidate(&Ggx).unwrap_err().to_string().contains("do not fit ggx"));
     }
 }

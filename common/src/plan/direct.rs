@@ -1,33 +1,38 @@
-//! The direct integrator in a fit: what its searches read, and how their claims are checked.
+//! The direct integrator in a fit: the inputs of its searches, and the means to check their results.
 
-use super::{FitPlanner, add};
+use super::scene_tables::SceneTables;
 use crate::{
     fit::{DirectPixels, Integration},
     graph::{GraphEdit, Input, PlanError},
     light::LightDistribution,
-    nodes::{DirectWire, wire::ImageWire},
+    nodes::DirectWire,
     render::transport::Pixel,
 };
 use std::sync::Arc;
 
-impl FitPlanner {
-    /// What tells a search to render directly, and what it reads for that; nothing with tables.
+impl SceneTables {
+    /// How searches render by the direct integrator, and their further inputs; `None` and no inputs with tables.
     pub(super) fn direct_searches(
         &self,
         graph: &mut GraphEdit<'_>,
     ) -> Result<(Option<DirectWire>, Vec<Input>), PlanError> {
         let Integration::Direct { samples } = self.method.integration else { return Ok((None, Vec::new())) };
-        let geometry = self.capture.geometry();
-        let environment = self.environment.ok_or_else(|| PlanError::new("the environment was not added"))?;
-        let mut inputs = vec![Input::Blob(environment)];
-        if let Some(map) = geometry.normal_map() {
-            inputs.push(Input::Blob(add(graph, "normal map", &ImageWire::of(&map.to_image()))?));
-        }
-        let (geometry, has_normals) = (geometry.spec(), inputs.len() > 1);
-        Ok((Some(DirectWire { geometry, has_normals, samples, seed: self.method.seed }), inputs))
+        let (direct, inputs) = self.direct_scene(samples, graph)?;
+        Ok((Some(direct), inputs))
     }
 
-    /// The light as the direct integrator samples it, made once; `None` with tables.
+    /// How a node renders by the direct integrator, and its further inputs: the environment, and the normal map if there is one.
+    pub(super) fn direct_scene(
+        &self,
+        samples: u32,
+        graph: &mut GraphEdit<'_>,
+    ) -> Result<(DirectWire, Vec<Input>), PlanError> {
+        let inputs = self.light_and_normals(graph)?;
+        let (geometry, has_normals) = (self.capture.geometry().spec(), inputs.len() > 1);
+        Ok((DirectWire { geometry, has_normals, samples, seed: self.method.seed }, inputs))
+    }
+
+    /// The light with its sampling density for the direct integrator, computed once; `None` with tables.
     pub(super) fn distribution(&mut self) -> Option<Arc<LightDistribution>> {
         if self.method.integration == Integration::Tables {
             return None;
@@ -38,7 +43,7 @@ impl FitPlanner {
         ))
     }
 
-    /// These pixels of the capture by the direct integrator; `None` with tables.
+    /// The renderer of these pixels by the direct integrator; `None` with tables.
     pub(super) fn direct_pixels<'a>(
         &'a self,
         light: Option<&'a LightDistribution>,

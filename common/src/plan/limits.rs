@@ -1,6 +1,6 @@
-//! What a fit can take: photos, maps and subsets that fit into blobs and into memory.
+//! Size limits of a fit: photos, maps and subsets must fit into blobs and into memory.
 
-use super::FULL_SHARD;
+use super::tables::FULL_SHARD;
 use crate::{
     brdf::{Model, flat_bounds},
     fit::{Integration, Method, MethodError},
@@ -21,10 +21,10 @@ pub enum FitError {
     /// The photo has no light to fit to.
     #[error("every usable pixel of the photo is black: check the exposure of the photo and the place of the object")]
     Black,
-    /// More than the coordinator can check without letting its workers wait.
+    /// More samples per evaluation than the coordinator can check without blocking its event loop.
     #[error(
-        "--integrator direct with {pixels} pixels of {samples} samples each is more than the {MOST_DIRECT} samples per evaluation \
-         that a fit can take: use fewer --samples, or direct:N with a smaller N"
+        "--integrator direct with {pixels} pixels of {samples} samples each is more than the limit of {MOST_DIRECT} samples per \
+         evaluation: use fewer --samples, or direct:N with a smaller N"
     )]
     DirectTooLarge {
         /// Pixels of stage one.
@@ -32,24 +32,24 @@ pub enum FitError {
         /// Samples per pixel.
         samples: u32,
     },
-    /// A point that is none of the model's.
-    #[error("the parameters {point:?} are none of {model}")]
+    /// A point outside the model's parameter space.
+    #[error("the parameters {point:?} do not fit {model}: wrong number of values, or a value outside its bounds")]
     Point {
         /// As given.
         point: Vec<f64>,
         /// The model.
         model: &'static str,
     },
-    /// More than one message can carry.
-    #[error("{what} has {found} pixels, more than the {limit} that a fit can take: {remedy}")]
+    /// Larger than a blob or the memory can hold.
+    #[error("{what} has {found} pixels, more than the limit of {limit}: {remedy}")]
     TooLarge {
         /// What is too large.
         what: &'static str,
         /// Its pixels.
         found: usize,
-        /// The most there may be.
+        /// The largest number allowed.
         limit: usize,
-        /// What to do.
+        /// How to make it smaller.
         remedy: &'static str,
     },
 }
@@ -71,7 +71,7 @@ pub(super) fn check_points<'a>(
     Ok(())
 }
 
-/// Refuses what would not fit into a blob, or into memory, before any work is done.
+/// Refuses inputs that would not fit into a blob or into memory, before any work is done.
 pub(super) fn check_sizes(capture: &Capture, method: &Method) -> Result<(), FitError> {
     let size = |image: &Image| image.width() * image.height();
     let map = capture.environment();
@@ -98,14 +98,14 @@ pub(super) fn check_sizes(capture: &Capture, method: &Method) -> Result<(), FitE
     Ok(())
 }
 
-/// Most samples of one evaluation by the direct integrator, a second or less: the coordinator, which checks one evaluation of every
-/// search, hears nothing of its workers meanwhile.
+/// Most samples of one evaluation by the direct integrator, a second or less: the coordinator repeats one evaluation of every
+/// search, and its event loop is blocked meanwhile.
 const MOST_DIRECT: u64 = 1 << 20;
-/// Most pixels of a photo: its pictures (32 bytes per pixel) travel in one blob, its table in [`MAX_INPUTS`] shards.
+/// Most pixels of a photo: its pictures (32 bytes per pixel) are sent in one blob, its table in [`MAX_INPUTS`] shards.
 const MOST_PHOTO: usize = 8_000_000;
 /// Most texels of a map, 12 bytes each in one blob.
 const MOST_MAP: usize = 20_000_000;
-/// Most pixels of stage one: their table takes about 1.2 kB each, more than once.
+/// Most pixels of stage one: their table takes about 1.2 kB per pixel, and more than one copy exists at a time.
 const MOST_FULL: usize = 200_000;
 
 const _: () = assert!(MOST_PHOTO * 32 < MAX_BLOB_BYTES && MOST_PHOTO / FULL_SHARD + 2 < MAX_INPUTS);

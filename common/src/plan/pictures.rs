@@ -1,4 +1,4 @@
-//! The pictures at the end of a fit: which nodes make them, and whether they made what was asked for.
+//! The pictures at the end of a fit: the nodes that make them, and the checks of their outputs.
 
 use super::verify::wrong;
 use crate::{
@@ -11,10 +11,10 @@ use crate::{
 };
 use std::collections::BTreeMap;
 
-/// The pictures that were asked for.
+/// The pictures that were requested.
 #[derive(Debug, Default)]
 pub(super) struct Pictures {
-    /// Nodes in the order of their pictures, with their number.
+    /// Nodes in the order of their pictures, each with its number of pictures.
     asked: Vec<(NodeId, usize)>,
     come: BTreeMap<NodeId, Made>,
 }
@@ -23,7 +23,7 @@ pub(super) struct Pictures {
 pub(super) type Made = (Vec<Image>, Vec<f64>);
 
 impl Pictures {
-    /// A node will make so many.
+    /// Registers a node that makes `count` pictures.
     pub(super) fn ask(&mut self, node: NodeId, count: usize) {
         self.asked.push((node, count));
     }
@@ -33,7 +33,7 @@ impl Pictures {
         self.asked.iter().any(|(asked, _)| *asked == node)
     }
 
-    /// A node has made its pictures of `width` x `height`; all of them, if these were the last.
+    /// Takes the pictures of a node, each of `width` x `height`. Returns the pictures of all nodes once the last node is done.
     pub(super) fn made(
         &mut self,
         node: NodeId,
@@ -82,5 +82,5 @@ fn checked(output: &Blob, expected: usize, (width, height): (usize, usize)) -> R
     }
 }
 
-/// Side of the metric's windows, in pixels: an image has so many less one fewer of them in each direction.
+/// Side of the metric's windows, in pixels: an image of N columns has N + 1 - `WINDOW` of them across, and likewise down.
 const WINDOW: usize = 11;

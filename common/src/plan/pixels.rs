@@ -1,6 +1,6 @@
-//! What a plan asks of the photo: which pixels there are, with which values.
+//! The pixels of the photo that a plan uses, with their values.
 
-use super::index;
+use super::encode::index;
 use crate::{
     image::Image,
     math::{luminance, widen},
@@ -26,7 +26,7 @@ pub(super) fn intensities(capture: &Capture) -> Vec<subset::Candidate> {
     capture.usable().map(candidate).collect()
 }
 
-/// The pixels that count for the score, tile by tile, so that neighbours share cuts of the light.
+/// The pixels that count for the score, tile by tile, so that neighbours share cuts of the light pyramid.
 pub(super) fn covered_pixels(capture: &Capture) -> Vec<Pixel> {
     let width = capture.photo().width();
     let coverage = capture.scoring_coverage();
@@ -36,7 +36,7 @@ pub(super) fn covered_pixels(capture: &Capture) -> Vec<Pixel> {
     pixels
 }
 
-/// Every pixel of a photo, or one of every square of pixels, its middle.
+/// Every pixel of a photo, or the middle pixel of every square of pixels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Grid(u32);
 
@@ -44,8 +44,8 @@ impl Grid {
     /// Every pixel.
     pub(super) const FULL: Self = Self(1);
 
-    /// The coarsest grid on which the box around these pixels still has `size` columns and rows, where it has as many; coarser, if more
-    /// than `most` pixels would be on it.
+    /// The coarsest grid on which the bounding box of these pixels still has `size` columns and rows; every pixel if the box is smaller
+    /// than that. The grid is coarser if it would hold more than `most` of the pixels.
     pub(super) fn around(pixels: &[Pixel], size: u32, most: usize) -> Self {
         let extent = |axis: usize| {
             let (low, high) = pixels.iter().fold((u32::MAX, 0), |(low, high), p| (low.min(p[axis]), high.max(p[axis])));
@@ -58,12 +58,12 @@ impl Grid {
         grid
     }
 
-    /// Columns or rows of the grid along so many pixels.
+    /// Columns or rows of the grid along `length` pixels.
     pub(super) fn count(self, length: usize) -> usize {
         self.places(length).count()
     }
 
-    /// Columns and rows of a square.
+    /// Side of a square, in pixels.
     pub(super) fn stride(self) -> u32 {
         self.0
     }
@@ -99,7 +99,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_grid_takes_the_middle_of_every_square_and_cuts_what_is_left_over() {
+    fn a_grid_takes_the_middle_of_every_square_and_drops_incomplete_squares() {
         let photo = Image::from_pixels(7, 5, (0..35u8).map(|i| [f32::from(i); 3]).collect());
         let grid = Grid(3);
         let image = grid.image(&photo);

@@ -1,15 +1,22 @@
-//! Stage three as a plan: look on a coarse picture for the lobe to start from, polish on the full-resolution table there, on wider
-//! tables where the width runs into an edge. Where that ends worse than the winner, it is done again from the winner, on the table that
-//! it was judged on: the outcome never scores worse than the winner.
+//! The plan of stage three: explore on a coarse picture to find the lobe to start from, then polish from there on a full-resolution
+//! table, and on wider tables while the width ends at the edge of its table. If the end is worse than the winner of stage two, polish
+//! runs again from the winner, on the table that the winner was judged on. So the outcome never scores worse than the winner.
 
-use super::{FitPlanner, Grid, Step, add, index, release_tables, verify};
+use super::{
+    encode::{add, index},
+    pixels::Grid,
+    scene_tables::SceneTables,
+    step::Step,
+    tables::COARSE_SHARD,
+    verify,
+};
 use crate::{
     brdf::Model,
     fit::{
+        Judged, Polished,
         explore::{MAX_EXPLORATIONS, explored_span, starts},
         needed_span,
         polish::MAX_EVALUATIONS,
-        winner,
     },
     graph::{Blob, BlobHash, GraphEdit, Input, PlanError},
     nodes::{self, PolishParameters},
@@ -19,19 +26,19 @@ use crate::{
     },
 };
 
-/// How often polish may run on towards a width beyond its table.
+/// Most rounds of polish; each round after the first is on a wider table.
 const MAX_ROUNDS: usize = 4;
 
-/// Reach of the next table around a width that polish took to the edge of this one.
+/// Factor by which the next table extends to either side of the width at which the last round ended.
 const AROUND: f64 = 1.6;
 
-/// Columns or rows of the object on the coarse picture, the fewer of the two.
+/// Columns or rows of the object on the coarse picture, whichever are fewer.
 const COARSE_SIZE: u32 = 96;
 
 /// Most pixels of the coarse picture's table.
 const MOST_COARSE: usize = 40_000;
 
-/// Fewer pixels of an object show no lobe.
+/// Fewest pixels of the object on the coarse picture: fewer do not show a lobe.
 const FEWEST_COARSE: usize = 150;
 
 /// Pixels from the centre of one of the metric's windows to its edge.
@@ -40,162 +47,180 @@ const REACH: usize = 5;
 /// Knots per factor of two of width in the coarse table.
 const COARSE_PER_OCTAVE: f64 = 4.0;
 
-/// A table that would have to span more than this factor of widths, margins included, is not made for both winner and find.
+/// Largest ratio of widths, margins included, that one table may span to hold both the winner and the lobe that `explore` found.
 const FAR: f64 = 4.0;
 
-/// Most starts that a round of polish compares: winner, find, and the ends of earlier rounds.
+/// Most starts that a round of polish compares: the winner, the result of `explore`, and the ends of earlier rounds.
 const MAX_STARTS: usize = MAX_ROUNDS + 2;
 
-/// Where stage three stands.
+/// The state of stage three.
 #[derive(Debug, Default)]
 pub(super) struct Polishing {
+    /// The outcome of the last round.
+    pub(super) outcome: Option<Polished>,
+    /// Evaluations of CSSIM on the coarse picture.
+    pub(super) explored_evaluations: usize,
     /// The view and the table of the coarse picture.
     coarse: Option<(BlobHash, Vec<Input>)>,
-    /// What the next round may start from: the best on its table.
+    /// Possible starts of the next round, which takes the best of them on its table.
     starts: Vec<Vec<f64>>,
-    /// Whether it went back to the winner and the table that it was judged on, where it ends.
+    /// Whether it went back to the winner and to the table that the winner was judged on; it ends there.
     has_retreated: bool,
     rounds: usize,
-    /// Evaluations of these rounds.
+    /// Evaluations of the rounds since the start or the retreat.
     evaluations: usize,
-    /// Those of a start that has led nowhere.
+    /// Evaluations of the rounds before the retreat.
     spent: usize,
 }
 
-impl FitPlanner {
+impl Polishing {
     /// Adds the table of the coarse picture.
-    pub(super) fn add_coarse_table(&mut self, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
-        let Some((low, high)) = explored_span(self.method.model) else { return Ok(()) };
-        let grid = Grid::around(&self.pixels, COARSE_SIZE, MOST_COARSE);
-        let pixels: Vec<Pixel> = self.pixels.iter().copied().filter(|pixel| grid.holds(*pixel)).collect();
-        if !self.shows_the_object(grid, &pixels) {
+    pub(super) fn add_coarse_table(
+        &mut self,
+        scene: &mut SceneTables,
+        graph: &mut GraphEdit<'_>,
+    ) -> Result<(), PlanError> {
+        let Some((low, high)) = explored_span(scene.method.model) else { return Ok(()) };
+        let grid = Grid::around(&scene.pixels, COARSE_SIZE, MOST_COARSE);
+        let pixels: Vec<Pixel> = scene.pixels.iter().copied().filter(|pixel| grid.holds(*pixel)).collect();
+        if !shows_the_object(scene, grid, &pixels) {
             return Ok(());
         }
-        let view = add(graph, "coarse view", &self.view_wire(grid, pixels.clone()))?;
+        let view = add(graph, "coarse view", &scene.view_wire(grid, pixels.clone()))?;
         let list = add(graph, "list of pixels", &pixels)?;
         let knots = Knots::covering(low, high, COARSE_PER_OCTAVE);
-        let list = (list, pixels.len(), super::tables::COARSE_SHARD);
+        let list = (list, pixels.len(), COARSE_SHARD);
         let table =
-            self.add_transport(graph, (nodes::TRANSPORT, "of the coarse picture"), list, knots, Accuracy::COARSE)?;
-        self.polishing.coarse = Some((view, table));
+            scene.add_transport(graph, (nodes::TRANSPORT, "of the coarse picture"), list, knots, Accuracy::COARSE)?;
+        self.coarse = Some((view, table));
         Ok(())
     }
 
-    /// Whether a coarse picture can be scored: the object has pixels enough, and one of the metric's windows is centred on it.
-    fn shows_the_object(&self, grid: Grid, pixels: &[Pixel]) -> bool {
-        let photo = self.capture.photo();
-        let inside = |place: u32, length: usize| {
-            let (at, count) = ((place / grid.stride()) as usize, grid.count(length));
-            at >= REACH && at + REACH < count
-        };
-        let is_centre = |p: &Pixel| inside(p[0], photo.width()) && inside(p[1], photo.height());
-        pixels.len() >= FEWEST_COARSE && pixels.iter().any(is_centre)
-    }
-
-    /// Looks on the coarse picture for the lobe that polish starts from.
-    pub(super) fn add_exploration(&mut self, won: &[f64], graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
-        let Some((view, table)) = &self.polishing.coarse else { return self.polish_winner(won, graph) };
+    /// Searches on the coarse picture for the lobe that polish starts from.
+    pub(super) fn explore(
+        &mut self,
+        won: &[f64],
+        scene: &mut SceneTables,
+        graph: &mut GraphEdit<'_>,
+    ) -> Result<Step, PlanError> {
+        let Some((view, table)) = &self.coarse else { return self.polish_winner(won, scene, graph) };
         let inputs = [vec![Input::Blob(*view)], table.clone()].concat();
         let parameters =
-            PolishParameters { starts: starts(self.method.model, won), max_evaluations: index(MAX_EXPLORATIONS) };
-        let node = self.add_on_view(graph, (nodes::EXPLORE, nodes::EXPLORE), inputs, &parameters)?;
-        self.step = Step::Exploring(node);
-        Ok(())
+            PolishParameters { starts: starts(scene.method.model, won), max_evaluations: index(MAX_EXPLORATIONS) };
+        let node = scene.add_on_view(graph, (nodes::EXPLORE, nodes::EXPLORE), inputs, &parameters)?;
+        Ok(Step::Exploring(node))
     }
 
-    /// Polish starts from what was found, on a table that has its width, and from the winner where that table has the winner's too.
-    pub(super) fn explored(&mut self, output: &Blob, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
-        let model = self.method.model;
-        // Until now every part of the table may still have come, to be looked at.
-        let table = self.polishing.coarse.take().map_or_else(Vec::new, |(_, table)| table);
+    /// Starts polish from the lobe that `explore` found, on a table that spans its width; from the winner too, if the table spans
+    /// the winner's width as well.
+    pub(super) fn explored(
+        &mut self,
+        output: &Blob,
+        won: Vec<f64>,
+        scene: &mut SceneTables,
+        graph: &mut GraphEdit<'_>,
+    ) -> Result<Step, PlanError> {
+        let model = scene.method.model;
+        // Not released earlier: the plan checks every shard when it arrives.
+        let table = self.coarse.take().map_or_else(Vec::new, |(_, table)| table);
         table.iter().filter_map(Input::node).for_each(|shard| graph.release(shard));
-        let most = MAX_EXPLORATIONS * starts(model, &self.winner_of_stage_two()?).len();
+        let most = MAX_EXPLORATIONS * starts(model, &won).len();
         let found = verify::polished(model, output, most)?;
         self.explored_evaluations = found.evaluations;
         let found = found.parameters;
-        let won = self.winner_of_stage_two()?;
         let inside =
             |span: Option<(f64, f64)>| span.zip(width(model, &found)).is_none_or(|(s, w)| s.0 <= w && w <= s.1);
         let both = needed_span(model, [&won[..], &found[..]].into_iter());
         let near = both.is_none_or(|(low, high)| high / low <= FAR);
-        let starts = if inside(self.span) || near { vec![won, found.clone()] } else { vec![found.clone()] };
-        if !inside(self.span) {
-            self.span = needed_span(model, starts.iter().map(|start| &start[..]));
+        let starts = if inside(scene.span) || near { vec![won, found.clone()] } else { vec![found.clone()] };
+        if !inside(scene.span) {
+            scene.span = needed_span(model, starts.iter().map(|start| &start[..]));
         }
-        self.polishing.starts = starts;
-        self.add_polish(graph)
+        self.starts = starts;
+        self.add_polish(scene, graph)
     }
 
-    fn winner_of_stage_two(&self) -> Result<Vec<f64>, PlanError> {
-        let best = winner(&self.judged, self.method.judge).ok_or_else(|| PlanError::new("no candidate was judged"))?;
-        Ok(self.judged[best].candidate.parameters.clone())
+    fn polish_winner(
+        &mut self,
+        won: &[f64],
+        scene: &mut SceneTables,
+        graph: &mut GraphEdit<'_>,
+    ) -> Result<Step, PlanError> {
+        self.starts = vec![won.to_vec()];
+        self.add_polish(scene, graph)
     }
 
-    fn polish_winner(&mut self, won: &[f64], graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
-        self.polishing.starts = vec![won.to_vec()];
-        self.add_polish(graph)
+    fn add_polish(&self, scene: &mut SceneTables, graph: &mut GraphEdit<'_>) -> Result<Step, PlanError> {
+        let left = MAX_EVALUATIONS.saturating_sub(self.evaluations);
+        let parameters = PolishParameters { starts: self.starts.clone(), max_evaluations: index(left) };
+        Ok(Step::Polishing(scene.add_judging(graph, nodes::POLISH, scene.span, &parameters)?))
     }
 
-    fn add_polish(&mut self, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
-        let left = MAX_EVALUATIONS.saturating_sub(self.polishing.evaluations);
-        let parameters = PolishParameters { starts: self.polishing.starts.clone(), max_evaluations: index(left) };
-        self.step = Step::Polishing(self.add_judging(graph, nodes::POLISH, self.span, &parameters)?);
-        Ok(())
-    }
-
-    /// Polish ends, or goes on with a wider table where it ran into the edge of this one.
-    pub(super) fn polished(&mut self, output: &Blob, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
-        let left = MAX_EVALUATIONS.saturating_sub(self.polishing.evaluations);
-        let mut polished = verify::polished(self.method.model, output, left.max(MAX_STARTS))?;
-        let polishing = &mut self.polishing;
-        polishing.rounds += 1;
-        polishing.evaluations += polished.evaluations;
-        polished.evaluations = polishing.spent + polishing.evaluations;
-        // Another table pays only with evaluations left for a gradient and a few steps.
-        let enough_left = polishing.evaluations + 3 * polished.parameters.len() < MAX_EVALUATIONS;
-        let goes_on =
-            polished.at_table_edge && polishing.rounds < MAX_ROUNDS && enough_left && !polishing.has_retreated;
-        polishing.starts.push(polished.parameters.clone());
-        let score = self.method.judge.pick(polished.cssim, polished.cssim_object);
-        let best = winner(&self.judged, self.method.judge).ok_or_else(|| PlanError::new("no candidate was judged"))?;
-        let is_worse = score > self.score_of_winner(best);
-        let judged_on = self.tables.first().map_or(self.span, |(span, _)| *span);
-        self.best.set(score.min(self.score_of_winner(best)));
-        self.polished = Some(polished);
-        if goes_on {
-            self.widen_span();
-            self.release_tables_between(graph);
-            self.add_polish(graph)
-        } else if is_worse && self.span != judged_on {
-            // Nothing better was there: what polish owes is the winner's own surroundings, on the table that it won on.
-            self.span = judged_on;
-            self.release_tables_between(graph);
-            let spent = self.polishing.evaluations;
-            self.polishing = Polishing { spent, has_retreated: true, ..Polishing::default() };
-            let won = self.winner_of_stage_two()?;
-            self.polish_winner(&won, graph)
+    /// Takes the outcome of a round. Polish ends, or continues on a wider table if the width reached the edge of this one.
+    pub(super) fn polished(
+        &mut self,
+        output: &Blob,
+        winner: &Judged,
+        scene: &mut SceneTables,
+        graph: &mut GraphEdit<'_>,
+    ) -> Result<Step, PlanError> {
+        let left = MAX_EVALUATIONS.saturating_sub(self.evaluations);
+        let mut polished = verify::polished(scene.method.model, output, left.max(MAX_STARTS))?;
+        self.rounds += 1;
+        self.evaluations += polished.evaluations;
+        polished.evaluations = self.spent + self.evaluations;
+        // Another table is worth it only if enough evaluations are left for a gradient and a few steps.
+        let enough_left = self.evaluations + 3 * polished.parameters.len() < MAX_EVALUATIONS;
+        let continues = polished.at_table_edge && self.rounds < MAX_ROUNDS && enough_left && !self.has_retreated;
+        self.starts.push(polished.parameters.clone());
+        let judge = scene.method.judge;
+        let score = judge.pick(polished.cssim, polished.cssim_object);
+        let is_worse = score > judge.pick(winner.cssim, winner.cssim_object);
+        self.outcome = Some(polished);
+        if continues {
+            self.widen_span(scene);
+            scene.release_tables_after(1, graph);
+            self.add_polish(scene, graph)
+        } else if is_worse && scene.span != scene.judged_span() {
+            // Start again from the winner, on the table that it was judged on, where polish cannot end worse.
+            scene.span = scene.judged_span();
+            scene.release_tables_after(1, graph);
+            *self = Self {
+                outcome: self.outcome.take(),
+                explored_evaluations: self.explored_evaluations,
+                spent: self.evaluations,
+                has_retreated: true,
+                ..Self::default()
+            };
+            self.polish_winner(&winner.candidate.parameters, scene, graph)
         } else {
-            self.add_report(graph)
+            Ok(Step::Reporting)
         }
     }
 
-    /// The pictures are made of the first table and the last.
-    fn release_tables_between(&mut self, graph: &mut GraphEdit<'_>) {
-        let between = self.tables.split_off(1);
-        release_tables(between, graph);
-    }
-
-    /// A span around the width where polish stands that holds the widths of all earlier rounds: on the next table all of them
-    /// are judged again, and the best goes on.
-    fn widen_span(&mut self) {
-        let model = self.method.model;
+    /// Widens the span to hold the width of every round so far and the surroundings of the last one: on the next table all of
+    /// them are judged again, and polish continues from the best.
+    fn widen_span(&self, scene: &mut SceneTables) {
+        let model = scene.method.model;
         let Some(width) = model.lobes().iter().find_map(|b| b.width) else { return };
         let (lower, upper) = width.span(model.parameters());
-        let widths = || self.polishing.starts.iter().map(|start| width.at(start));
+        let widths = || self.starts.iter().map(|start| width.at(start));
         let last = widths().next_back().unwrap_or(upper);
         let (low, high) = (widths().fold(last / AROUND, f64::min), widths().fold(last * AROUND, f64::max));
-        self.span = Some((low.max(lower), high.min(upper)));
+        scene.span = Some((low.max(lower), high.min(upper)));
     }
+}
+
+/// Whether a coarse picture can be scored: it has enough pixels of the object, and at least one of the metric's windows is centred
+/// on the object.
+fn shows_the_object(scene: &SceneTables, grid: Grid, pixels: &[Pixel]) -> bool {
+    let photo = scene.capture.photo();
+    let inside = |place: u32, length: usize| {
+        let (at, count) = ((place / grid.stride()) as usize, grid.count(length));
+        at >= REACH && at + REACH < count
+    };
+    let is_centre = |p: &Pixel| inside(p[0], photo.width()) && inside(p[1], photo.height());
+    pixels.len() >= FEWEST_COARSE && pixels.iter().any(is_centre)
 }
 
 /// The width of a parameter vector's main lobe.

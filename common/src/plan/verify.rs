@@ -1,18 +1,18 @@
-//! Trust in what nodes return, which may have run on a worker. A shard of a transport table has to be of the shape that was asked
-//! for, with finite values (whether they are right, only another computation can tell). The cost of every candidate is computed again,
-//! here, on the table that its search read (design section 8). The cost is a pure function of the table and the parameters, so it has
-//! to be the same to the bit; one evaluation costs a thousandth of a search. Scores, parameters and pictures have to be possible ones.
+//! Checks of the outputs of nodes, which may have run on a worker. A shard of a transport table must have the requested shape and
+//! finite values (only a second computation can tell whether the values are right). The cost of every candidate is computed again
+//! here, on the table that its search read (design section 8). The cost is a pure function of the table and the parameters, so it
+//! must be equal bit for bit; one evaluation costs a thousandth of a search. Scores and parameters must be within their ranges,
+//! pictures finite.
 
-use super::other;
+use super::encode::other;
 use crate::{
     brdf::Model,
     fit::{Candidate, Objective, Polished},
     graph::{Blob, GraphEdit, Input, NodeId, PlanError},
     nodes::{
-        AppraisedWire, joined,
+        joined,
         wire::{PolishedWire, ScoresWire, TableWire, read},
     },
-    plan::Appraisal,
     render::{
         knots::{self, Knots},
         table::TransportTable,
@@ -28,7 +28,7 @@ use std::{
 pub(super) struct SubsetTables(BTreeMap<usize, TransportTable>);
 
 impl SubsetTables {
-    /// The table of subset `s`, which the node `search` reads: of its inputs, those that are outputs are the shards.
+    /// The table of subset `s`. Its shards are those inputs of the node `search` that are outputs of other nodes.
     pub(super) fn get(
         &mut self,
         s: usize,
@@ -42,7 +42,7 @@ impl SubsetTables {
         })
     }
 
-    /// Lets the table of subset `s` go.
+    /// Drops the table of subset `s`.
     pub(super) fn forget(&mut self, s: usize) {
         self.0.remove(&s);
     }
@@ -58,16 +58,16 @@ fn table_of(model: &dyn Model, search: NodeId, graph: &GraphEdit<'_>) -> Result<
     joined(model, &shards.iter().collect::<Vec<_>>()).map_err(other)
 }
 
-/// A part of a transport table, as it was asked for.
+/// A shard of a transport table, as it was requested.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Shard {
-    /// How many pixels.
+    /// Number of pixels.
     pub(super) pixels: usize,
     /// The grid of widths of the main lobe.
     pub(super) knots: Knots,
 }
 
-/// Refuses a part of a transport table that is not the one that was asked for.
+/// Refuses a shard of a transport table that is not the one that was requested.
 pub(super) fn check_shard(model: &dyn Model, asked: Shard, output: &Blob) -> Result<(), PlanError> {
     let of_model = || format!("a transport table of {}", model.name());
     let table = read::<TableWire>("transport table", output)
@@ -88,7 +88,7 @@ pub(super) fn check_shard(model: &dyn Model, asked: Shard, output: &Blob) -> Res
     }
 }
 
-/// The scores of `count` candidates, the whole image's and the object's.
+/// The scores of `count` candidates: over the whole image, over the object.
 pub(super) fn scores(output: &Blob, count: usize) -> Result<Vec<(f64, f64)>, PlanError> {
     let ScoresWire(scores) = read("scores", output).map_err(|failure| wrong("scores", &failure))?;
     if scores.len() != count {
@@ -98,7 +98,7 @@ pub(super) fn scores(output: &Blob, count: usize) -> Result<Vec<(f64, f64)>, Pla
     Ok(scores)
 }
 
-/// The outcome of a search on the score that may have evaluated it so often.
+/// The outcome of a search on the score with at most `most` evaluations.
 pub(super) fn polished(model: &dyn Model, output: &Blob, most: usize) -> Result<Polished, PlanError> {
     let polished = read::<PolishedWire>("polish", output).and_then(|wire| wire.polished(model));
     let polished = polished.map_err(|failure| wrong("parameters with their scores", &failure))?;
@@ -110,38 +110,21 @@ pub(super) fn polished(model: &dyn Model, output: &Blob, most: usize) -> Result<
     Ok(polished)
 }
 
-/// The appraisals of so many points, for so many gammas.
-pub(super) fn appraisals(output: &Blob, points: usize, gammas: usize) -> Result<Vec<Appraisal>, PlanError> {
-    let AppraisedWire(appraised) = read("appraisals", output).map_err(|failure| wrong("appraisals", &failure))?;
-    if appraised.len() != points {
-        return Err(wrong(format!("{points} appraisals"), &appraised.len()));
-    }
-    let checked = |(cssim, cssim_object, costs): (f64, f64, Vec<f64>)| {
-        check_score(cssim)?;
-        check_score(cssim_object)?;
-        if costs.len() != gammas {
-            return Err(wrong(format!("{gammas} costs"), &costs.len()));
-        }
-        costs.iter().try_for_each(|cost| check_score(*cost))?;
-        Ok(Appraisal { cssim, cssim_object, costs })
-    };
-    appraised.into_iter().map(checked).collect()
-}
-
-fn check_score(score: f64) -> Result<(), PlanError> {
+/// Refuses a score or a cost that is negative or not finite.
+pub(super) fn check_score(score: f64) -> Result<(), PlanError> {
     if score.is_finite() && score >= 0.0 { Ok(()) } else { Err(wrong("a score at or above 0", &score)) }
 }
 
-/// The output of a worker is not one of its node.
+/// The error for an output that its node cannot have.
 pub(super) fn wrong(expected: impl Into<String>, found: &dyn Display) -> PlanError {
     PlanError::WrongOutput { expected: expected.into(), found: found.to_string() }
 }
 
 fn missing() -> PlanError {
-    PlanError::new("a search has finished whose table is not there: a mistake in the plan, please report it")
+    PlanError::new("the table of a finished search is missing: a bug in the plan, please report it")
 }
 
-/// Refuses a candidate whose cost is not the one that its parameters have.
+/// Refuses a candidate whose cost differs from the cost at its parameters.
 pub(super) fn check_cost(candidate: &Candidate, objective: &mut Objective<'_>) -> Result<(), PlanError> {
     let (claimed, recomputed) = (candidate.cost, objective.cost(&candidate.parameters));
     if claimed.to_bits() == recomputed.to_bits() {

@@ -1,10 +1,10 @@
-//! The access file: what a worker has to know to join a run. Only who can read it can join.
+//! The access file: everything that a worker needs to join a run. Only a process that can read it can join.
 //!
 //! ```json
 //! { "address": "127.0.0.1:45123", "certificate": "blake3:64 hexadecimal digits", "secret": "64 hexadecimal digits" }
 //! ```
-//! The private key of the certificate is not in it: this file is copied to workers, and none of them shall be able to stand in
-//! for the coordinator.
+//! It does not contain the private key of the certificate: the file is copied to workers, and a worker must not be able to impersonate
+//! the coordinator.
 
 use std::fmt;
 
@@ -13,13 +13,14 @@ use subtle::ConstantTimeEq;
 use thiserror::Error;
 
 use super::certificate::CertificatePin;
+use super::hex::{from_hex, to_hex};
 
 /// The secret of a run: 32 random bytes. Compared in constant time, never printed.
 #[derive(Clone)]
 pub struct Secret([u8; 32]);
 
 impl Secret {
-    /// A secret of these bytes, which must come from the operating system's random source.
+    /// The secret of these bytes, which must come from the operating system's random source.
     #[must_use]
     pub fn from_bytes(bytes: [u8; 32]) -> Self {
         Self(bytes)
@@ -46,39 +47,39 @@ impl PartialEq for Secret {
 
 impl Eq for Secret {}
 
-/// What an access file says.
+/// The content of an access file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Access {
     /// Where the coordinator listens, as `HOST:PORT`.
     pub address: String,
-    /// The coordinator's certificate. A worker talks to nobody who shows another one.
+    /// The pin of the coordinator's certificate. A worker closes the connection if the peer presents another certificate.
     pub certificate: CertificatePin,
     /// The secret.
     pub secret: Secret,
 }
 
-/// Text that is no access file.
+/// Why a text is not an access file.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum AccessError {
     /// The text is not the expected JSON.
     #[error("expected JSON with \"address\", \"certificate\" and \"secret\": {0}")]
     Json(String),
-    /// The secret is not 32 bytes in hexadecimal. It is not repeated here.
+    /// The secret is not 32 bytes in hexadecimal. The message does not repeat it.
     #[error(
-        "expected a \"secret\" of 64 hexadecimal digits, found {found} characters or other signs; copy the file again"
+        "expected a \"secret\" of 64 hexadecimal digits, found {found} characters, or characters that are not hexadecimal digits; copy the file again"
     )]
     Secret {
-        /// How many characters there are.
+        /// Number of characters found.
         found: usize,
     },
     /// The address has no port.
     #[error("expected an \"address\" of the form HOST:PORT, found {found:?}")]
     Address {
-        /// What there is.
+        /// The address found.
         found: String,
     },
-    /// The certificate is no pin. It is not repeated here: fields may have been mixed up.
+    /// The certificate is not a pin. The message does not repeat it, because it may be the secret in the wrong field.
     #[error(
         "expected a \"certificate\" of the form blake3:HASH with 64 hexadecimal digits, found something else; was the file written by another version?"
     )]
@@ -97,7 +98,7 @@ impl Access {
     /// Parse the text of an access file.
     ///
     /// # Errors
-    /// When it is not one. A file without a certificate is none: there is no connection without TLS.
+    /// If it is not an access file. The certificate is required, because every connection uses TLS.
     pub fn parse(text: &str) -> Result<Self, AccessError> {
         let file: AccessFile = serde_json::from_str(text).map_err(|error| AccessError::Json(without_values(&error)))?;
         let secret =
@@ -124,25 +125,7 @@ impl Access {
     }
 }
 
-/// Where and of what kind an error is, without serde's quotation of the text: that might be the secret.
+/// Kind and place of an error, without serde's quotation of the text, which might be the secret.
 fn without_values(error: &serde_json::Error) -> String {
     format!("{:?} error in line {}, column {}", error.classify(), error.line(), error.column()).to_lowercase()
-}
-
-/// 32 bytes of 64 hexadecimal digits.
-pub(super) fn from_hex(digits: &str) -> Option<[u8; 32]> {
-    let mut bytes = [0; 32];
-    let pairs = digits.as_bytes().chunks_exact(2);
-    if digits.len() != 64 {
-        return None;
-    }
-    for (byte, pair) in bytes.iter_mut().zip(pairs) {
-        let [high, low] = [pair[0], pair[1]].map(|digit| char::from(digit).to_digit(16));
-        *byte = u8::try_from(high? * 16 + low?).ok()?;
-    }
-    Some(bytes)
-}
-
-pub(super) fn to_hex(bytes: &[u8]) -> String {
-    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }

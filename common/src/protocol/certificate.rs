@@ -1,15 +1,15 @@
-//! The pin: how an access file names the coordinator's certificate.
+//! The pin that identifies the coordinator's certificate in an access file.
 
 use std::fmt;
 
 use subtle::ConstantTimeEq;
 
-use super::access::{from_hex, to_hex};
+use super::hex::{from_hex, to_hex};
 
-/// Names a certificate: the BLAKE3 hash of its DER form. As text `blake3:` and 64 hexadecimal digits.
+/// Identifies a certificate: the BLAKE3 hash of its DER form. As text, `blake3:` and 64 hexadecimal digits.
 ///
-/// A hash and not the certificate itself: it is all that a worker needs to recognise its coordinator, and it fits on a line. It
-/// is public: who knows it can recognise the coordinator, too, but neither join nor stand in for it.
+/// A hash is enough for a worker to recognise its coordinator, and fits on a line. It is not a secret: it allows neither to join nor to
+/// impersonate the coordinator.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub struct CertificatePin([u8; 32]);
 
@@ -22,7 +22,7 @@ impl CertificatePin {
         Self(*blake3::hash(certificate_der).as_bytes())
     }
 
-    /// Whether this is the pin of that certificate (DER). Takes the same time whether or not.
+    /// Whether this is the pin of a certificate in DER form, compared in constant time.
     #[must_use]
     pub fn names(&self, certificate_der: &[u8]) -> bool {
         self.0.ct_eq(&Self::of(certificate_der).0).into()

@@ -1,8 +1,8 @@
-//! The only file that uses bincode: values to bytes and back, under size limits.
+//! Encodes values to bytes and decodes them, with size limits. The only file that uses bincode.
 //!
-//! bincode 2.0.1 is unmaintained (RUSTSEC-2025-0141) and pinned; what replaces it some day replaces this file. The format
-//! is bincode's standard configuration (little-endian, variable-length integers, floats by their bits), so encoding is
-//! deterministic and a decoded float has the bits of the encoded one.
+//! bincode 2.0.1 is unmaintained (RUSTSEC-2025-0141) and pinned; to replace it, replace this file. The format is bincode's standard
+//! configuration (little-endian, variable-length integers, floats by their bits), so encoding is deterministic and a decoded float has
+//! the bits of the encoded one.
 
 use bincode::config::standard;
 use serde::Serialize;
@@ -12,7 +12,7 @@ use thiserror::Error;
 use super::frame::MAX_FRAME_BYTES;
 use crate::graph::MAX_BLOB_BYTES;
 
-/// Bytes that are not what they should be, or a value that cannot be sent.
+/// Why a value cannot be encoded or bytes cannot be decoded.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum CodecError {
@@ -27,20 +27,20 @@ pub enum CodecError {
         /// The largest length allowed.
         limit: usize,
     },
-    /// The bytes are no encoding of the wanted type: cut off, hostile, or of another version.
+    /// The bytes are not an encoding of the expected type: truncated, hostile, or written by another version.
     #[error("cannot decode {bytes} bytes: {reason}; were they written by another version?")]
     Decode {
-        /// How many bytes there were.
+        /// Number of bytes.
         bytes: usize,
-        /// What the decoder says.
+        /// The error of the decoder.
         reason: String,
     },
-    /// Bytes are left over behind the value.
+    /// There are bytes after the value.
     #[error("expected {expected} bytes, found {found}; were they written by another version?")]
     Trailing {
-        /// How many bytes the value takes.
+        /// Length of the value in bytes.
         expected: usize,
-        /// How many bytes there were.
+        /// Number of bytes.
         found: usize,
     },
 }
@@ -48,7 +48,7 @@ pub enum CodecError {
 /// Encode a payload: parameters, inputs and outputs of nodes. Decode it with [`decode`].
 ///
 /// # Errors
-/// When the value has no encoding or one beyond [`MAX_BLOB_BYTES`].
+/// If the value has no encoding, or one longer than [`MAX_BLOB_BYTES`].
 pub fn encode<T: Serialize>(value: &T) -> Result<Vec<u8>, CodecError> {
     encode_within(value, MAX_BLOB_BYTES)
 }
@@ -56,32 +56,32 @@ pub fn encode<T: Serialize>(value: &T) -> Result<Vec<u8>, CodecError> {
 /// Decode a payload, reading all of `bytes`.
 ///
 /// # Errors
-/// When the bytes are cut off, too many, or no `T`. What is allocated stays within eight times [`MAX_BLOB_BYTES`].
+/// If the bytes are truncated, too many, or not a `T`. At most eight times [`MAX_BLOB_BYTES`] are allocated.
 pub fn decode<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, CodecError> {
     check_length(bytes.len(), MAX_BLOB_BYTES)?;
     let outcome = bincode::serde::decode_from_slice(bytes, standard().with_limit::<DECODED_BYTES>());
     all_read(bytes, outcome)
 }
 
-/// Encode a message of the wire. Decode it with [`decode_message`].
+/// Encode a message of the protocol. Decode it with [`decode_message`].
 ///
 /// # Errors
-/// When the value has no encoding or one that does not fit into a frame.
+/// If the value has no encoding, or one that does not fit into a frame.
 pub fn encode_message<T: Serialize>(message: &T) -> Result<Vec<u8>, CodecError> {
     encode_within(message, MAX_FRAME_BYTES - 1)
 }
 
-/// Decode a message of the wire, reading all of `bytes`.
+/// Decode a message of the protocol, reading all of `bytes`.
 ///
 /// # Errors
-/// When the bytes are cut off, too many, or no `T`.
+/// If the bytes are truncated, too many, or not a `T`.
 pub fn decode_message<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, CodecError> {
     check_length(bytes.len(), MAX_FRAME_BYTES)?;
     let outcome = bincode::serde::decode_from_slice(bytes, standard().with_limit::<MAX_FRAME_BYTES>());
     all_read(bytes, outcome)
 }
 
-/// bincode counts decoded sizes: an integer of eight bytes may have come from one byte.
+/// bincode's limit counts decoded sizes, and an integer of eight bytes may be encoded in one byte.
 const DECODED_BYTES: usize = 8 * MAX_BLOB_BYTES;
 
 fn encode_within<T: Serialize>(value: &T, limit: usize) -> Result<Vec<u8>, CodecError> {

@@ -1,4 +1,4 @@
-//! Frames: how a stream of bytes is cut into messages and parts of blobs.
+//! Frames: split a stream of bytes into messages and parts of blobs.
 //!
 //! ```text
 //!   length: u32, little-endian, of what follows    tag: u8    body: length - 1 bytes
@@ -6,15 +6,15 @@
 
 use thiserror::Error;
 
-/// The largest `length` of a frame, tag included (2 MiB): a node's parameters (1 MiB) with 4096 inputs, or a part of a
-/// blob (1 MiB). Large blobs travel in many parts, so that no frame is large and a stranger can make nobody
-/// allocate more than this. Messages do wait behind a whole blob; whoever reads takes every byte for a sign of life.
+/// The largest `length` of a frame, tag included (2 MiB): a node's parameters (1 MiB) with 4096 inputs, or a part of a blob (1 MiB).
+/// Large blobs are sent in many parts, so that frames are small and an unauthenticated peer cannot cause a larger allocation. A message
+/// may have to wait until a whole blob is sent; therefore every received byte counts as a sign of life.
 pub const MAX_FRAME_BYTES: usize = 2 << 20;
 
 /// Length and tag.
 const HEADER_BYTES: usize = 5;
 
-/// What a frame holds.
+/// The content of a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FrameTag {
     /// An encoded message.
@@ -26,13 +26,13 @@ pub enum FrameTag {
 /// One frame.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Frame {
-    /// What the body is.
+    /// The content of the body.
     pub tag: FrameTag,
     /// The body: at most [`MAX_FRAME_BYTES`] - 1 bytes.
     pub body: Vec<u8>,
 }
 
-/// Bytes that are no frame. The stream cannot be read on from there.
+/// Bytes that are not a frame. The rest of the stream cannot be read.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum FrameError {
@@ -44,7 +44,7 @@ pub enum FrameError {
         /// The largest length allowed.
         limit: usize,
     },
-    /// The tag is none of ours.
+    /// The tag is unknown.
     #[error("expected frame tag 0 or 1, found {found}")]
     Tag {
         /// The tag.
@@ -52,10 +52,10 @@ pub enum FrameError {
     },
 }
 
-/// The bytes that go before a body of this length.
+/// The header of a frame with a body of this length.
 ///
 /// # Errors
-/// When the body does not fit into a frame.
+/// If the body does not fit into a frame.
 pub fn frame_header(tag: FrameTag, body_bytes: usize) -> Result<[u8; HEADER_BYTES], FrameError> {
     let too_long = FrameError::Length { found: body_bytes.saturating_add(1), limit: MAX_FRAME_BYTES };
     if body_bytes >= MAX_FRAME_BYTES {
@@ -65,11 +65,11 @@ pub fn frame_header(tag: FrameTag, body_bytes: usize) -> Result<[u8; HEADER_BYTE
     Ok([a, b, c, d, tag as u8])
 }
 
-/// Cuts a stream of bytes into frames; holds at most one incomplete frame and what was pushed last.
+/// Splits a stream of bytes into frames. Buffers at most one incomplete frame and the last pushed bytes.
 #[derive(Debug)]
 pub struct FrameReader {
     buffer: Vec<u8>,
-    /// How much of the buffer has been given out.
+    /// Length of the part of the buffer that was already returned as frames.
     consumed: usize,
     limit: usize,
 }
@@ -82,7 +82,7 @@ impl Default for FrameReader {
 }
 
 impl FrameReader {
-    /// Read frames of up to `limit` bytes, tag included; [`MAX_FRAME_BYTES`] if that is less.
+    /// A reader of frames of up to `limit` bytes, tag included, and at most [`MAX_FRAME_BYTES`].
     #[must_use]
     pub fn with_limit(limit: usize) -> Self {
         Self { buffer: Vec::new(), consumed: 0, limit: limit.min(MAX_FRAME_BYTES) }
@@ -98,8 +98,7 @@ impl FrameReader {
     /// The next complete frame; `None` when more bytes are needed. Call it until `None` before the next [`push`](Self::push).
     ///
     /// # Errors
-    /// When the header is not valid, as soon as it is there and before the body is waited for. The same error comes again
-    /// on every further call.
+    /// If the header is invalid; this is detected before the body arrives. Every further call returns the same error.
     pub fn next_frame(&mut self) -> Result<Option<Frame>, FrameError> {
         let unread = &self.buffer[self.consumed..];
         let Some((header, rest)) = unread.split_first_chunk::<HEADER_BYTES>() else {
@@ -123,7 +122,7 @@ impl FrameReader {
         Ok(Some(Frame { tag, body }))
     }
 
-    /// Whether the stream may end here: no frame is half read.
+    /// Whether the stream may end here, which is not inside a frame.
     #[must_use]
     pub fn is_between_frames(&self) -> bool {
         self.consumed == self.buffer.len()

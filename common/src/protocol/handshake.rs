@@ -1,14 +1,14 @@
-//! The preamble: who speaks what, and whether both know the secret.
+//! The preamble: exchanges protocol versions and proofs that both sides know the secret.
 //!
 //! ```text
 //!   coordinator -> worker   Challenge   magic 8, version 2, zero 2, nonce 32                       44 bytes
 //!   worker -> coordinator   Response    magic 8, version 2, zero 2, nonce 32, proof 32             76 bytes
 //!   coordinator -> worker   Verdict     magic 8, version 2, refusal 1, zero 1, proof 32            44 bytes
 //! ```
-//! Integers are little-endian. A proof is BLAKE3 over the role's label and both nonces, keyed with a [`ProofKey`], which is made
-//! of the secret and of the TLS connection: neither side shows the secret, neither can replay a proof or send the other's back,
-//! nobody between them can pass proofs on from one connection to another, and a worker takes no orders from an impostor.
-//! Proofs are compared in constant time. Fixed lengths, parsed by hand.
+//! Integers are little-endian. A proof is BLAKE3 over the role's label and both nonces, keyed with a [`ProofKey`], which is derived from
+//! the secret and the TLS connection. Neither side reveals the secret. A proof cannot be replayed, reflected to its sender, or relayed
+//! from one connection to another, and a worker does not accept an impostor as its coordinator. Proofs are compared in constant time.
+//! All lengths are fixed, and the bytes are parsed by hand.
 
 use std::fmt;
 
@@ -28,12 +28,12 @@ pub const VERDICT_BYTES: usize = 44;
 /// 32 bytes from the operating system's random source, used once.
 pub type Nonce = [u8; 32];
 
-/// What makes a TLS connection unlike any other, known to its two ends alone: the exporter value `tls-exporter` of RFC 9266.
+/// A value that is unique to a TLS connection and known only to its two ends: the exporter value `tls-exporter` of RFC 9266.
 #[derive(Clone, Copy)]
 pub struct ChannelBinding([u8; 32]);
 
 impl ChannelBinding {
-    /// The exporter's value for the label `EXPORTER-Channel-Binding` with an empty context.
+    /// The binding from the exporter's value for the label `EXPORTER-Channel-Binding` with an empty context.
     #[must_use]
     pub fn from_exporter(value: [u8; 32]) -> Self {
         Self(value)
@@ -47,13 +47,13 @@ impl fmt::Debug for ChannelBinding {
     }
 }
 
-/// What proofs on one connection are keyed with: the BLAKE3 keyed hash, under the secret, of the connection's binding. Two
-/// connections have two keys, also when somebody between worker and coordinator has one with each.
+/// The key of the proofs on one connection: the BLAKE3 keyed hash, under the secret, of the connection's binding. Different connections
+/// have different keys, so a man in the middle with one connection to each side cannot relay proofs.
 #[derive(Clone, Debug)]
 pub struct ProofKey(Secret);
 
 impl ProofKey {
-    /// The key of those who know `secret` and are the ends of the connection that `channel` names.
+    /// The key for `secret` on the connection that `channel` identifies.
     #[must_use]
     pub fn new(secret: &Secret, channel: &ChannelBinding) -> Self {
         Self(Secret::from_bytes(secret.keyed_hash(&[CHANNEL_LABEL, channel.0.as_slice()].concat())))
@@ -64,33 +64,31 @@ const CHANNEL_LABEL: &[u8] = b"lookalike channel key";
 const WORKER_LABEL: &[u8] = b"lookalike worker proof";
 const COORDINATOR_LABEL: &[u8] = b"lookalike coordinator proof";
 
-/// A handshake that failed. Trying again does not help.
+/// Why a handshake failed. A retry would fail again.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum HandshakeError {
-    /// The other side is no Lookalike.
+    /// The peer does not speak this protocol.
     #[error("expected the greeting of a lookalike coordinator or worker, found something else; is the address right?")]
     Magic,
-    /// The other side speaks another version.
+    /// The peer speaks another version.
     #[error("expected protocol version {expected}, found {found}; use the same build of coordinator and worker")]
     Version {
         /// Our version.
         expected: u16,
-        /// Theirs.
+        /// The version of the peer.
         found: u16,
     },
     /// The coordinator refuses this worker.
     #[error("the coordinator refuses this worker: {0}")]
     Refused(Refusal),
-    /// The coordinator does not know the secret: it is not the one that wrote the access file.
-    #[error(
-        "the coordinator does not know the secret of the access file; copy the file again from the run that is to be joined"
-    )]
+    /// The coordinator does not know the secret, so it is not the one that wrote the access file.
+    #[error("the coordinator does not know the secret of the access file; copy the file again from the run to join")]
     Impostor,
-    /// A refusal of unknown meaning.
+    /// An unknown refusal.
     #[error("expected a verdict of 0 to 2, found {found}")]
     Verdict {
-        /// The byte that came.
+        /// The received byte.
         found: u8,
     },
 }
@@ -99,41 +97,41 @@ pub enum HandshakeError {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 pub enum Refusal {
     /// The worker's proof is wrong.
-    #[error("wrong secret; copy the access file again from the run that is to be joined")]
+    #[error("wrong secret; copy the access file again from the run to join")]
     WrongSecret,
     /// The worker speaks another version.
     #[error("it speaks another protocol version; use the same build of coordinator and worker")]
     WrongVersion,
 }
 
-/// The coordinator's first bytes.
+/// The first bytes from the coordinator.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Challenge {
-    /// What the coordinator speaks.
+    /// The protocol version of the coordinator.
     pub version: u16,
-    /// To be proved upon.
+    /// The nonce for the worker's proof.
     pub nonce: Nonce,
 }
 
 /// The worker's answer to a [`Challenge`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Response {
-    /// What the worker speaks.
+    /// The protocol version of the worker.
     pub version: u16,
-    /// To be proved upon by the coordinator.
+    /// The nonce for the coordinator's proof.
     pub nonce: Nonce,
-    /// Shows that the worker knows the secret.
+    /// The proof that the worker knows the secret.
     pub proof: [u8; 32],
 }
 
 /// The coordinator's answer to a [`Response`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Verdict {
-    /// What the coordinator speaks.
+    /// The protocol version of the coordinator.
     pub version: u16,
-    /// `None`: welcome.
+    /// Why the worker is refused; `None` if it is accepted.
     pub refusal: Option<Refusal>,
-    /// Shows that the coordinator knows the secret; all zero in a refusal, so that a stranger gets nothing to compare.
+    /// The proof that the coordinator knows the secret; all zero in a refusal, so that a refused peer learns nothing about the secret.
     pub proof: [u8; 32],
 }
 
@@ -144,7 +142,7 @@ impl Challenge {
         Self { version: PROTOCOL_VERSION, nonce }
     }
 
-    /// As bytes.
+    /// The wire form.
     #[must_use]
     pub fn to_bytes(&self) -> [u8; CHALLENGE_BYTES] {
         let mut bytes = [0; CHALLENGE_BYTES];
@@ -152,10 +150,10 @@ impl Challenge {
         bytes
     }
 
-    /// From bytes.
+    /// Parses the wire form.
     ///
     /// # Errors
-    /// When they are not a Lookalike's. A strange version is not an error here.
+    /// If they are not from this protocol. Another version is not an error here.
     pub fn from_bytes(bytes: &[u8; CHALLENGE_BYTES]) -> Result<Self, HandshakeError> {
         Ok(Self { version: version_of(bytes)?, nonce: take(bytes, 12) })
     }
@@ -163,7 +161,7 @@ impl Challenge {
     /// The worker's answer.
     ///
     /// # Errors
-    /// When the coordinator speaks another version.
+    /// If the coordinator speaks another version.
     pub fn answer(&self, key: &ProofKey, nonce: Nonce) -> Result<Response, HandshakeError> {
         check_version(self.version)?;
         Ok(Response { version: PROTOCOL_VERSION, nonce, proof: proof(key, WORKER_LABEL, &self.nonce, &nonce) })
@@ -171,7 +169,7 @@ impl Challenge {
 }
 
 impl Response {
-    /// As bytes.
+    /// The wire form.
     #[must_use]
     pub fn to_bytes(&self) -> [u8; RESPONSE_BYTES] {
         let mut bytes = [0; RESPONSE_BYTES];
@@ -179,10 +177,10 @@ impl Response {
         bytes
     }
 
-    /// From bytes.
+    /// Parses the wire form.
     ///
     /// # Errors
-    /// When they are not a Lookalike's. A strange version is not an error here.
+    /// If they are not from this protocol. Another version is not an error here.
     pub fn from_bytes(bytes: &[u8; RESPONSE_BYTES]) -> Result<Self, HandshakeError> {
         Ok(Self { version: version_of(bytes)?, nonce: take(bytes, 12), proof: take(bytes, 44) })
     }
@@ -205,7 +203,7 @@ impl Response {
 }
 
 impl Verdict {
-    /// As bytes.
+    /// The wire form.
     #[must_use]
     pub fn to_bytes(&self) -> [u8; VERDICT_BYTES] {
         let refusal = match self.refusal {
@@ -218,10 +216,10 @@ impl Verdict {
         bytes
     }
 
-    /// From bytes.
+    /// Parses the wire form.
     ///
     /// # Errors
-    /// When they are not a Lookalike's.
+    /// If they are not from this protocol.
     pub fn from_bytes(bytes: &[u8; VERDICT_BYTES]) -> Result<Self, HandshakeError> {
         let version = version_of(bytes)?;
         let refusal = match bytes[10] {
@@ -233,10 +231,10 @@ impl Verdict {
         Ok(Self { version, refusal, proof: take(bytes, 12) })
     }
 
-    /// Whether the worker may go on: it is welcome, and the coordinator is the one that wrote the access file.
+    /// Checks that the worker is accepted, and that the coordinator is the one that wrote the access file.
     ///
     /// # Errors
-    /// When it may not.
+    /// If either is not the case, or the version is wrong.
     pub fn check(&self, challenge: &Challenge, response: &Response, key: &ProofKey) -> Result<(), HandshakeError> {
         check_version(self.version)?;
         if let Some(refusal) = self.refusal {
@@ -248,7 +246,7 @@ impl Verdict {
 }
 
 fn proof(key: &ProofKey, label: &[u8], challenge: &Nonce, response: &Nonce) -> [u8; 32] {
-    // Unambiguous without separators: the label is one of two constants, the nonces have fixed lengths.
+    // Unambiguous without separators, because the label is one of two constants and the nonces have fixed lengths.
     key.0.keyed_hash(&[label, challenge, response].concat())
 }
 
@@ -261,7 +259,7 @@ fn version_of(bytes: &[u8]) -> Result<u16, HandshakeError> {
     if bytes.starts_with(&MAGIC) { Ok(u16::from_le_bytes(take(bytes, 8))) } else { Err(HandshakeError::Magic) }
 }
 
-/// Fill `bytes` with the fields one after the other; the callers' lengths add up.
+/// Fills `bytes` with the fields one after the other; the callers ensure that they fit.
 fn put(bytes: &mut [u8], fields: &[&[u8]]) {
     let mut rest = bytes;
     for field in fields {
@@ -271,7 +269,7 @@ fn put(bytes: &mut [u8], fields: &[&[u8]]) {
     }
 }
 
-/// The field of `N` bytes at `offset`, which the callers keep inside.
+/// The field of `N` bytes at `offset`; the callers ensure that it lies inside.
 fn take<const N: usize>(bytes: &[u8], offset: usize) -> [u8; N] {
     std::array::from_fn(|index| bytes[offset + index])
 }

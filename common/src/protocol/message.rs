@@ -1,21 +1,21 @@
-//! The messages, as they go over the wire. Changing anything here, even an order of variants, is a new
+//! The messages of the protocol. Any change here, even of the order of variants, requires a new
 //! [`PROTOCOL_VERSION`](super::PROTOCOL_VERSION).
 
 use serde::{Deserialize, Serialize};
 
-/// The longest text in a message, in bytes (16 KiB); longer ones are cut by their sender.
+/// The longest text in a message, in bytes (16 KiB); the sender truncates longer ones.
 pub const MAX_MESSAGE_TEXT_BYTES: usize = 16 << 10;
 
-/// Names a run: random, so that a worker which finds its coordinator's address again notices that another run lives there.
+/// Identifies a run. It is random, so that a reconnecting worker notices if another run uses its coordinator's address.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct RunName(pub [u8; 16]);
 
-/// Names a worker process: random, made when it starts, so that one that has lost its connection is known when it comes back.
-/// Its process id would not do: in containers every worker may have the same.
+/// Identifies a worker process. It is drawn at random when the process starts, so that the coordinator recognises the process when it
+/// reconnects. A process id is not enough, because in containers every worker may have the same one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub struct ProcessName(pub [u8; 16]);
 
-/// Names a lease. A worker answers with the name under which it was assigned the node.
+/// Identifies a lease. The answer of a worker has the name of the lease under which the node was assigned.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct LeaseName {
     /// The node's number in the job graph.
@@ -29,32 +29,32 @@ pub struct LeaseName {
 /// The first message of a worker.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Hello {
-    /// The program's version, for messages only: compatibility is the preamble's business.
+    /// The program's version, for display only; the preamble checks compatibility.
     pub build: String,
-    /// How many nodes it executes at a time; at least 1.
+    /// How many nodes the worker executes at a time; at least 1.
     pub threads: u32,
-    /// Its process id, for messages; that of a local worker also tells its coordinator which one it is.
+    /// Its process id, for display; the coordinator also uses it to recognise its local workers.
     pub process: u32,
-    /// The same on every connection of this process.
+    /// The name of the process, the same on all its connections.
     pub name: ProcessName,
-    /// Whether a coordinator has started it, on its own machine.
+    /// Whether the coordinator started it on its own machine.
     pub is_local: bool,
 }
 
 /// The coordinator's answer to [`Hello`].
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Welcome {
-    /// The number of this connection in this run, for messages.
+    /// The number of this connection in this run, for display.
     pub worker: u64,
-    /// The run. A worker that knew another one forgets its work.
+    /// The run. A worker that comes from another run, or from an earlier epoch of this one, drops its work.
     pub run: RunName,
     /// See [`LeaseName::epoch`].
     pub epoch: u64,
-    /// How often the worker shall tell that it lives, in milliseconds.
+    /// Interval of the worker's heartbeats, in milliseconds.
     pub heartbeat_ms: u32,
-    /// A worker that has not read a byte for this long, in milliseconds, shall take the connection for broken.
+    /// After this time without a received byte, in milliseconds, the worker must treat the connection as broken.
     pub silence_ms: u32,
-    /// How long it may take to finish what it executes when it is asked to end, in milliseconds, unless it was told
+    /// How long the worker may take to finish its running nodes when it is asked to end, in milliseconds, unless its own options say
     /// otherwise.
     pub drain_ms: u32,
 }
@@ -62,11 +62,11 @@ pub struct Welcome {
 /// A node to execute.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Assignment {
-    /// Under which name to answer.
+    /// The lease to name in the answer.
     pub lease: LeaseName,
     /// The node type.
     pub kind: String,
-    /// For messages.
+    /// The node's label, for display.
     pub label: String,
     /// The node's parameters.
     pub parameters: Vec<u8>,
@@ -79,41 +79,41 @@ pub struct Assignment {
 pub struct Executing {
     /// Its lease.
     pub lease: LeaseName,
-    /// How much of it is done, in thousandths, as far as it says.
+    /// Its last reported progress, in thousandths.
     pub permille: u16,
 }
 
-/// What a coordinator says to a worker.
+/// A message from the coordinator to a worker.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum ToWorker {
-    /// You are in. The first message.
+    /// The worker is accepted. The first message.
     Welcome(Welcome),
-    /// Execute this.
+    /// Execute this node.
     Assign(Assignment),
-    /// The output of this node is not wanted any more; do not answer.
+    /// The output of this node is no longer needed; do not answer.
     Cancel(LeaseName),
-    /// A blob that was fetched; its parts follow.
+    /// A blob that the worker has requested; its parts follow.
     Blob {
         /// Its hash.
         hash: [u8; 32],
         /// Its length in bytes.
         length: u64,
     },
-    /// Your answer for this lease has arrived; forget it.
+    /// The answer for this lease has been received; the worker can drop it.
     Acknowledge(LeaseName),
-    /// I live. Comes as often as a worker shall tell the same.
+    /// A heartbeat, at the same interval as the worker's.
     Heartbeat,
-    /// The run is over; end.
+    /// The run is over; the worker must end.
     Stop {
-        /// Why, for messages.
+        /// The reason, for display.
         reason: String,
     },
 }
 
-/// In which way a node failed.
+/// The way in which a node failed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum FailureKind {
-    /// Its inputs do not allow an output.
+    /// It has no output for its inputs.
     Application,
     /// It panicked.
     Panic,
@@ -121,19 +121,19 @@ pub enum FailureKind {
     UnknownKind,
 }
 
-/// What a worker says to its coordinator.
+/// A message from a worker to the coordinator.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum ToCoordinator {
-    /// Who I am. The first message.
+    /// The identity of the worker. The first message.
     Hello(Hello),
-    /// I live, and execute these.
+    /// A heartbeat.
     Heartbeat {
         /// The nodes in execution.
         executing: Vec<Executing>,
     },
-    /// I begin to execute this.
+    /// The worker starts to execute this node.
     Started(LeaseName),
-    /// Send me this blob.
+    /// A request for a blob.
     Fetch {
         /// Its hash.
         hash: [u8; 32],
@@ -147,23 +147,23 @@ pub enum ToCoordinator {
         /// Its length in bytes.
         length: u64,
     },
-    /// This node has no output, and would have none on any worker.
+    /// This node has failed, and would fail on any worker.
     Failed {
         /// The lease.
         lease: LeaseName,
         /// In which way it failed.
         kind: FailureKind,
-        /// What is wrong.
+        /// The error.
         message: String,
     },
-    /// I leave because I was asked to, not because of what I executed.
+    /// The worker disconnects because it was asked to, not because of a node that it executed.
     Goodbye,
-    /// I was asked to end: I finish what I execute, as far as there is time, and begin with nothing more. What I have not said to
-    /// have started may go elsewhere.
+    /// The worker was asked to end: it finishes its running nodes if there is time, and starts no more. Nodes that it has not reported as
+    /// started can be assigned to other workers.
     Draining,
 }
 
-/// `text`, cut to [`MAX_MESSAGE_TEXT_BYTES`] at a character's edge.
+/// `text`, truncated to [`MAX_MESSAGE_TEXT_BYTES`] at a character boundary.
 #[must_use]
 pub fn bounded_text(text: &str) -> String {
     text[..text.floor_char_boundary(MAX_MESSAGE_TEXT_BYTES)].to_owned()

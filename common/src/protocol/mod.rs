@@ -1,22 +1,22 @@
-//! The wire between coordinator and workers: handshake, frames, messages, transfers of blobs. Bytes in, bytes out: nothing
-//! here opens a socket or waits for one.
+//! The protocol between coordinator and workers: handshake, frames, messages, transfers of blobs. It maps bytes to values and back;
+//! nothing here opens a socket or waits for one.
 //!
-//! A connection is one TCP stream with TLS 1.3 in it, from its first byte. The coordinator shows a certificate that the access
-//! file pins ([`CertificatePin`]); the worker shows none. Inside, in order:
+//! A connection is one TCP stream with TLS 1.3 from its first byte. The coordinator presents a certificate that the access file pins
+//! ([`CertificatePin`]); the worker presents no certificate. Inside TLS, in order:
 //! 1. a fixed-byte preamble ([`Challenge`], [`Response`], [`Verdict`]): magic, version, mutual proof of the shared
-//!    secret, bound to this very TLS connection ([`ProofKey`]); parsed by hand, so that a stranger reaches no decoder;
+//!    secret, bound to this TLS connection ([`ProofKey`]); parsed by hand, so that unauthenticated bytes never reach the decoder;
 //! 2. frames ([`FrameReader`]): a length, checked against [`MAX_FRAME_BYTES`] before anything is allocated, a tag, a body;
 //! 3. in message frames [`ToCoordinator`] or [`ToWorker`], the first ones being `Hello` and `Welcome`;
 //! 4. in part frames the raw bytes of the blob that the last message announced ([`IncomingBlob`]).
 //!
-//! What it is not: these types are the wire's own. The job graph's types are converted at the edge, and nothing else is
-//! ever serialised because it happens to be convenient.
+//! These types are used on the wire only. Types of the job graph are converted to them, and never serialised directly.
 
 mod access;
 mod certificate;
 mod codec;
 mod frame;
 mod handshake;
+mod hex;
 mod message;
 mod transfer;
 mod version;

@@ -77,7 +77,7 @@ fn message_bytes_belong_to_this_protocol_version() {
         .chain(to_coordinator().iter().map(|message| encode_message(message).unwrap()))
         .flat_map(|bytes| [vec![u8::try_from(bytes.len()).unwrap()], bytes].concat())
         .collect();
-    // When this fails the wire has changed: count PROTOCOL_VERSION up and write the new hash here.
+    // If this fails, the protocol has changed: increment PROTOCOL_VERSION and write the new hash here.
     let golden = (4, "8a654160e73aab518e3039e1a3f39af290d64a27a01ee9e01bd094381322d4e7");
     assert_eq!((PROTOCOL_VERSION, BlobHash::of(&encoded).to_string().as_str()), golden);
 }
@@ -92,7 +92,7 @@ fn lease_and_hello_have_their_golden_bytes() {
 }
 
 #[test]
-fn every_message_survives_the_wire_and_no_cut_one_is_accepted() {
+fn every_message_round_trips_and_truncated_ones_are_refused() {
     fn check<T: Serialize + for<'de> Deserialize<'de> + PartialEq + std::fmt::Debug>(messages: Vec<T>) {
         for message in messages {
             let bytes = encode_message(&message).unwrap();
@@ -129,7 +129,7 @@ fn payload_floats_keep_their_bits() {
 }
 
 #[test]
-fn frames_are_found_however_the_stream_is_cut() {
+fn frames_are_found_for_any_split_of_the_stream() {
     let large = vec![3; MAX_FRAME_BYTES - 1];
     let bodies: [(FrameTag, &[u8]); 4] =
         [(FrameTag::Message, b"first"), (FrameTag::Part, b""), (FrameTag::Part, &large), (FrameTag::Message, b"last")];
@@ -195,15 +195,15 @@ fn wrong_secret_is_refused_without_a_proof() {
     let verdict = Verdict::from_bytes(&verdict.to_bytes()).unwrap();
     let refused = HandshakeError::Refused(Refusal::WrongSecret);
     assert_eq!(verdict.check(&challenge, &response, &key(8)), Err(refused));
-    // A proof for another challenge is worth nothing.
+    // A proof for another challenge is refused.
     let replayed = Challenge::new([3; 32]).answer(&key(7), [2; 32]).unwrap();
     assert_eq!(replayed.judge(&challenge, &key(7)).refusal, Some(Refusal::WrongSecret));
 }
 
 #[test]
-fn proofs_cannot_be_passed_on_to_another_connection() {
+fn proofs_cannot_be_relayed_to_another_connection() {
     let challenge = Challenge::new([1; 32]);
-    // Somebody between the two has a connection with each, and passes everything on.
+    // A man in the middle has a connection to each side and relays everything.
     let response = challenge.answer(&key_on(7, 1), [2; 32]).unwrap();
     let verdict = response.judge(&challenge, &key_on(7, 2));
     assert_eq!((verdict.refusal, verdict.proof), (Some(Refusal::WrongSecret), [0; 32]));
@@ -224,7 +224,7 @@ fn unknown_version_is_named_on_both_sides() {
 }
 
 #[test]
-fn preamble_has_its_golden_bytes_and_knows_strangers() {
+fn preamble_has_its_golden_bytes_and_refuses_other_protocols() {
     let challenge = Challenge::new([1; 32]);
     let ones = "01".repeat(32);
     assert_eq!(hex(&challenge.to_bytes()), format!("4c4f4f4b4c494b4504000000{ones}"));
@@ -289,7 +289,7 @@ fn bad_access_files_are_named_without_repeating_the_secret() {
     assert!(matches!(file("host:70000", &pin, &digits), Err(AccessError::Address { .. })));
     assert_eq!(file("h:1", &pin, "abc"), Err(AccessError::Secret { found: 3 }));
     assert_eq!(file("h:1", &pin, &"g".repeat(64)), Err(AccessError::Secret { found: 64 }));
-    // There is no connection without TLS, so no file without a pin.
+    // Every connection uses TLS, so the pin is required.
     for certificate in ["null", "\"\"", "\"pem\"", &format!("\"sha256:{digits}\""), &format!("\"blake3:{digits}00\"")] {
         assert_eq!(file("h:1", certificate, &digits), Err(AccessError::Certificate), "{certificate}");
     }

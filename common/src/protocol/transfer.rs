@@ -1,14 +1,14 @@
-//! Blobs on the wire: announced by a message with hash and length, sent as part frames right behind it, verified at the end.
+//! Transfers of blobs: a message announces hash and length, part frames follow directly, and the receiver verifies the hash at the end.
 
 use thiserror::Error;
 
 use crate::graph::{Blob, BlobHash, HashMismatch, MAX_BLOB_BYTES};
 
-/// How many bytes of a blob go into one frame (1 MiB): large enough that framing costs nothing, small enough that
-/// memory follows what has come.
+/// How many bytes of a blob go into one frame (1 MiB): large enough to make the overhead of frames negligible, small enough that memory
+/// grows with the received bytes.
 pub const PART_BYTES: usize = 1 << 20;
 
-/// A transfer that went wrong. The connection cannot be used any more.
+/// Why a transfer failed. The connection cannot be used any more.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum TransferError {
@@ -18,10 +18,10 @@ pub enum TransferError {
         /// The announced length.
         found: u64,
     },
-    /// More bytes came than were announced, or an empty part.
+    /// More bytes than announced, or an empty part.
     #[error("expected a part of 1 to {expected} bytes, found {found}")]
     Part {
-        /// How many bytes are missing.
+        /// Number of missing bytes.
         expected: usize,
         /// The length of the part.
         found: usize,
@@ -31,12 +31,12 @@ pub enum TransferError {
     Hash(#[from] HashMismatch),
 }
 
-/// The parts in which a blob is sent; none for an empty one.
+/// The parts in which a blob is sent; an empty blob has no parts.
 pub fn parts(bytes: &[u8]) -> impl Iterator<Item = &[u8]> {
     bytes.chunks(PART_BYTES)
 }
 
-/// A blob that is being received. Memory grows with what has come, not with what was announced.
+/// A blob that is being received. Memory grows with the received bytes, not with the announced length.
 #[derive(Debug)]
 pub struct IncomingBlob {
     hash: BlobHash,
@@ -45,10 +45,10 @@ pub struct IncomingBlob {
 }
 
 impl IncomingBlob {
-    /// Begin to receive the blob that a message announced.
+    /// Begin to receive an announced blob.
     ///
     /// # Errors
-    /// When it is longer than [`MAX_BLOB_BYTES`].
+    /// If it is longer than [`MAX_BLOB_BYTES`].
     pub fn begin(hash: BlobHash, length: u64) -> Result<Self, TransferError> {
         let within_limit = usize::try_from(length).ok().filter(|length| *length <= MAX_BLOB_BYTES);
         let length = within_limit.ok_or(TransferError::TooLong { found: length })?;
@@ -58,14 +58,14 @@ impl IncomingBlob {
     /// Take the next part.
     ///
     /// # Errors
-    /// When it is empty or longer than what is missing.
+    /// If it is empty or longer than the missing bytes.
     pub fn push(&mut self, part: &[u8]) -> Result<(), TransferError> {
         let expected = self.length - self.bytes.len();
         if part.is_empty() || part.len() > expected {
             return Err(TransferError::Part { expected, found: part.len() });
         }
-        // Doubling would leave up to half of the memory unused; past the first part the announced length is believed
-        // step by step.
+        // `Vec` would double its capacity and leave up to half of it unused. Grow at most by doubling, and never beyond the announced
+        // length.
         if self.bytes.capacity() < self.bytes.len() + part.len() {
             let wanted = self.length.min(self.bytes.len() * 2).max(self.bytes.len() + part.len());
             self.bytes.reserve_exact(wanted - self.bytes.len());
@@ -74,7 +74,7 @@ impl IncomingBlob {
         Ok(())
     }
 
-    /// Whether all bytes are there.
+    /// Whether all bytes have been received.
     #[must_use]
     pub fn is_complete(&self) -> bool {
         self.bytes.len() == self.length
@@ -83,7 +83,7 @@ impl IncomingBlob {
     /// The blob, verified.
     ///
     /// # Errors
-    /// When bytes are missing or are not the announced ones.
+    /// If bytes are missing, or their hash is not the announced one.
     pub fn finish(self) -> Result<Blob, TransferError> {
         if !self.is_complete() {
             return Err(TransferError::Part { expected: self.length - self.bytes.len(), found: 0 });

@@ -1,9 +1,8 @@
-//! Which protocol this build speaks.
+//! The protocol version of this build.
 
-/// The first bytes that either side sends: tells a stranger's protocol from ours.
+/// The first bytes that either side sends, to detect peers that speak another protocol.
 pub const MAGIC: [u8; 8] = *b"LOOKLIKE";
 
-/// The version of everything in this module: preamble, frames and messages. Any change of them, however small, counts it
-/// up; a test holds the bytes of every message to this number. Both sides have to speak the same version: workers and
-/// coordinator come from one build, so there is no negotiation to get wrong.
+/// The version of preamble, frames and messages. Any change of them needs a new number; a test checks the bytes of every message
+/// against it. Both sides must have the same version; there is no negotiation, because workers and coordinator come from one build.
 pub const PROTOCOL_VERSION: u16 = 4;

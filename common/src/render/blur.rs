@@ -1,26 +1,27 @@
-//! What a surface point sees of a pyramid node: not a point, but light spread around its centroid.
+//! The light of a pyramid node at a surface point: angles at the node's centroid, and a correction for its spread.
 //!
 //! Let `x` be the light's offset from the centroid `c` in the tangent plane there, of mean 0 and covariance `S`, and `L = 2 v.h`. To
 //! second order the half vector `h = (l + v)/|l + v|`, `l = c + x - c |x|^2/2`, moves along a unit vector `r` across it by
 //!
 //! `r.x/L - (r.c)|x|^2/(2L) - (r.x)(h.x)/L^2`,
 //!
-//! and `u = 1 - (n.h)^2` changes, with `r sin(th) = n - (n.h) h =: q` and `p` the half vector's step, by
+//! and, with `r sin(th) = n - (n.h) h =: q` and `p` the step of the half vector, `u = 1 - (n.h)^2` changes by
 //!
 //! `-2 (n.h) q.p - (q.p)^2 + (n.h)^2 |p|^2`.
 //!
-//! Their means follow from three quadratic forms of `S`.
+//! The means of both follow from three quadratic forms of `S`.
 
-use super::{cut::Point, pyramid::Node};
+use super::{point::Point, pyramid::Node};
 use crate::{
     brdf::{Angles, Spread},
     math::{Vec3, frame::Frame, widen},
 };
 
-/// `v.h` below this is taken as this: light that comes from straight behind the surface turns the half vector without bound.
+/// Lower limit of `v.h`: as light approaches the direction opposite to the view, a small step of it turns the half vector without
+/// bound.
 pub(super) const LEAST_COS_D: f64 = 0.05;
 
-/// The angles of a node's light at a surface point, and what its spread does to them; `None` when all of it is below the horizon.
+/// The angles of a node's light at a surface point, and the effect of its spread on them; `None` if all of it is below the horizon.
 #[inline]
 pub(super) fn seen_from(node: &Node, point: &Point) -> Option<(Angles, Spread)> {
     let centroid = widen(node.centroid);
@@ -43,9 +44,9 @@ pub(super) fn seen_from(node: &Node, point: &Point) -> Option<(Angles, Spread)> 
             return None;
         }
     }
-    // The mean vector of directions spread around their centroid is shorter than 1 by half the mean square chord: exact.
+    // The mean of the node's directions is shorter than 1 by exactly half their mean square chord from the centroid.
     angles.cos_i *= 1.0 - 0.5 * light2;
-    // `h` and `q` in the tangent plane; the centroid has no part there. Light straight from behind has no half vector.
+    // `h` and `q` in the tangent plane, in which the centroid has no component. Light opposite to the view has no half vector.
     let length = 2.0 * angles.cos_d.max(1e-9);
     let half = (view.0 / length, view.1 / length);
     let offset = (normal.0 - angles.cos_h * half.0, normal.1 - angles.cos_h * half.1);
@@ -59,10 +60,11 @@ pub(super) fn seen_from(node: &Node, point: &Point) -> Option<(Angles, Spread)> 
     Some((angles, Spread { du, du2: 4.0 * cos2 * along2 }))
 }
 
-/// Mean of `max(0, n.l)` of light of mean cosine `cos_i` and variance `variance`, taken as spread evenly, no farther than `radius`: every
-/// lobe vanishes linearly at the horizon, and a node that it cuts would else count fully or not at all.
+/// Mean of `max(0, n.l)` over light of mean cosine `cos_i` and variance `variance`. The cosine is taken as uniformly distributed, no
+/// farther than `radius` from its mean. Every lobe vanishes linearly at the horizon; without this mean, a node that crosses the horizon
+/// would count fully or not at all.
 fn above_horizon(cos_i: f64, variance: f64, radius: f64) -> f64 {
-    // A variance that is none may be rounded below 0.
+    // Rounding may make a variance of 0 negative.
     let reach = (3.0 * variance.max(0.0)).sqrt().min(radius);
     if cos_i >= reach {
         cos_i

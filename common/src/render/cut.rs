@@ -1,12 +1,13 @@
-//! The cut through the light pyramid for one surface point: as few nodes as the lobes allow.
+//! The cut through the light pyramid for one surface point: the fewest nodes that keep the error below the tolerance.
 //!
 //! Taking a node as a point at its energy centroid leaves a second-order error, `1/2 tr(H S)`, with `H` the Hessian of `f cos` and `S`
 //! the energy's covariance over the node. A node is split while that error, bounded from above over the node and over the widths of
-//! a [`Band`], exceeds the tolerance; then most of it is taken away (in `render/blur.rs`). Nothing is random: neighbouring pixels get
-//! neighbouring cuts, and the error is smooth instead of noise.
+//! a [`Band`], exceeds the tolerance. Most of the remaining error is then corrected in `render/blur.rs`. Nothing is random: neighbouring
+//! pixels get similar cuts, so the error varies smoothly instead of as noise.
 
 use super::{
     blur::{LEAST_COS_D, seen_from},
+    point::Point,
     pyramid::{Cell, LightPyramid, Node, strongest},
 };
 use crate::{
@@ -15,12 +16,12 @@ use crate::{
 };
 use std::f64::consts::PI;
 
-/// What the cut is refined for: a range of lobe widths, or the cosine lobe.
+/// The lobes that a cut is refined for: a range of lobe widths, or the cosine lobe.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Band {
     /// A lobe as wide as the hemisphere, with its [bend](crate::brdf::Lobe::bend).
     Diffuse(f64),
-    /// Microfacet lobes of GGX alpha from `.0` to `.1`, and how their distribution falls.
+    /// Microfacet lobes of GGX alpha from `.0` to `.1`, and how fast their distribution falls.
     Glossy(f64, f64, Tail),
 }
 
@@ -35,26 +36,6 @@ impl Band {
     }
 }
 
-/// A surface point: unit normal and direction to the viewer, world space.
-#[derive(Debug, Clone, Copy)]
-pub struct Point {
-    /// Surface normal.
-    pub normal: Vec3,
-    /// Towards the viewer.
-    pub view: Vec3,
-    /// Their cosine, positive.
-    pub cos_o: f64,
-}
-
-impl Point {
-    /// A point seen from above the surface; `None` when the view is not above the horizon.
-    #[must_use]
-    pub fn new(normal: Vec3, view: Vec3) -> Option<Self> {
-        let cos_o = normal.dot(view);
-        (cos_o > 0.0).then_some(Self { normal, view, cos_o })
-    }
-}
-
 /// Reusable storage for cuts.
 #[derive(Debug, Default)]
 pub struct Cut {
@@ -65,12 +46,12 @@ pub struct Cut {
 
 impl Cut {
     /// Refines the pyramid until no node's error in radiance, for a lobe of unit weight, exceeds `tolerance` (for glossy lobes times
-    /// `n.v`, and less for wide ones) at any surface point whose normal and view lie within `reach` (chords of the unit sphere, added) of those of `point`; `point.cos_o` is the lowest
-    /// of them.
+    /// `n.v`, and less for wide ones). The bound holds at every surface point whose normal and view lie within `reach` of those of
+    /// `point` (the sum of both chords of the unit sphere); `point.cos_o` must be the lowest of all these points.
     pub fn refine(&mut self, pyramid: &LightPyramid, point: &Point, reach: f64, band: Band, tolerance: f64) {
         let bound = Bound::new(point, reach, band);
-        // The `F5` part of a lobe has a twentieth of its mean radiance and nearly all of it towards the rim, where n.v is small: with
-        // the same tolerance everywhere its relative error would be twenty times that of the lobe.
+        // The `F5` part of a lobe has a twentieth of the lobe's mean radiance, nearly all of it near the rim, where n.v is small: with
+        // the same tolerance everywhere, its relative error would be twenty times that of the lobe.
         let tolerance = match band {
             Band::Diffuse(_) => tolerance,
             Band::Glossy(sharpest, ..) => tolerance * point.cos_o.max(LEAST_COS_D) * (EVEN / sharpest).min(1.0),
@@ -108,14 +89,14 @@ impl Cut {
         &self.lights
     }
 
-    /// The nodes of the cut: direction of the energy's centroid (world, unit up to a rounding) and energy, for reflectances that
-    /// are no basis lobes.
+    /// The nodes of the cut: direction of the energy's centroid (world, unit length up to rounding) and energy. For reflectances that
+    /// are not basis lobes.
     pub fn directions(&self) -> impl Iterator<Item = (Vec3, Rgb)> + '_ {
         self.nodes.iter().map(|node| (widen(node.centroid), widen(node.energy)))
     }
 }
 
-/// Bounds the error of taking a node as a point, for the surface points around one and a band.
+/// Bounds the error of taking a node as a point, for a band and the surface points around a given one.
 struct Bound<'a> {
     point: &'a Point,
     reach: f64,
@@ -124,7 +105,7 @@ struct Bound<'a> {
     shading: f64,
     /// Squares of the band's widths.
     squares: [f64; 2],
-    /// Of a distribution of long tail: its peak times the square of the width, at the largest width.
+    /// For a distribution of long tail: its peak times the square of the width, at the largest width.
     long_peak: f64,
     lower: f64,
 }
@@ -174,7 +155,7 @@ impl<'a> Bound<'a> {
         let turn = inverse.sqrt().min(10.0);
         let along = self.point.normal.dot(half);
         let sin2 = (1.0 - along * along * inverse).max(0.0);
-        // A half vector below the surface counts as one in it; the node may still hold the mirror direction.
+        // A half vector below the surface counts as one in the surface; the node may still contain the mirror direction.
         let sin = if along > 0.0 { sin2.sqrt() } else { 1.0 };
         let nearest = (sin - f64::from(node.radius) * turn - self.reach).max(0.0);
         let t2 = nearest * nearest;
@@ -195,15 +176,15 @@ impl<'a> Bound<'a> {
     }
 }
 
-/// The cosine lobe needs few nodes, whose errors average less: it gets a tighter tolerance.
+/// The cosine lobe needs few nodes, so their errors average out less: it gets a tighter tolerance.
 const DIFFUSE_CARE: f64 = 6.0;
 
-/// Curvature, in units of the distribution, of what multiplies it: Fresnel's term, masking-shadowing, the cosine. Wide lobes are no
-/// smoother than that.
+/// Curvature, in units of the distribution, of its factors: Fresnel's term, masking-shadowing, the cosine. Wide lobes are not smoother
+/// than these factors.
 const SLOW_FACTORS: f64 = 4.0;
 
-/// Of lobes wider than this the second-order terms leave as much as they take, as what multiplies the distribution varies as much; they
-/// need few nodes and get a tighter tolerance.
+/// For lobes wider than this, the second-order terms correct only about half of the error, because the factors of the distribution vary
+/// as much as the distribution. Such lobes need few nodes and get a tighter tolerance.
 const EVEN: f64 = 0.1;
 
 /// Share of a node's size by which a kink at the horizon can shift its value.

@@ -1,7 +1,7 @@
-//! Where inside a pixel its radiance is sampled.
+//! Sample positions inside a pixel.
 //!
-//! A photo's pixel is a mean over its area. The transport tables take that mean by Gauss-Legendre quadrature whose order
-//! follows how far the normal turns over the pixel, measured in widths of the sharpest lobe.
+//! A photo's pixel is a mean over its area. The transport tables compute that mean by Gauss-Legendre quadrature. Its order depends on
+//! the turn of the normal over the pixel, in widths of the sharpest lobe.
 
 use crate::math::sampling::PointStream;
 
@@ -22,8 +22,8 @@ pub fn positions(spread_rad: f64, alpha: f64) -> Vec<Position> {
     tensor(order(spread_rad, alpha))
 }
 
-/// Positions for a pixel that the silhouette cuts: the first few points of a low-discrepancy sequence where `hit(x, y)` holds, so
-/// that a sliver gets as many as a pixel that is almost full. None if it misses everywhere.
+/// Positions for a pixel that the silhouette cuts: the first 32 points of a low-discrepancy sequence at which `hit(x, y)` holds, so
+/// that a barely covered pixel gets as many as one that is almost full. Empty if no point hits.
 #[must_use]
 pub fn on_object(hit: impl Fn(f64, f64) -> bool) -> Vec<Position> {
     let stream = PointStream::new(SILHOUETTE_STREAM);
@@ -38,10 +38,10 @@ pub fn on_object(hit: impl Fn(f64, f64) -> bool) -> Vec<Position> {
 /// Positions in a pixel that the silhouette cuts.
 const SILHOUETTE_POSITIONS: usize = 32;
 
-/// Points of the pixel that are tried for them: a sliver of a 256th of the pixel is still found.
+/// Points of the pixel that are tried: enough to find an object that covers a 256th of the pixel.
 const SILHOUETTE_TRIES: u32 = 1024;
 
-/// The same points in every pixel, so that neighbours differ smoothly.
+/// The points are the same in every pixel, so that neighbours differ smoothly.
 const SILHOUETTE_STREAM: u64 = 0;
 
 /// Gauss-Legendre order per axis. With the turn over the pixel in lobe widths, `q`, the error of order `n` falls as `q^(2n)`;
@@ -102,9 +102,9 @@ mod tests {
         }
     }
 
-    /// The mean of a GGX peak over a pixel, wherever the peak lies in it.
+    /// The mean of a GGX peak over a pixel, for several places of the peak.
     #[test]
-    fn a_lobe_averages_to_a_five_hundredth_of_its_peak() {
+    fn the_mean_of_a_lobe_is_within_a_five_hundredth_of_its_peak() {
         const TOLERANCE: f64 = 2e-3;
         for q in [0.05, 0.079, 0.3, 0.49, 0.8, 0.99, 1.4, 1.49, 1.9, 2.5, 2.9] {
             let lobe = |x: f64| 1.0 / ((1.0 + x * x * q * q) * (1.0 + x * x * q * q));

@@ -1,8 +1,7 @@
 //! A full image by the direct integrator, with an estimate of its noise.
 //!
-//! Each pixel is rendered twice, by two independent randomisations of half the samples; the image is their mean, and their
-//! difference tells how far the mean is from the truth. Pixels are weighted by their coverage, so that an edge pixel shows the object over
-//! black.
+//! Each pixel is rendered twice, with two independent randomisations of half the samples. The image is their mean; the noise is
+//! estimated from their difference. Pixels are multiplied by their coverage, so an edge pixel shows the object over black.
 
 use super::integrator::Integrator;
 use crate::{
@@ -14,14 +13,14 @@ use crate::{
 };
 use rayon::prelude::*;
 
-/// What to render, and how finely.
+/// The scene to render, and the number of samples.
 #[derive(Debug, Clone, Copy)]
 pub struct Shot<'a> {
     /// The object and the camera.
     pub geometry: &'a Geometry,
     /// The light with its sampling density.
     pub light: &'a LightDistribution,
-    /// What the object is made of.
+    /// The material of the object.
     pub reflectance: &'a dyn Reflectance,
     /// Samples per pixel.
     pub samples: u32,
@@ -38,23 +37,23 @@ pub struct Rendering {
     pub coverage: Vec<f32>,
     /// Mean radiance over the object.
     pub mean_radiance: Rgb,
-    /// None with a single sample, or when the object is black.
+    /// `None` with a single sample, or if the object is black.
     pub noise: Option<Noise>,
 }
 
-/// The standard error of pixels, over those that are wholly covered.
+/// The standard error of pixels, over those that the object covers completely.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Noise {
-    /// Of a typical pixel, relative to its own luminance: the median over the pixels, scaled to a standard deviation. What the
-    /// eye sees.
+    /// Of a typical pixel, relative to its own luminance: the median over the pixels, scaled to a standard deviation. It corresponds
+    /// to the visible noise.
     pub typical: f64,
-    /// Root mean square over pixels and channels, relative to the mean radiance (mean of the channels). The highlights decide it.
+    /// Root mean square over pixels and channels, relative to the mean radiance (mean of the channels). Highlights dominate it.
     pub rms: f64,
 }
 
 impl Shot<'_> {
-    /// Renders the image, the rows in parallel. The same bits on any number of threads. `row_done` is called once per row, in no
-    /// certain order, from any thread.
+    /// Renders the image, its rows in parallel; the result is the same bit for bit on any number of threads. `row_done` is called once
+    /// per row, in any order, from any thread.
     #[must_use]
     pub fn render(&self, row_done: impl Fn() + Sync) -> Rendering {
         let (width, height) = (self.geometry.width(), self.geometry.height());
@@ -81,7 +80,7 @@ impl Shot<'_> {
         if coverage == 0.0 {
             return Pixel { radiance: Rgb::ZERO, coverage, error: None };
         }
-        // No image in memory has more columns or rows.
+        // An image in memory never has more than `u32::MAX` columns or rows.
         let place = [column, row].map(|n| u32::try_from(n).unwrap_or(u32::MAX));
         let half = |samples: u32, half: u64| {
             let Self { geometry, light, .. } = *self;
@@ -124,7 +123,7 @@ fn noise(pixels: &[Pixel], mean_radiance: Rgb) -> Option<Noise> {
 /// The median of |x| for a normal x of standard deviation 1.
 const HALF_NORMAL_MEDIAN: f64 = 0.674_489_750_196_081_7;
 
-/// Keeps these random numbers apart from those of other users of the integrator.
+/// Part of the key of the random numbers, so that they differ from those of other users of the integrator.
 const STAGE: u64 = 0x1_3A6E;
 
 #[cfg(test)]

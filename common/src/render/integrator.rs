@@ -1,6 +1,6 @@
-//! The direct integrator: one pixel of any reflectance by Monte Carlo integration. The slow reference.
+//! The direct integrator, the slow reference: one pixel of any reflectance by Monte Carlo integration.
 //!
-//! Each sample has its own position inside the pixel, and so its own normal. Directions come from one mixture, half from the
+//! Each sample has its own position inside the pixel, and therefore its own normal. Directions come from one mixture, half from the
 //! environment's density and half from the lobes of the reflectance (visible GGX normals), weighted by the balance heuristic
 //! (Veach 1997): every sample counts with `1 / sum_j n_j p_j(d)`. Points are scrambled Sobol points, a pure function of (seed, pixel,
 //! technique, index).
@@ -38,7 +38,7 @@ enum Technique {
     Cosine,
 }
 
-/// Lobes at least this wide are proposed by the cosine instead.
+/// Directions for lobes at least this wide are drawn from the cosine density instead.
 const WIDE: f64 = 0.7;
 
 impl Integrator<'_> {
@@ -62,7 +62,7 @@ impl Integrator<'_> {
             }
         }
         let drawn: u32 = techniques.iter().map(|(_, n)| n).sum();
-        // Each technique's sum estimates the mean over the pixel; samples that miss the object add nothing.
+        // Each technique's sum estimates the mean over the pixel; samples that miss the object add 0.
         if hits == 0 { Rgb::ZERO } else { sum * (f64::from(drawn) / f64::from(hits)) }
     }
 
@@ -122,7 +122,7 @@ impl Integrator<'_> {
     }
 }
 
-/// The local direction that a technique of the reflectance proposes; may lie below the surface.
+/// A direction drawn by a technique of the reflectance, in local coordinates; it may lie below the surface.
 fn proposal(technique: Technique, wo: Vec3, u: [f64; 2]) -> Vec3 {
     match technique {
         Technique::Lobe(alpha) => {

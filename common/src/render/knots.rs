@@ -14,11 +14,11 @@ pub const STENCIL: usize = 6;
 
 /// Knots per factor of two of width in tables of stage one.
 ///
-/// Beckmann's exponential is the sharpest function of `ln m`: at its worst between knots it is off by 1.3e-4 of its peak with six, by
-/// 2.8e-4 with the five of full-resolution tables (tested below).
+/// Beckmann's exponential is the sharpest function of `ln m`: its largest error between knots is 1.3e-4 of its peak with six knots per
+/// octave, and 2.8e-4 with the five of full-resolution tables (tested below).
 pub const PER_OCTAVE: f64 = 6.0;
 
-/// Bounds of a grid that comes from elsewhere.
+/// Limits of a grid that was received from a peer.
 const MOST_KNOTS: usize = 4096;
 const LARGEST_LN: f64 = 100.0;
 
@@ -30,7 +30,7 @@ pub struct Knots {
     count: usize,
 }
 
-/// The knots a width lies between, with the weights of its value and of its derivative.
+/// The knots around a width, with their weights for the value and the derivative.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Stencil {
     /// First knot of six.
@@ -94,7 +94,7 @@ impl Knots {
         (sized && ends.iter().all(|ln| ln.is_finite() && ln.abs() < LARGEST_LN)).then_some(knots)
     }
 
-    /// Interpolation weights at a width; outside the span the nearest end is taken.
+    /// Interpolation weights at a width; a width outside the span is clamped to it.
     #[must_use]
     pub fn stencil(&self, width: f64) -> Stencil {
         let position = ((ln(width) - self.first_ln) / self.step_ln).clamp(0.0, (self.count - 1) as f64);
@@ -135,8 +135,8 @@ impl Knots {
 
 /// The grid of every lobe of a model; `None` for a lobe of fixed shape.
 ///
-/// The first lobe that has a width, the main one, has the grid `main`, which may cover no more than the widths that are of interest. Any
-/// other covers all of its widths: those of a coat are few.
+/// The main lobe, the first one that has a width, has the grid `main`, which may cover only the needed widths. Every other lobe has a
+/// grid over its whole range of widths; the range of a coat is small.
 #[must_use]
 pub fn of_lobes(model: &dyn Model, main: Knots) -> Vec<Option<Knots>> {
     let mut main = Some(main);
@@ -148,8 +148,8 @@ pub fn of_lobes(model: &dyn Model, main: Knots) -> Vec<Option<Knots>> {
     widths.map(|width| width.map(|width| main.take().unwrap_or_else(|| whole(width)))).collect()
 }
 
-/// Knots per factor of two for lobes that are not the main one: a coat's distribution is off by 7e-4 of itself at its worst (tested
-/// below), and no more than a quarter of it is seen.
+/// Knots per factor of two for all lobes but the main one: the largest relative error of a coat's distribution is 7e-4 (tested below),
+/// and the coat's weight is at most a quarter.
 const OTHERS_PER_OCTAVE: f64 = 3.0;
 
 #[cfg(test)]

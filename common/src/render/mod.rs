@@ -1,10 +1,10 @@
-//! From light, shape and BRDF to pixels.
+//! Renders pixels from light, shape and BRDF.
 //!
-//! Two independent ways to the same numbers: the direct [`integrator`] (Monte Carlo, the slow reference, any
-//! reflectance) and the [`transport`] tables (deterministic adaptive quadrature over a [`pyramid`] of the light, for the
-//! basis lobes of a model), each tested against the other.
+//! Two independent methods compute the same numbers and are tested against each other: the direct [`integrator`] (Monte Carlo, the
+//! slow reference, any reflectance) and the [`transport`] tables (deterministic adaptive quadrature over a [`pyramid`] of the light,
+//! for the basis lobes of a model).
 //!
-//! Direct light from the environment only: a convex object, no inter-reflection.
+//! Only direct light from the environment is rendered: the object is taken as convex, without inter-reflection.
 
 mod blur;
 pub mod cut;
@@ -12,6 +12,7 @@ pub mod footprint;
 pub mod image;
 pub mod integrator;
 pub mod knots;
+pub mod point;
 pub mod pyramid;
 pub mod subset;
 pub mod table;

@@ -1,9 +1,9 @@
 //! A pyramid of the environment light: per node the energy, its centroid direction and its covariance.
 //!
-//! Level 0 holds one node per texel of the lat-long map; each coarser level joins 2 x 2 nodes. The energy of a texel is the
-//! integral of the *bilinear* radiance over the texel's area (the mean of a bilinear function over a rectangle within one
-//! patch is its value at the centre, so four quadrants suffice; that the radiance and sin(theta) vary together over a quadrant
-//! is neglected in the energy, not in the centroid). Where a texel is too coarse for a lobe, [`Cell`]s finer than texels are made on the fly.
+//! Level 0 has one node per texel of the lat-long map; each coarser level joins 2 x 2 nodes. The energy of a texel is the integral of
+//! the *bilinear* radiance over the texel's area. The mean of a bilinear function over a rectangle within one patch is its value at the
+//! centre, so four quadrants suffice. The covariance of radiance and sin(theta) over a quadrant is neglected in the energy, but not in
+//! the centroid. Where a texel is too coarse for a lobe, [`Cell`]s finer than texels are computed on demand.
 
 use crate::{
     light::Environment,
@@ -13,7 +13,7 @@ use glam::DMat3;
 use rayon::prelude::*;
 use std::f64::consts::{PI, TAU};
 
-/// Light from one node of the pyramid, seen as a point with a spread.
+/// Light from one node of the pyramid: a point with a spread.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Node {
     /// Radiance integrated over solid angle, linear Rec. 709.
@@ -23,7 +23,7 @@ pub struct Node {
     /// Energy-weighted covariance of the directions about the centroid, in the tangent plane there: along the first axis of
     /// [`Frame::from_normal`], mixed, along the second; square chords of the unit sphere.
     pub covariance: [f32; 3],
-    /// No point of the node is farther from the centroid than this chord.
+    /// Largest distance of a point of the node from the centroid, as a chord.
     pub radius: f32,
 }
 
@@ -81,7 +81,7 @@ pub struct LightPyramid {
     mean_radiance: f64,
 }
 
-/// Cells are not split further than this many halvings of a texel.
+/// Finest level: cells are at most this many halvings of a texel.
 const DEEPEST: i8 = -6;
 
 /// Coarsening stops at this many rows.
@@ -131,7 +131,7 @@ impl LightPyramid {
         }
     }
 
-    /// The cells that a cell is made of; none when it is as fine as they get.
+    /// The cells into which a cell splits; empty for the finest cells.
     pub fn children(&self, cell: Cell) -> impl Iterator<Item = Cell> + use<> {
         let (rows, columns) = match usize::try_from(cell.level - 1) {
             Ok(level) => (self.levels[level].rows, self.levels[level].columns),
@@ -165,7 +165,7 @@ fn quadrant(environment: &Environment, v: f64, u: f64, size: [f64; 2]) -> Node {
     let solid_angle = dphi * 2.0 * sin * sin_cos(0.5 * dtheta).0;
     let (radiance, slopes) = environment.radiance_and_slopes(u_mid, v_mid);
     let sum = radiance.element_sum();
-    // The side of the rectangle in texels, over the radiance: changes relative to it.
+    // Slopes per texel become changes over the rectangle, relative to the radiance.
     let side = environment.height() as f64 / size[0];
     let [a, b, c] = if sum > 0.0 { slopes.map(|slope| slope * side / sum) } else { [0.0; 3] };
     let (s, t) = (a / 12.0, (b + dtheta * cos / sin) / 12.0);
@@ -222,7 +222,7 @@ fn coarsen(fine: &Level) -> Level {
 fn join(parts: &[Node]) -> Node {
     let weight = |n: &Node| f64::from(n.energy.iter().sum::<f32>());
     let total: f64 = parts.iter().map(weight).sum();
-    // A dark node still has a place and a size.
+    // A node without energy still has a centroid and a spread.
     let share = |n: &Node| if total > 0.0 { weight(n) / total } else { 1.0 / parts.len() as f64 };
     let mean: Vec3 = parts.iter().map(|n| widen(n.centroid) * share(n)).sum();
     let centroid = mean.normalize_or(widen(parts[0].centroid));
@@ -252,7 +252,7 @@ mod tests {
 
     #[test]
     fn the_roots_hold_all_the_light_of_the_map() {
-        // Dim, textured walls, a window and a sun of one texel; sides that are no powers of two.
+        // Dim, textured walls, a window and a sun of one texel; sides that are not powers of two.
         let texel = |k: usize| match (k / 44, k % 44) {
             (6..=9, 5..=9) => [4.0, 5.0, 7.0],
             (7, 31) => [900.0, 800.0, 700.0],
@@ -265,7 +265,7 @@ mod tests {
         let energy = root_energy(&pyramid);
         // The pyramid integrates the bilinear function; only sin(theta) within a quarter texel is neglected.
         assert!((energy / integral - Rgb::ONE).abs().max_element() < 1e-3, "{energy} {integral}");
-        // The sum over texels sees the sun in its own row, not spread over three: their solid angles differ by a hundredth.
+        // The sum over texels has the sun in one row, not spread over three, whose solid angles differ by 1 %.
         assert!((energy / total - Rgb::ONE).abs().max_element() < 0.01, "{energy} {total}");
     }
 

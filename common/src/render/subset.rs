@@ -5,9 +5,14 @@
 //! over all pixels.
 
 use super::transport::{Pixel, tile_order};
-use crate::math::sampling::{key, uniform};
+use crate::{
+    choice::choice,
+    math::sampling::{key, uniform},
+};
+use std::{fmt, str::FromStr};
+use thiserror::Error;
 
-/// How many pixels stage one looks at.
+/// How many pixels stage one uses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum SampleCount {
     /// This many draws.
@@ -16,15 +21,56 @@ pub enum SampleCount {
     Full,
 }
 
+impl Default for SampleCount {
+    /// 256, as in the paper.
+    fn default() -> Self {
+        Self::Draws(256)
+    }
+}
+
+/// A text that is no [`SampleCount`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
+#[error("expected a whole number above 0, or full; at most {} can be drawn", u32::MAX)]
+pub struct UnknownSampleCount;
+
+impl FromStr for SampleCount {
+    type Err = UnknownSampleCount;
+
+    /// A whole number above 0, or `full`.
+    fn from_str(text: &str) -> Result<Self, UnknownSampleCount> {
+        match text.parse() {
+            Ok(count @ 1..) => Ok(Self::Draws(count)),
+            Err(_) if text == "full" => Ok(Self::Full),
+            _ => Err(UnknownSampleCount),
+        }
+    }
+}
+
+impl fmt::Display for SampleCount {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Draws(count) => write!(f, "{count}"),
+            Self::Full => write!(f, "full"),
+        }
+    }
+}
+
 /// How pixels are drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Sampling {
     /// Probability proportional to intensity (the paper's).
+    #[default]
     Importance,
     /// One draw from each of N equal parts of the pixels, in Morton order; density uniform.
     Stratified,
-    /// Every pixel alike.
+    /// Equal probability for every pixel.
     Uniform,
+}
+
+choice! { Sampling:
+    Importance = "importance", "In proportion to the photo's luminance, as in the paper";
+    Stratified = "stratified", "All usable pixels alike, one draw from each of N equal parts of the image";
+    Uniform = "uniform", "All usable pixels alike, drawn independently";
 }
 
 /// A pixel that stage one may use.
@@ -36,7 +82,7 @@ pub struct Candidate {
     pub intensity: f64,
 }
 
-/// The chosen pixels, tile by tile ([`tile_order`]), each once: neighbours share cuts of the light.
+/// The chosen pixels, each once, in [`tile_order`], so that neighbours share cuts of the light pyramid.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct PixelSubset {
     /// Column and row.
@@ -45,13 +91,13 @@ pub struct PixelSubset {
     pub weights: Vec<f64>,
 }
 
-/// The stage number that keeps this module's random numbers apart from others'.
+/// Part of the key of the random numbers, so that they differ from those of other modules.
 const STAGE: u64 = 1;
 
 impl PixelSubset {
-    /// Draws a subset; a pure function of its arguments. `index` tells the subsets of one run apart.
+    /// Draws a subset; a pure function of its arguments. `index` is the number of the subset in its run.
     ///
-    /// Returns `None` when there is no candidate, or importance sampling finds no light at all.
+    /// Returns `None` if there is no candidate, or if all intensities are 0 with importance sampling.
     #[must_use]
     pub fn draw(
         candidates: &[Candidate],
@@ -142,6 +188,16 @@ mod tests {
     fn gradient() -> Vec<Candidate> {
         let pixel = |i: u32| [i % 40, i / 40];
         (0..1600).map(|i| Candidate { pixel: pixel(i), intensity: f64::from(i % 40) + 0.5 }).collect()
+    }
+
+    #[test]
+    fn samples_are_a_count_or_everything() {
+        assert_eq!("full".parse(), Ok(SampleCount::Full));
+        assert_eq!("256".parse(), Ok(SampleCount::default()));
+        assert_eq!("12".parse::<SampleCount>().unwrap().to_string(), "12");
+        for text in ["0", "-1", "2.5", "all", "", "4294967296"] {
+            assert!(text.parse::<SampleCount>().is_err(), "{text}");
+        }
     }
 
     #[test]

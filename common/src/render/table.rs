@@ -1,4 +1,4 @@
-//! A transport table: the basis integrals of some pixels on a grid of lobe widths, and radiance from it.
+//! A transport table: the basis integrals of a list of pixels on a grid of lobe widths, and the radiance computed from them.
 //!
 //! `B[p] = sum_t weight_t(parameters) * T_t[p](width)`: see [`crate::brdf`]. Values are stored in `f32`, sums are `f64` in a
 //! fixed order.
@@ -14,7 +14,7 @@ use crate::{
 pub struct LobeTable {
     /// Grid of widths; `None` for a lobe of fixed shape.
     pub knots: Option<Knots>,
-    /// Terms the lobe splits into.
+    /// Number of terms into which the lobe splits.
     pub terms: usize,
     /// Shape `knot x term x channel x pixel`, linear Rec. 709 radiance per unit weight.
     pub values: Vec<f32>,
@@ -43,7 +43,7 @@ pub type Planes = [Vec<f64>; 3];
 impl TransportTable {
     /// Joins the tables of consecutive pixel ranges.
     ///
-    /// Returns `None` when there is no shard, or the shards were made on different grids.
+    /// Returns `None` if there is no shard, or if the shards have different grids.
     #[must_use]
     pub fn concatenate(shards: &[&Self]) -> Option<Self> {
         let first = shards.first()?;

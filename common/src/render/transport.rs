@@ -2,9 +2,10 @@
 //! pyramid.
 
 use super::{
-    cut::{Band, Cut, Point},
+    cut::{Band, Cut},
     footprint::{self, Position},
     knots::{self, Knots},
+    point::Point,
     pyramid::LightPyramid,
     table::{LobeTable, TransportTable},
 };
@@ -23,8 +24,8 @@ pub type Pixel = [u32; 2];
 pub struct Accuracy {
     /// Largest error of one node of a cut, in units of the map's mean radiance, for a lobe of unit weight.
     pub tolerance: f64,
-    /// Turn of the normal over a pixel, in widths of the sharpest lobe, up to which one position stands for the pixel, as a
-    /// multiple of what keeps the error below 2e-3 of the lobe's peak.
+    /// Factor on the turn of the normal over a pixel up to which a given number of positions is used; 1 keeps the error below 2e-3 of the
+    /// lobe's peak.
     pub footprint: f64,
 }
 
@@ -33,18 +34,18 @@ impl Accuracy {
     pub const SUBSET: Self = Self { tolerance: 5e-4, footprint: 1.0 };
     /// Full-resolution tables of stage two and polish.
     pub const FULL: Self = Self { tolerance: 3e-3, footprint: 3.0 };
-    /// Tables on which polish looks for the lobe to start from.
+    /// Tables of the coarse picture, on which stage three finds the lobe to start from.
     pub const COARSE: Self = Self { tolerance: 1e-2, footprint: 10.0 };
 }
 
-/// What a table is to hold: lobes of `model`, widths on `knots`.
+/// The contents of a table: the lobes of `model`, at the widths of `knots`.
 #[derive(Debug, Clone, Copy)]
 pub struct TransportPlan {
     /// The model whose lobes are integrated.
     pub model: &'static dyn Model,
     /// The grid of widths of the model's main lobe, its first that has one; others have [grids of their own](knots::of_lobes).
     pub knots: Knots,
-    /// How finely.
+    /// How finely the integrals are computed.
     pub accuracy: Accuracy,
 }
 
@@ -54,7 +55,7 @@ const BAND_RATIO: f64 = 4.0;
 /// Neighbouring pixels within squares of this side may share a cut.
 const TILE: u32 = 4;
 
-/// Points share a cut while their normals turn by no more than this share of the sharpest lobe's width.
+/// Points share a cut if their half vectors differ by at most this share of the sharpest lobe's width.
 const REACH: f64 = 1.0;
 
 /// A surface point of a pixel with its share of the pixel's mean.
@@ -70,9 +71,9 @@ struct Seen {
 type Sums = Vec<Vec<f64>>;
 
 impl TransportPlan {
-    /// Integrates the table of some pixels. A pixel that sees no surface gets zeros.
+    /// Integrates the table of a list of pixels. A pixel without surface gets zeros.
     ///
-    /// Consecutive pixels of one tile share cuts where they may, so lists are best ordered by [`tile_order`].
+    /// Consecutive pixels of one tile share cuts where possible, so a list in [`tile_order`] is fastest.
     #[must_use]
     pub fn integrate(&self, geometry: &Geometry, pyramid: &LightPyramid, pixels: &[Pixel]) -> TransportTable {
         let tiles: Vec<&[Pixel]> = pixels.chunk_by(|a, b| tile_of(*a) == tile_of(*b)).collect();
@@ -180,7 +181,7 @@ fn tile_of([column, row]: Pixel) -> Pixel {
     [column / TILE, row / TILE]
 }
 
-/// Runs of points that may share a cut: the whole tile, else halves of it as long as they are too wide, else single points.
+/// Groups of points that may share a cut: the points are halved until each group is within `reach` or a single point.
 fn groups(points: &[Seen], reach: f64) -> Vec<&[Seen]> {
     if points.is_empty() {
         return Vec::new();
@@ -192,26 +193,26 @@ fn groups(points: &[Seen], reach: f64) -> Vec<&[Seen]> {
     [groups(first, reach), groups(second, reach)].concat()
 }
 
-/// The middle of some points, and how far the half vector of a light direction may turn from it to any of them.
+/// The mean of a group of points, and a bound on how far the half vector of a light direction turns from it to any of them.
 fn around(group: &[Seen]) -> (Point, f64) {
     if let [only] = group {
         return (only.point, 0.0);
     }
     let mean = |f: fn(&Point) -> Vec3| group.iter().map(|seen| f(&seen.point)).sum::<Vec3>().normalize_or_zero();
     let (normal, view) = (mean(|p| p.normal), mean(|p| p.view));
-    // The lowest view bounds masking for all.
+    // The lowest `cos_o` bounds the masking of all points.
     let cos_o = group.iter().map(|seen| seen.point.cos_o).fold(f64::INFINITY, f64::min);
     let distance = |p: &Point| (p.normal - normal).length() + (p.view - view).length();
     let reach = group.iter().map(|seen| distance(&seen.point)).fold(0.0, f64::max);
     (Point { normal, view, cos_o }, reach)
 }
 
-/// Splits ascending widths into runs that share a cut.
+/// Splits ascending widths into ranges that share a cut.
 fn bands(lobe: &dyn Lobe, widths: &[f64]) -> Vec<(Band, std::ops::Range<usize>)> {
     let Some(alphas) = widths.iter().map(|&w| lobe.equivalent_alpha(w)).collect::<Option<Vec<f64>>>() else {
         return vec![(Band::Diffuse(lobe.bend()), 0..widths.len())];
     };
-    // Equal numbers of knots per band, as many bands as the ratio asks for.
+    // As many bands as `BAND_RATIO` requires, with equal numbers of knots.
     let span = alphas.iter().fold(0.0_f64, |m, &a| m.max(a)) / alphas.iter().fold(f64::INFINITY, |m, &a| m.min(a));
     let count = (crate::math::elementary::ln(span) / crate::math::elementary::ln(BAND_RATIO)).ceil().max(1.0);
     let count = crate::math::cell(count, alphas.len() + 1);

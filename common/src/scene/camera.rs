@@ -6,9 +6,10 @@ use crate::math::Vec3;
 use crate::math::elementary::tan;
 
 /// The camera: on +Z, looking along -Z, the photo's x along +X.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub enum Camera {
     /// Parallel rays.
+    #[default]
     Orthographic,
     /// A pinhole whose axis meets the middle of the photo; pixels are square.
     Perspective {

@@ -181,7 +181,7 @@ impl Capture {
             1000 * too_bright > counts.usable,
             format!(
                 "{too_bright} pixels of the object are brighter than the brightest light of the map, which no material \
-                 can be: photo and map may have different exposures (see --exposure-gain)"
+                 can be: if photo and map have different exposures, scale one of them to the exposure of the other"
             ),
         );
         warnings

@@ -5,8 +5,9 @@ use std::time::Duration;
 
 use lookalike::graph::{Blob, FailureReason, NodeId, NodeKey, NodeState, WorkerId};
 
-use crate::comm::{Action, RunEvent, Site, WorkerProcess};
-use crate::core::{Core, Deaths, Record};
+use crate::actions::Action;
+use crate::events::{RunEvent, Site};
+use crate::state::{Core, Deaths, Record};
 
 /// The worker's number of what runs in the coordinator itself. Workers count from 1.
 const HERE: u64 = 0;
@@ -56,7 +57,8 @@ pub(super) enum AttemptChange {
 #[derive(Debug)]
 pub(super) struct WorkerRow {
     pub(super) worker: u64,
-    pub(super) process: WorkerProcess,
+    /// Its process id on its own machine.
+    pub(super) process: u32,
     pub(super) threads: usize,
     pub(super) at: Duration,
 }
@@ -84,17 +86,16 @@ pub(crate) struct Batch {
     pub(super) attempts: Vec<AttemptChange>,
     pub(super) workers: Vec<WorkerRow>,
     pub(super) left: Vec<LeftRow>,
-    pub(super) local_workers: Vec<u32>,
     pub(super) results: Vec<(NodeKey, Blob)>,
     /// Results that turned out to be wrong.
     pub(super) forgotten: Vec<NodeKey>,
-    /// Results whose bytes nobody needs any more.
+    /// Results whose bytes are not needed any more.
     pub(super) released: BTreeSet<NodeKey>,
     pub(super) listen: Option<String>,
 }
 
 impl Batch {
-    /// Take note of what the reactor has said.
+    /// Note an action of the reactor.
     pub(crate) fn note(&mut self, action: &Action, core: &Core, now: Duration) {
         match action {
             Action::Assign { worker, lease } => self.begin(lease.node, lease.attempt, worker.0, now),
@@ -114,7 +115,7 @@ impl Batch {
         }
     }
 
-    /// Take note of something that was told without the reactor.
+    /// Note an event.
     pub(crate) fn note_event(&mut self, event: &RunEvent, core: &Core, now: Duration) {
         match event {
             RunEvent::NodeAdded { name } => {
@@ -147,19 +148,18 @@ impl Batch {
                 self.released.extend(core.look(name.node).and_then(|record| record.key));
             }
             RunEvent::WorkerJoined { worker, threads, .. } => {
-                if let Some(process) = core.members.get(*worker).map(|member| member.process) {
+                if let Some(process) = core.members.get(*worker).map(|member| member.process.id) {
                     self.workers.push(WorkerRow { worker: worker.0, process, threads: *threads, at: now });
                 }
             }
             RunEvent::WorkerLeft { worker, departure } => {
                 self.left.push(LeftRow { worker: worker.0, why: departure.to_string(), at: now });
             }
-            RunEvent::LocalWorkerStarted { process } => self.local_workers.push(*process),
             _ => {}
         }
     }
 
-    /// Keep the result of a node. What was released before is wanted again.
+    /// Keep the result of a node, also if it was released before.
     pub(crate) fn keep(&mut self, key: NodeKey, output: Blob) {
         self.released.remove(&key);
         self.results.push((key, output));
@@ -176,21 +176,16 @@ impl Batch {
         self.listen = Some(address);
     }
 
-    /// The nodes that were touched and whose key is known.
-    pub(crate) fn keys(&self) -> impl Iterator<Item = (NodeKey, NodeId)> {
-        self.nodes.iter().filter_map(|(node, row)| Some((row.key?, NodeId(*node))))
-    }
-
-    /// Whether nobody may be told of the group before this is written: there is more in it than what people see.
+    /// Whether the actions of the group have to wait for this transaction: it holds more than what people see.
     pub(crate) fn is_urgent(&self) -> bool {
-        let Self { nodes, workers, left, local_workers, results, forgotten, released, listen, .. } = self;
-        let rows = nodes.len() + workers.len() + left.len() + local_workers.len();
+        let Self { nodes, workers, left, results, forgotten, released, listen, .. } = self;
+        let rows = nodes.len() + workers.len() + left.len();
         rows + results.len() + forgotten.len() + released.len() > 0 || listen.is_some()
     }
 
     /// Whether there is nothing to write.
     pub(crate) fn is_empty(&self) -> bool {
-        // What is finished is among the results, and what has stopped among the nodes.
+        // Finished nodes are among the results, stopped ones among the nodes.
         !self.is_urgent() && self.started.is_empty() && self.attempts.is_empty()
     }
 
@@ -222,7 +217,7 @@ impl Batch {
         };
         let new = || NodeRow { added: None, state, attempts, deaths, key, error: None };
         let row = self.nodes.entry(node.0).or_insert_with(new);
-        // What an earlier coordinator completed stays recalled.
+        // A node that an earlier coordinator completed stays recalled.
         let state = if row.state == State::Recalled { State::Recalled } else { state };
         (row.state, row.attempts, row.deaths, row.key) = (state, attempts, deaths, key);
         row

@@ -1,6 +1,5 @@
-//! What is written a little later than it happens: attempts, and that nodes run or are completed. Nothing depends on it but what
-//! people see (that a node is completed is also said by its result), most of it changes again before anybody looks, and each
-//! table that a transaction leaves alone makes it cheaper.
+//! Rows that are written about once a second: attempts, and that nodes run or are completed. Only people read them (a result also says that
+//! its node is completed), most of them change again before that, and a transaction over fewer tables is cheaper.
 
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -40,7 +39,7 @@ impl Deferred {
         Self { epoch, open: BTreeMap::new(), ended: Vec::new(), states: BTreeMap::new() }
     }
 
-    /// Take over what can wait of a batch. The rest of it is written.
+    /// Take the rows of a batch that can wait. The rest of it is written at once.
     pub(super) fn take(&mut self, batch: &Batch) {
         for (node, row) in &batch.nodes {
             // A node that is written as ready may have begun to run since.

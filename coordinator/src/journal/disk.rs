@@ -1,7 +1,7 @@
-//! A disk whose pace the world decides: see [`World::disk_time`](lookalike_worker::world::World::disk_time).
+//! A disk with simulated latency: see [`World::disk_time`](lookalike_worker::world::World::disk_time).
 //!
-//! The thread that writes is there as ever, but whoever gives it something waits until it has done it, and is told after the disk's
-//! time. So nothing depends on when the thread runs.
+//! The journal's thread writes as always, but the caller blocks until it has written, and is told after the disk's time. So nothing depends
+//! on when the thread runs.
 
 use std::collections::VecDeque;
 use std::sync::mpsc::{Sender, sync_channel};

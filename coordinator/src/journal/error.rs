@@ -12,13 +12,13 @@ use super::identity::Difference;
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum JournalError {
-    /// There is a run already, and nobody asked to go on with it.
-    #[error("{} already holds a run; go on with it with --resume, choose another --out, or remove it first", path.display())]
+    /// The file holds a run, and `--resume` was not given.
+    #[error("{} already holds a run; continue it with --resume, choose another --out, or remove it first", path.display())]
     Exists {
         /// The journal.
         path: PathBuf,
     },
-    /// The file is something else.
+    /// The file is not a journal.
     #[error("{} is not the journal of a run; choose another --out, or move that file away", path.display())]
     NotAJournal {
         /// The file.
@@ -26,7 +26,7 @@ pub enum JournalError {
     },
     /// Another version of this program wrote it in another form.
     #[error(
-        "{} has journal format {found}, expected {expected}; go on with the version of lookalike that began the run, or choose another --out",
+        "{} has journal format {found}, expected {expected}; use the version of lookalike that began the run, or choose another --out",
         path.display()
     )]
     Version {
@@ -54,9 +54,9 @@ pub enum JournalError {
         /// The journal.
         path: PathBuf,
     },
-    /// There is no room for more.
+    /// The disk is full.
     #[error(
-        "cannot write the journal {}: the disk is full; free some space there and go on with --resume: nothing that was acknowledged is lost",
+        "cannot write the journal {}: the disk is full; free some space there and continue with --resume: nothing that was acknowledged is lost",
         path.display()
     )]
     DiskFull {
@@ -65,7 +65,7 @@ pub enum JournalError {
     },
     /// The journal cannot be written.
     #[error(
-        "cannot write the journal {}; mend that and go on with --resume: nothing that was acknowledged is lost",
+        "cannot write the journal {}; fix the cause and continue with --resume: nothing that was acknowledged is lost",
         path.display()
     )]
     Write {
@@ -82,9 +82,9 @@ pub enum JournalError {
         /// What SQLite says.
         source: rusqlite::Error,
     },
-    /// The thread that writes the journal is gone: a mistake of this program.
+    /// The thread that writes the journal has panicked: an error of this program.
     #[error(
-        "nothing writes the journal {} any more: its thread has ended with a panic; go on with --resume, and please report this",
+        "the thread that writes the journal {} has panicked; continue with --resume, and please report this",
         path.display()
     )]
     Thread {

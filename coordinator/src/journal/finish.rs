@@ -1,13 +1,14 @@
-//! The end of a run: what it wrote, so that somebody who asks again can be told that it is all there.
+//! The end of a run: the files that it wrote, so that a second call can verify them.
 
 use std::path::Path;
 
 use rusqlite::{OptionalExtension, params};
 
 use super::error::JournalError;
-use super::fits::{self, FitLedger};
 use super::identity::RunIdentity;
-use super::{past, schema, status, unix_ms};
+use super::parts::{self, PartLedger};
+use super::time::unix_ms;
+use super::{past, schema, status};
 
 /// A finished run's files of results, each with the BLAKE3 of its bytes.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -19,7 +20,7 @@ pub struct Finished {
 /// Mark a run as finished. The outputs of its nodes are dropped: the results are written, and the outputs are large.
 pub fn finish(path: &Path, finished: &Finished) -> Result<(), JournalError> {
     let connection = schema::open(path)?;
-    let outputs = fits::files_json(&finished.outputs);
+    let outputs = parts::files_json(&finished.outputs);
     let write = || -> rusqlite::Result<()> {
         let now = unix_ms();
         connection.execute("UPDATE run SET finished_ms = ?1, outputs = ?2", params![now, outputs])?;
@@ -38,14 +39,13 @@ pub fn finish(path: &Path, finished: &Finished) -> Result<(), JournalError> {
     Ok(())
 }
 
-/// Write what the fits of a run came to after its journal was closed. With `ended`, all of them have ended, but not all of them well:
-/// how many did not.
-pub fn settle(path: &Path, ledger: &FitLedger, ended: Option<&str>) -> Result<(), JournalError> {
+/// Write how the parts of a run ended, after its journal was closed. With `ended`, all of them have ended and some failed: how many.
+pub fn settle(path: &Path, ledger: &PartLedger, ended: Option<&str>) -> Result<(), JournalError> {
     let mut connection = schema::open(path)?;
     let rows = ledger.take();
     let mut write = || -> rusqlite::Result<()> {
         let transaction = connection.transaction()?;
-        fits::write(&transaction, &rows)?;
+        parts::write(&transaction, &rows)?;
         if let Some(ended) = ended {
             let now = unix_ms();
             transaction.execute("UPDATE run SET finished_ms = ?1", [now])?;
@@ -70,5 +70,5 @@ pub fn finished(path: &Path, identity: &RunIdentity) -> Result<Option<Finished>,
     let sql = "SELECT outputs FROM run WHERE outputs IS NOT NULL";
     let outputs = connection.query_row(sql, [], |row| row.get::<_, String>(0)).optional();
     let outputs = outputs.map_err(|source| JournalError::reading(path, source))?;
-    Ok(outputs.and_then(|text| fits::files_of(&text)).map(|outputs| Finished { outputs }))
+    Ok(outputs.and_then(|text| parts::files_of(&text)).map(|outputs| Finished { outputs }))
 }

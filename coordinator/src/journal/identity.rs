@@ -1,18 +1,18 @@
-//! What a run is a run of: a run that is taken up again must have the same inputs and settings.
+//! The identity of a run: a resumed run must have the same inputs and settings.
 
 use std::collections::BTreeMap;
 use std::fmt;
 
 use serde_json::{Map, Value};
 
-/// The inputs (by content) and the settings that shape the result of a run, by name. What does not shape it, such as the number
-/// of workers, is no part of it.
+/// The inputs (by content) and the settings that determine the result of a run, by name. The number of workers, for example, is not part
+/// of it.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct RunIdentity {
     parts: Vec<(String, String)>,
 }
 
-/// Something that is not as it was when the run began.
+/// A difference between two identities.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Difference {
     /// What it is: a flag, or an input.

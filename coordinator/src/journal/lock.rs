@@ -11,8 +11,7 @@ use thiserror::Error;
 /// The lock's file in a folder of results.
 pub const LOCK_FILE: &str = "run.lock";
 
-/// How often to ask, and how long to wait in between: `lookalike status` holds the lock for an instant when it looks whether
-/// somebody else does.
+/// How often to try, and the pause in between: `lookalike status` holds the lock for an instant to see whether it is held.
 const TRIES: u32 = 10;
 const PAUSE: Duration = Duration::from_millis(20);
 
@@ -22,11 +21,11 @@ pub struct RunLock {
     _file: File,
 }
 
-/// The folder cannot be had.
+/// The folder cannot be locked.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum LockError {
-    /// Somebody else has it.
+    /// Another process holds it.
     #[error("another coordinator is at work in {} ({holder}): wait for it to end, or choose another --out", folder.display())]
     Held {
         /// The folder.
@@ -48,8 +47,7 @@ impl RunLock {
     /// Take the lock of a folder.
     ///
     /// # Errors
-    /// When another process has it, or its file cannot be written. On a file system that has no locks nobody can tell, and
-    /// everybody gets it.
+    /// When another process has it, or its file cannot be written. On a file system without locks every process gets it.
     pub fn take(folder: &Path) -> Result<Self, LockError> {
         let path = folder.join(LOCK_FILE);
         let file_error = |source| LockError::File { path: path.clone(), source };
@@ -69,7 +67,7 @@ impl RunLock {
         Ok(Self { _file: file })
     }
 
-    /// Whether some process has the lock of a folder; `None` where nobody can tell.
+    /// Whether a process holds the lock of a folder; `None` where the file system cannot tell.
     #[must_use]
     pub fn is_held(folder: &Path) -> Option<bool> {
         let file = File::open(folder.join(LOCK_FILE)).ok()?;

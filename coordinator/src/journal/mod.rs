@@ -1,12 +1,12 @@
-//! The journal of a run: what was added, given out, answered, in SQLite at `OUT/run.sqlite`.
+//! The journal of a run in SQLite, at `OUT/run.sqlite`: nodes, attempts, workers, results.
 //!
 //! ```text
 //!   reactor --actions of a group of events--> Batch --one transaction--> thread "journal" --committed--> the actions are done
 //! ```
-//! A worker's answer is acknowledged, and the next node given out, only after the transaction that says so: whatever ends the
-//! coordinator, nothing is lost that anybody was told of. Each process that coordinates a run is an *epoch* of it, and the first
-//! one has the number 1. Planners are pure, so a later epoch plans anew from the same inputs; nodes whose [`NodeKey`] has a result are completed
-//! from here, whatever their numbers were, and those alone run that have none.
+//! A worker's answer is acknowledged, and the next node given out, only after the transaction that records it: whatever ends the
+//! coordinator, nothing that was acknowledged is lost. Each process that coordinates a run is an *epoch* of it, counted from 1.
+//! Planners are pure, so a later epoch plans anew from the same inputs. Nodes whose [`NodeKey`] has a result are completed from here,
+//! whatever their numbers were; the others run.
 //!
 //! The tables are in `schema.rs`, and explained in `docs/journal.md`:
 //!
@@ -16,13 +16,13 @@
 //! | `epochs` | coordinator process: host, when it began and was last seen, how it ended, where it listened |
 //! | `nodes` | node of an epoch: kind, label, state, attempts, deaths of workers, key, error |
 //! | `attempts` | lease that was given out: worker, when, how it ended |
-//! | `workers`, `local_workers` | connection of a worker; process of this machine that was started as one |
+//! | `workers` | connection of a worker |
 //! | `results` | node key: the hash and the bytes of its output |
-//! | `fits` | fit of a run of many: how it is doing, what it wrote |
+//! | `parts` | part of a run of many, such as a fit of a batch: its state, what it wrote |
 //!
 //! What nothing depends on is written about once a second: `deferred.rs`.
 //!
-//! Keys and hashes have no index: they are random, and an index would write one page for each. A coordinator that goes on reads all
+//! Keys and hashes have no index: they are random, and an index would write one page for each. A resuming coordinator reads all
 //! keys once. The secret of the access file is never here; the file is readable by its owner alone all the same.
 //!
 //! On a network file system the journal is locked for this process alone, and others read `status.json`.
@@ -32,23 +32,23 @@ mod deferred;
 mod disk;
 mod error;
 mod finish;
-mod fits;
 mod identity;
 mod lock;
+mod options;
+mod parts;
 mod past;
 mod place;
 mod schema;
 pub mod status;
+mod time;
 mod writer;
 
 use std::collections::{HashMap, HashSet};
 use std::path::PathBuf;
 use std::sync::mpsc::{Sender, channel, sync_channel};
-use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::{self, JoinHandle};
-use std::time::{Duration, Instant, SystemTime};
+use std::time::{Duration, Instant};
 
-use lookalike::fit::BestScore;
 use lookalike::graph::NodeKey;
 use lookalike::protocol::RunName;
 use tokio::sync::mpsc::{UnboundedReceiver, unbounded_channel};
@@ -58,43 +58,15 @@ use self::deferred::Deferred;
 use self::disk::Disk;
 pub use self::error::JournalError;
 pub use self::finish::{Finished, finish, finished, settle};
-pub use self::fits::{FitLedger, FitStatus};
-pub use self::fits::{FitRow, written};
 pub use self::identity::{Difference, RunIdentity};
 pub use self::lock::{LOCK_FILE, LockError, RunLock};
-pub(crate) use self::past::Past;
+pub use self::options::{JOURNAL_FILE, JournalOptions, Score};
+pub use self::parts::{PartLedger, PartRow, PartStatus, written};
+use self::past::{Loaded, Past};
 pub use self::schema::remove;
 use self::writer::{Command, Writer};
-use crate::core::Deaths;
-use crate::core::recall::{Memory, Recall};
-
-/// The journal's file in a folder of results.
-pub const JOURNAL_FILE: &str = "run.sqlite";
-
-/// Where a run is written down, and what it is a run of.
-#[derive(Clone, Debug)]
-pub struct JournalOptions {
-    /// The file; its folder has to exist. Only one process may use it at a time: see [`RunLock`].
-    pub path: PathBuf,
-    /// What shapes the result.
-    pub identity: RunIdentity,
-    /// Whether to go on with a run that is there. Without one, a new run begins either way.
-    pub resume: bool,
-    /// Whether local workers live on for a while when this process dies, for the next one to take them over.
-    pub survivors: bool,
-    /// The best score so far, for people who look at the run.
-    pub best: Option<Arc<BestScore>>,
-    /// What becomes of the fits, in a run of many.
-    pub fits: FitLedger,
-}
-
-impl JournalOptions {
-    /// A new run, which cannot be gone on with by surviving workers.
-    #[must_use]
-    pub fn new(path: PathBuf, identity: RunIdentity) -> Self {
-        Self { path, identity, resume: false, survivors: false, best: None, fits: FitLedger::default() }
-    }
-}
+use crate::state::Deaths;
+use crate::state::past_outputs::{Memory, PastOutputs};
 
 /// The journal of a run that this process coordinates.
 #[derive(Debug)]
@@ -106,18 +78,16 @@ pub(crate) struct Journal {
     pub(crate) epoch: u64,
     /// What earlier epochs have left.
     pub(crate) past: Past,
-    known: Known,
+    /// The keys that have a result of an earlier epoch.
+    known: HashSet<NodeKey>,
     commands: Sender<Command>,
     committed: UnboundedReceiver<Result<(), JournalError>>,
     disk: Option<Disk>,
     thread: Option<JoinHandle<Result<(), JournalError>>>,
 }
 
-/// The keys that have a result in the journal, but for those of this epoch.
-type Known = Arc<Mutex<HashSet<NodeKey>>>;
-
 impl Journal {
-    /// Begin a run, or go on with the one that is there. `disk_time` is that of the [world](lookalike_worker::world::World).
+    /// Begin a run, or resume the one in the file. `disk_time` is that of the [world](lookalike_worker::world::World).
     pub(crate) fn open(
         options: &JournalOptions,
         name: RunName,
@@ -134,7 +104,7 @@ impl Journal {
         };
         let (commands, asked) = channel();
         let (sender, committed) = unbounded_channel();
-        let known: Known = Arc::new(Mutex::new(loaded.results.keys().copied().collect()));
+        let known = loaded.results.keys().copied().collect();
         let writer = Writer {
             connection,
             options: options.clone(),
@@ -154,9 +124,9 @@ impl Journal {
     }
 
     /// What the reactor asks for the outputs of earlier epochs.
-    pub(crate) fn recall(&self) -> Box<dyn Recall> {
+    pub(crate) fn past_outputs(&self) -> Box<dyn PastOutputs> {
         let deaths = self.past.deaths.clone();
-        Box::new(Recollection { known: Arc::clone(&self.known), deaths, commands: self.commands.clone() })
+        Box::new(JournalledOutputs { known: self.known.clone(), deaths, commands: self.commands.clone() })
     }
 
     /// Write a batch, after those before. [`Self::committed`] tells when it is written.
@@ -181,11 +151,6 @@ impl Journal {
         let _ = self.commands.send(Command::Note(Box::new(batch)));
     }
 
-    /// A result was kept whose node is not there today: should it become ready, it is completed from here.
-    pub(crate) fn learn(&self, key: NodeKey) {
-        self.known.lock().unwrap_or_else(PoisonError::into_inner).insert(key);
-    }
-
     /// Write how this epoch ended, after all batches; `None` when every node is closed as the planner wants it.
     pub(crate) fn close(mut self, ended: Option<String>) -> Result<(), JournalError> {
         let _ = self.commands.send(Command::Close(ended));
@@ -206,7 +171,7 @@ impl Journal {
     }
 }
 
-/// Dropped without [`Journal::close`] where the world decides about disks: the process was killed, and the next one may come at once.
+/// Dropped without [`Journal::close`] in a simulated world: the process was killed, and the next one may start at once.
 impl Drop for Journal {
     fn drop(&mut self) {
         if let (Some(_), Some(thread)) = (&self.disk, self.thread.take()) {
@@ -218,16 +183,16 @@ impl Drop for Journal {
 
 /// Answers the reactor from the journal.
 #[derive(Debug)]
-struct Recollection {
-    known: Known,
+struct JournalledOutputs {
+    known: HashSet<NodeKey>,
     deaths: HashMap<NodeKey, Deaths>,
     commands: Sender<Command>,
 }
 
-impl Recall for Recollection {
-    fn recall(&mut self, key: NodeKey) -> Memory {
+impl PastOutputs for JournalledOutputs {
+    fn of(&mut self, key: NodeKey) -> Memory {
         let deaths = self.deaths.get(&key).copied().unwrap_or_default();
-        let is_known = self.known.lock().unwrap_or_else(PoisonError::into_inner).contains(&key);
+        let is_known = self.known.contains(&key);
         let read = || {
             let (sender, answer) = sync_channel(1);
             self.commands.send(Command::Read(key, sender)).ok()?;
@@ -235,20 +200,6 @@ impl Recall for Recollection {
         };
         Memory { output: if is_known { read() } else { None }, deaths }
     }
-}
-
-/// What a journal says when it is opened.
-struct Loaded {
-    run: RunName,
-    epoch: u64,
-    results: HashMap<NodeKey, i64>,
-    past: Past,
-}
-
-/// Milliseconds since 1970.
-fn unix_ms() -> i64 {
-    let since = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
-    i64::try_from(since.as_millis()).unwrap_or(i64::MAX)
 }
 
 #[cfg(test)]

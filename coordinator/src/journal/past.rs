@@ -1,39 +1,38 @@
-//! The begin of an epoch: a new journal, or what earlier epochs have left in one.
+//! The begin of an epoch: a new journal, or one of earlier epochs.
 
 use std::collections::HashMap;
 use std::net::SocketAddr;
 use std::path::Path;
 
 use lookalike::graph::NodeKey;
-use lookalike::protocol::{ProcessName, RunName};
-use rusqlite::{Connection, OptionalExtension, Row, params};
+use lookalike::protocol::RunName;
+use rusqlite::{Connection, OptionalExtension, params};
 
 use super::error::JournalError;
 use super::identity::RunIdentity;
 use super::lock::host;
-use super::{Loaded, schema, unix_ms};
-use crate::comm::WorkerProcess;
-use crate::core::Deaths;
+use super::schema;
+use super::time::unix_ms;
+use crate::state::Deaths;
 
 /// What earlier epochs have left.
 #[derive(Debug, Default)]
 pub(crate) struct Past {
-    /// The key of each node that may have been given out, by epoch and number.
-    pub(crate) keys: HashMap<(u64, u64), NodeKey>,
     /// The workers that died while they executed a node, where any did.
     pub(crate) deaths: HashMap<NodeKey, Deaths>,
     /// Where the last one listened.
     pub(crate) listen: Option<SocketAddr>,
-    /// The process ids of those that were started as local workers of this machine; most of them are gone.
-    pub(crate) local_workers: Vec<u32>,
-    /// The workers that were connected when their coordinator died, and may still be there.
-    pub(crate) workers: Vec<WorkerProcess>,
     /// How many nodes have a result.
     pub(crate) results: usize,
 }
 
-/// How long a worker tries to reach its coordinator by default; the longest of them is remote.
-const LONGEST_WAIT_MS: i64 = 10 * 60 * 1000;
+/// What a journal says when it is opened.
+pub(super) struct Loaded {
+    pub(super) run: RunName,
+    pub(super) epoch: u64,
+    pub(super) results: HashMap<NodeKey, i64>,
+    pub(super) past: Past,
+}
 
 /// Begin a new journal.
 pub(super) fn begin(path: &Path, identity: &RunIdentity, run: RunName) -> Result<(Connection, Loaded), JournalError> {
@@ -47,7 +46,7 @@ pub(super) fn begin(path: &Path, identity: &RunIdentity, run: RunName) -> Result
     Ok((connection, Loaded { run, epoch: 1, results: HashMap::new(), past: Past::default() }))
 }
 
-/// Go on with the run of a journal.
+/// Resume the run of a journal.
 pub(super) fn load(path: &Path, identity: &RunIdentity) -> Result<(Connection, Loaded), JournalError> {
     let connection = schema::open(path)?;
     check_identity(path, &connection, identity)?;
@@ -58,7 +57,7 @@ pub(super) fn load(path: &Path, identity: &RunIdentity) -> Result<(Connection, L
     let past = past(&connection, results.len()).map_err(reading)?;
     let epoch = last + 1;
     add_epoch(&connection, epoch).map_err(|source| JournalError::writing(path, source))?;
-    // The run is under way again.
+    // The run is not finished any more.
     let reopened = connection.execute("UPDATE run SET finished_ms = NULL, outputs = NULL", []);
     reopened.map_err(|source| JournalError::writing(path, source))?;
     Ok((connection, Loaded { run, epoch, results, past }))
@@ -93,14 +92,14 @@ fn results(connection: &Connection) -> rusqlite::Result<HashMap<NodeKey, i64>> {
 fn past(connection: &Connection, results: usize) -> rusqlite::Result<Past> {
     let mut past = Past { results, ..Past::default() };
     let mut statement = connection.prepare(
-        "SELECT id >> 32, id & 0xffffffff, key, deaths, deaths_alone, deaths_excused FROM nodes WHERE key IS NOT NULL",
+        "SELECT key, deaths, deaths_alone, deaths_not_counted FROM nodes
+         WHERE key IS NOT NULL AND deaths + deaths_alone + deaths_not_counted > 0",
     )?;
     let mut rows = statement.query([])?;
     while let Some(row) = rows.next()? {
-        let (epoch, node, key): (u64, u64, _) = (row.get(0)?, row.get(1)?, NodeKey(row.get(2)?));
-        let deaths = Deaths { in_company: row.get(3)?, alone: row.get(4)?, excused: row.get(5)? };
-        past.keys.insert((epoch, node), key);
-        // Each epoch counts on from the one before.
+        let key = NodeKey(row.get(0)?);
+        let deaths = Deaths { in_company: row.get(1)?, alone: row.get(2)?, not_counted: row.get(3)? };
+        // Each epoch begins with the counts of the one before.
         if deaths.total() > past.deaths.get(&key).map_or(0, |most| most.total()) {
             past.deaths.insert(key, deaths);
         }
@@ -111,19 +110,5 @@ fn past(connection: &Connection, results: usize) -> rusqlite::Result<Past> {
         |row| row.get::<_, String>(0),
     );
     past.listen = listen.optional()?.and_then(|listen| listen.parse().ok());
-    // Elsewhere the same numbers are those of other processes.
-    let mut statement = connection.prepare(
-        "SELECT DISTINCT local_workers.process FROM local_workers JOIN epochs USING (epoch) WHERE host = ?1 ORDER BY 1",
-    )?;
-    past.local_workers = statement.query_map([host()], |row| row.get(0))?.collect::<rusqlite::Result<_>>()?;
-    // An epoch that ended in order has told its workers to end.
-    let mut statement = connection.prepare(
-        "SELECT DISTINCT workers.process, name, local FROM workers JOIN epochs USING (epoch)
-         WHERE ended_ms IS NULL AND left_ms IS NULL AND seen_ms > ?1 ORDER BY 1",
-    )?;
-    let since = unix_ms() - LONGEST_WAIT_MS;
-    let worker =
-        |row: &Row<'_>| Ok(WorkerProcess { id: row.get(0)?, name: ProcessName(row.get(1)?), is_local: row.get(2)? });
-    past.workers = statement.query_map([since], worker)?.collect::<rusqlite::Result<_>>()?;
     Ok(past)
 }

@@ -12,7 +12,7 @@ use super::place;
 use crate::atomic;
 
 /// The format of the tables: `PRAGMA user_version`. A change of any kind is a new number.
-pub(super) const FORMAT: i64 = 2;
+pub(super) const FORMAT: i64 = 3;
 
 /// Marks the file as a journal of this program: `PRAGMA application_id`, the letters `Look`.
 pub(super) const APPLICATION: i64 = 0x4c6f_6f6b;
@@ -37,7 +37,7 @@ CREATE TABLE epochs (
     ended_ms    INTEGER,
     ended       TEXT,
     listen      TEXT,
-    best_cssim  REAL
+    best_score  REAL
 );
 CREATE TABLE nodes (
     id          INTEGER PRIMARY KEY,
@@ -47,7 +47,7 @@ CREATE TABLE nodes (
     attempts    INTEGER NOT NULL,
     deaths      INTEGER NOT NULL,
     deaths_alone    INTEGER NOT NULL,
-    deaths_excused  INTEGER NOT NULL,
+    deaths_not_counted  INTEGER NOT NULL,
     key         BLOB,
     error       TEXT
 );
@@ -64,18 +64,11 @@ CREATE TABLE workers (
     epoch       INTEGER NOT NULL,
     worker      INTEGER NOT NULL,
     process     INTEGER NOT NULL,
-    name        BLOB NOT NULL,
-    local       INTEGER NOT NULL,
     threads     INTEGER NOT NULL,
     joined_ms   INTEGER NOT NULL,
     left_ms     INTEGER,
     why         TEXT,
     PRIMARY KEY (epoch, worker)
-) WITHOUT ROWID;
-CREATE TABLE local_workers (
-    epoch       INTEGER NOT NULL,
-    process     INTEGER NOT NULL,
-    PRIMARY KEY (epoch, process)
 ) WITHOUT ROWID;
 CREATE TABLE results (
     id          INTEGER PRIMARY KEY,
@@ -84,20 +77,22 @@ CREATE TABLE results (
     hash        BLOB NOT NULL,
     bytes       BLOB
 );
-CREATE TABLE fits (
+CREATE TABLE parts (
     name        TEXT PRIMARY KEY,
     number      INTEGER NOT NULL,
     state       TEXT NOT NULL,
-    cssim       REAL,
+    score       REAL,
     seconds     REAL,
     error       TEXT,
     outputs     TEXT
 ) WITHOUT ROWID;
+CREATE VIEW fits AS
+    SELECT name, number, state, score AS cssim, seconds, error, outputs FROM parts;
 CREATE VIEW node_list AS
     SELECT id >> 32 AS epoch, id & 0xffffffff AS node, kind, label,
            CASE state WHEN 0 THEN 'waiting' WHEN 1 THEN 'ready' WHEN 2 THEN 'running' WHEN 3 THEN 'completed'
                       WHEN 4 THEN 'recalled' ELSE 'failed' END AS state,
-           attempts, deaths + deaths_alone + deaths_excused AS deaths, lower(hex(key)) AS key, error
+           attempts, deaths + deaths_alone + deaths_not_counted AS deaths, lower(hex(key)) AS key, error
     FROM nodes;
 CREATE VIEW attempt_list AS
     SELECT epoch, node, attempt, worker, begun_ms, ended_ms,
@@ -144,8 +139,8 @@ pub fn remove(path: &Path) -> io::Result<()> {
     Ok(())
 }
 
-/// Make a journal where none is, readable by its owner alone, and open it. It is there with all its tables and what `begin` writes, or
-/// not at all, whatever ends the process or fills the disk meanwhile.
+/// Create a journal, readable by its owner alone, and open it. It appears with all its tables and what `begin` writes, or not at all,
+/// whatever ends the process or fills the disk meanwhile.
 pub(super) fn create(
     path: &Path,
     begin: impl FnOnce(&Connection) -> rusqlite::Result<()>,
@@ -188,9 +183,9 @@ fn make(path: &Path, begin: impl FnOnce(&Connection) -> rusqlite::Result<()>) ->
     write().map_err(|source| JournalError::writing(path, source))
 }
 
-/// Open a journal that is there, to go on with it.
+/// Open an existing journal, to resume its run.
 pub(super) fn open(path: &Path) -> Result<Connection, JournalError> {
-    // Before anything else: it must not become a journal by being looked at.
+    // Check first: opening the file must not turn it into a journal.
     let looking = Connection::open_with_flags(path, OpenFlags::SQLITE_OPEN_READ_WRITE)
         .map_err(|source| JournalError::reading(path, source))?;
     check_format(path, &looking)?;

@@ -11,10 +11,11 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use super::error::JournalError;
-use super::fits::{self, FitStatus};
 use super::lock::RunLock;
+use super::options::JOURNAL_FILE;
+use super::parts::{self, PartStatus};
 use super::schema::node_id;
-use super::{JOURNAL_FILE, place, schema};
+use super::{place, schema};
 use crate::atomic;
 
 /// The status of a run beside its journal, for where the journal cannot be read by others.
@@ -35,9 +36,9 @@ const BUSY_TIME: Duration = Duration::from_secs(1);
 pub enum RunState {
     /// A coordinator is at work.
     Running,
-    /// No coordinator is at work, and the run is not finished: `--resume` goes on with it.
+    /// No coordinator is running, and the run is not finished: `--resume` continues it.
     Stopped,
-    /// Every fit has come to its end, but some of them failed: `--resume` tries those again.
+    /// Every part has ended, and some of them failed: `--resume` retries those.
     Ended,
     /// All results are written.
     Finished,
@@ -64,7 +65,7 @@ pub struct Status {
     pub started_at: String,
     /// When the last coordinator was last seen to write.
     pub updated_at: String,
-    /// When the results were written, or the last fit ended.
+    /// When the results were written, or the last part ended.
     pub finished_at: Option<String>,
     /// The seconds that its coordinators were at work, together.
     pub elapsed_s: f64,
@@ -78,13 +79,14 @@ pub struct Status {
     pub attempts: u64,
     /// How many attempts were lost with their workers.
     pub requeued: u64,
-    /// The lowest CSSIM so far.
-    pub best_cssim: Option<f64>,
+    /// The best score so far. Programs read it under the name that it has always had.
+    #[serde(rename = "best_cssim")]
+    pub best_score: Option<f64>,
     /// The nodes that failed, at most 100.
     pub failures: Vec<NodeError>,
-    /// The fits of a run of many, in their order.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub fits: Vec<FitStatus>,
+    /// The parts of a run of many, in their order.
+    #[serde(default, rename = "fits", skip_serializing_if = "Vec::is_empty")]
+    pub parts: Vec<PartStatus>,
 }
 
 /// How many nodes are where.
@@ -163,7 +165,7 @@ pub enum StatusError {
         /// What the system says.
         source: io::Error,
     },
-    /// The status file is none.
+    /// The status file is not one of ours.
     #[error("{path} is not a status of a run")]
     Content {
         /// The file.
@@ -197,12 +199,12 @@ impl Status {
         Ok(status)
     }
 
-    /// What the writer of the status cannot know: whether it is still there.
+    /// Correct what the writer of the status cannot know: whether it still runs.
     fn settle(&mut self, is_running: Option<bool>) {
         if matches!(self.state, RunState::Finished | RunState::Ended) {
             return;
         }
-        // Where nobody can tell it is as it was.
+        // If the lock cannot be read, the state stays as written.
         match is_running {
             Some(true) => {
                 self.state = RunState::Running;
@@ -217,8 +219,8 @@ impl Status {
                     "its coordinator ended without a word: it was killed, or the machine stopped".into()
                 });
                 self.workers.clear();
-                let open = self.fits.iter_mut().filter(|fit| matches!(fit.state.as_str(), "waiting" | "running"));
-                open.for_each(|fit| fit.state = "stopped".into());
+                let open = self.parts.iter_mut().filter(|part| matches!(part.state.as_str(), "waiting" | "running"));
+                open.for_each(|part| part.state = "stopped".into());
             }
             None => {}
         }
@@ -263,8 +265,8 @@ fn read(connection: &Connection) -> rusqlite::Result<Status> {
     })?;
     let elapsed: f64 =
         connection.query_row("SELECT sum(seen_ms - started_ms) / 1000.0 FROM epochs", [], |r| r.get(0))?;
-    let sql = "SELECT best_cssim FROM epochs WHERE best_cssim IS NOT NULL ORDER BY epoch DESC LIMIT 1";
-    let best_cssim = connection.query_row(sql, [], |row| row.get(0)).optional()?;
+    let sql = "SELECT best_score FROM epochs WHERE best_score IS NOT NULL ORDER BY epoch DESC LIMIT 1";
+    let best_score = connection.query_row(sql, [], |row| row.get(0)).optional()?;
     let sql = "SELECT count(*), count(*) FILTER (WHERE outcome = 2) FROM attempts";
     let (attempts, requeued) = connection.query_row(sql, [], |row| Ok((row.get(0)?, row.get(1)?)))?;
     let kinds = kinds(connection, epoch)?;
@@ -292,9 +294,9 @@ fn read(connection: &Connection) -> rusqlite::Result<Status> {
         workers: workers(connection, epoch)?,
         attempts,
         requeued,
-        best_cssim,
+        best_score,
         failures: failures(connection, epoch)?,
-        fits: fits::read(connection)?,
+        parts: parts::read(connection)?,
     })
 }
 

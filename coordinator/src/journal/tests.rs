@@ -5,19 +5,18 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use lookalike::graph::{Blob, NodeKey};
-use lookalike::protocol::{ProcessName, RunName};
+use lookalike::protocol::RunName;
 use rusqlite::Connection;
 use tempfile::TempDir;
 
 use super::batch::{NodeRow, State, WorkerRow};
 use super::status::{RunState, Status};
 use super::*;
-use crate::comm::WorkerProcess;
 
-mod fits;
+mod parts;
 
 const NAME: RunName = RunName([7; 16]);
-const DEATHS: Deaths = Deaths { in_company: 2, alone: 1, excused: 3 };
+const DEATHS: Deaths = Deaths { in_company: 2, alone: 1, not_counted: 3 };
 
 fn identity() -> RunIdentity {
     RunIdentity::default().with("--seed", "0")
@@ -78,7 +77,6 @@ fn next_epoch_finds_results_deaths_and_the_address() {
     let suspect = NodeRow { state: State::Ready, deaths: DEATHS, ..completed(2).nodes.remove(&2).unwrap() };
     batch.nodes.insert(2, suspect);
     batch.listens("127.0.0.1:4100".into());
-    batch.local_workers = vec![4711, 4712];
     write(&mut journal, [batch]);
     // Killed: nothing is closed. (A process that is killed writes nothing more; a thread cannot be.)
     let copy = copied(&folder);
@@ -86,12 +84,10 @@ fn next_epoch_finds_results_deaths_and_the_address() {
     let again = Journal::open(&options(&copy), RunName([8; 16]), None).unwrap();
     assert_eq!((again.run, again.epoch, again.past.results), (NAME, 2, 1));
     assert_eq!(again.past.listen, "127.0.0.1:4100".parse().ok());
-    assert_eq!(again.past.local_workers, [4711, 4712]);
-    assert_eq!(again.past.keys.get(&(1, 2)), Some(&key(2)));
-    let mut recall = again.recall();
-    assert_eq!(recall.recall(key(1)), Memory { output: Some(output(1)), ..Memory::default() });
-    assert_eq!(recall.recall(key(2)), Memory { output: None, deaths: DEATHS });
-    assert_eq!(recall.recall(key(3)), Memory::default());
+    let mut past = again.past_outputs();
+    assert_eq!(past.of(key(1)), Memory { output: Some(output(1)), ..Memory::default() });
+    assert_eq!(past.of(key(2)), Memory { output: None, deaths: DEATHS });
+    assert_eq!(past.of(key(3)), Memory::default());
 }
 
 /// The files of the journal as they are at this moment, in a folder of their own.
@@ -117,9 +113,9 @@ fn torn_write_costs_only_the_group_that_was_being_written() {
         let torn = fs::OpenOptions::new().write(true).open(copy.path().join("run.sqlite-wal")).unwrap();
         torn.set_len(length).unwrap();
         let again = Journal::open(&options(&copy), NAME, None).unwrap();
-        let mut recall = again.recall();
-        assert_eq!(recall.recall(key(1)).output, Some(output(1)), "{length}");
-        assert_eq!(recall.recall(key(2)).output, None, "{length}");
+        let mut past = again.past_outputs();
+        assert_eq!(past.of(key(1)).output, Some(output(1)), "{length}");
+        assert_eq!(past.of(key(2)).output, None, "{length}");
     }
 }
 
@@ -148,9 +144,9 @@ fn damaged_output_is_dropped_and_the_others_stay() {
         "UPDATE results SET bytes = zeroblob(1000) WHERE key = (SELECT key FROM nodes WHERE id & 0xffffffff = 1)",
     );
     let again = begun(&folder);
-    let mut recall = again.recall();
-    assert_eq!(recall.recall(key(1)).output, None);
-    assert_eq!(recall.recall(key(2)).output, Some(output(2)));
+    let mut past = again.past_outputs();
+    assert_eq!(past.of(key(1)).output, None);
+    assert_eq!(past.of(key(2)).output, Some(output(2)));
     again.close(None).unwrap();
     assert_eq!(begun(&folder).past.results, 1);
 }
@@ -194,9 +190,9 @@ fn output_that_is_computed_again_after_its_release_is_written_again() {
     both.keep(key(2), output(2));
     write(&mut journal, [again, completed(2), both]);
     let copy = copied(&folder);
-    let mut recall = Journal::open(&options(&copy), NAME, None).unwrap().recall();
-    assert_eq!(recall.recall(key(1)).output, Some(output(1)));
-    assert_eq!(recall.recall(key(2)).output, Some(output(2)));
+    let mut past = Journal::open(&options(&copy), NAME, None).unwrap().past_outputs();
+    assert_eq!(past.of(key(1)).output, Some(output(1)));
+    assert_eq!(past.of(key(2)).output, Some(output(2)));
 }
 
 #[test]
@@ -219,38 +215,6 @@ fn journal_is_there_as_a_whole_or_not_at_all() {
 }
 
 #[test]
-fn survivors_are_known_by_name_and_local_ones_by_their_machine() {
-    let folder = tempfile::tempdir().unwrap();
-    let mut journal = begun(&folder);
-    let mut batch = Batch { local_workers: vec![1, 4711], ..Batch::default() };
-    // In containers every process has the number 1.
-    for (worker, is_local) in [(1, true), (2, false), (3, false)] {
-        let process = WorkerProcess { id: 1, name: ProcessName([worker; 16]), is_local };
-        batch.workers.push(WorkerRow { worker: worker.into(), process, threads: 1, at: Duration::ZERO });
-    }
-    write(&mut journal, [batch]);
-    let copy = copied(&folder);
-    let past = std::mem::take(&mut Journal::open(&options(&copy), NAME, None).unwrap().past);
-    let names: Vec<_> = past.workers.iter().map(|worker| (worker.name.0[0], worker.is_local)).collect();
-    assert_eq!(names, [(1, true), (2, false), (3, false)]);
-    assert_eq!(past.local_workers, [1, 4711]);
-    sql(&copy, "UPDATE epochs SET host = 'elsewhere'");
-    assert_eq!(Journal::open(&options(&copy), NAME, None).unwrap().past.local_workers, [0; 0]);
-}
-
-#[test]
-fn result_that_is_kept_late_is_recalled() {
-    let folder = tempfile::tempdir().unwrap();
-    let mut journal = begun(&folder);
-    let mut recall = journal.recall();
-    let mut batch = Batch::default();
-    batch.keep(key(9), output(9));
-    journal.learn(key(9));
-    write(&mut journal, [batch]);
-    assert_eq!(recall.recall(key(9)).output, Some(output(9)));
-}
-
-#[test]
 fn file_that_does_not_fit_is_refused_by_name() {
     let folder = tempfile::tempdir().unwrap();
     let refused = |expected: &str| {
@@ -269,13 +233,13 @@ fn file_that_does_not_fit_is_refused_by_name() {
     begun(&folder).close(None).unwrap();
     let fresh = JournalOptions { resume: false, ..options(&folder) };
     let error = Journal::open(&fresh, NAME, None).unwrap_err().to_string();
-    assert!(error.contains("already holds a run; go on with it with --resume"), "{error}");
+    assert!(error.contains("already holds a run; continue it with --resume"), "{error}");
     let other = JournalOptions { identity: RunIdentity::default().with("--seed", "3"), ..options(&folder) };
     let error = Journal::open(&other, NAME, None).unwrap_err().to_string();
     assert!(error.contains("--seed is 0 there and 3 here"), "{error}");
     sql(&folder, "PRAGMA user_version = 99");
     refused("has journal format 99, expected 2");
-    sql(&folder, "PRAGMA user_version = 2; DELETE FROM run");
+    sql(&folder, "PRAGMA user_version = 3; DELETE FROM run");
     refused("is not the journal of a run");
 }
 
@@ -314,8 +278,7 @@ fn status_tells_counts_workers_and_whether_somebody_is_at_work() {
     let failed =
         NodeRow { state: State::Failed, error: Some("black".into()), ..completed(2).nodes.remove(&2).unwrap() };
     batch.nodes.insert(2, failed);
-    let process = WorkerProcess { id: 99, name: ProcessName([9; 16]), is_local: true };
-    batch.workers.push(WorkerRow { worker: 1, process, threads: 4, at: Duration::ZERO });
+    batch.workers.push(WorkerRow { worker: 1, process: 99, threads: 4, at: Duration::ZERO });
     write(&mut journal, [batch]);
     let running = Status::of(folder.path()).unwrap();
     assert_eq!((running.state, running.epoch, running.error), (RunState::Running, 1, None));

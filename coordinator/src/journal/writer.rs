@@ -9,16 +9,15 @@ use rusqlite::{Connection, Transaction, params};
 use tokio::sync::mpsc::UnboundedSender;
 use tracing::warn;
 
-use super::JournalOptions;
 use super::batch::{Batch, NodeRow};
 use super::deferred::{Deferred, ms};
 use super::error::JournalError;
-use super::fits;
+use super::options::JournalOptions;
+use super::parts;
 use super::schema::node_id;
 use super::status;
-use super::unix_ms;
-use crate::comm::WorkerProcess;
-use crate::core::Deaths;
+use super::time::unix_ms;
+use crate::state::Deaths;
 
 /// How often `status.json` is written at most.
 const STATUS_INTERVAL: Duration = Duration::from_secs(1);
@@ -42,7 +41,7 @@ pub(super) enum Command {
     Wait(SyncSender<()>),
     /// Write how this coordinator's part ended, and end.
     Close(Option<String>),
-    /// End without another word, as a process does that is killed.
+    /// End at once, as a killed process does.
     Die,
 }
 
@@ -62,7 +61,7 @@ pub(super) struct Writer {
 }
 
 impl Writer {
-    /// Do what is asked for until the end, or until nobody asks any more.
+    /// Process commands until the end, or until the sender is gone.
     pub(super) fn run(mut self) -> Result<(), JournalError> {
         loop {
             let soon = self.next_status.saturating_duration_since(Instant::now());
@@ -70,7 +69,7 @@ impl Writer {
                 Ok(Command::Commit(batch)) => {
                     let outcome = self.commit(&batch);
                     self.is_news = true;
-                    // When nobody listens any more the run is over.
+                    // An error means that the run is over.
                     let _ = self.committed.send(outcome);
                 }
                 Ok(Command::Note(batch)) => {
@@ -83,7 +82,7 @@ impl Writer {
                 Ok(Command::Close(ended)) => return self.close(ended.as_deref()),
                 // The coordinator's future was dropped.
                 Err(RecvTimeoutError::Disconnected) => return self.close(Some("it was dropped")),
-                // Somebody is still here.
+                // Nothing has happened, but the coordinator is alive.
                 Err(RecvTimeoutError::Timeout) => self.is_news = true,
             }
             if self.is_news && Instant::now() >= self.next_status {
@@ -99,9 +98,9 @@ impl Writer {
             return Ok(());
         }
         let mut new = Vec::new();
-        let fits = self.options.fits.take();
+        let parts = self.options.parts.take();
         let outcome = self.connection.transaction().and_then(|transaction| {
-            fits::write(&transaction, &fits)?;
+            parts::write(&transaction, &parts)?;
             new = write(&transaction, self.epoch, batch, &self.results)?;
             let rows = if is_much { Some(self.deferred.write(&transaction)?) } else { None };
             transaction.commit()?;
@@ -113,7 +112,7 @@ impl Writer {
             None => outcome,
         };
         if let Err(source) = outcome {
-            self.options.fits.put_back(fits);
+            self.options.parts.put_back(parts);
             return Err(JournalError::writing(&self.options.path, source));
         }
         self.results.extend(new);
@@ -124,9 +123,9 @@ impl Writer {
         Ok(())
     }
 
-    /// Wait until all that was written is on the disk. Once per epoch, before its first lease: a machine that loses its power may
-    /// lose the end of the log, but must not lose which epochs there were. The next one would have the number of one that was lost,
-    /// and a worker elsewhere might bring it an answer to the other's node of the same number.
+    /// Wait until everything written is on the disk. Once per epoch, before its first lease: a power loss may cost the end of the log, but
+    /// not the number of an epoch. Otherwise the next epoch could have the same number, and a worker of the lost one would take the next
+    /// coordinator for its own and answer for other nodes of the same numbers.
     fn reach_the_disk(&self) -> rusqlite::Result<()> {
         // What readers still need stays in the log as well, and is synchronised with it.
         self.connection.query_row("PRAGMA wal_checkpoint(PASSIVE)", [], |_| Ok(()))
@@ -172,9 +171,9 @@ impl Writer {
 
     /// Write what could wait.
     fn write_deferred(&mut self) {
-        let fits = self.options.fits.take();
+        let parts = self.options.parts.take();
         let outcome = self.connection.transaction().and_then(|transaction| {
-            fits::write(&transaction, &fits)?;
+            parts::write(&transaction, &parts)?;
             let rows = self.deferred.write(&transaction)?;
             transaction.commit()?;
             Ok(rows)
@@ -182,7 +181,7 @@ impl Writer {
         match outcome {
             Ok(rows) => self.deferred.written(rows),
             Err(error) => {
-                self.options.fits.put_back(fits);
+                self.options.parts.put_back(parts);
                 warn!(%error, "cannot note in the journal what is under way");
             }
         }
@@ -192,9 +191,9 @@ impl Writer {
     fn tell_status(&mut self) {
         let began = Instant::now();
         self.write_deferred();
-        let best = self.options.best.as_ref().and_then(|best| best.get());
+        let best = self.options.score.as_ref().and_then(|score| score());
         let seen = self.connection.execute(
-            "UPDATE epochs SET seen_ms = ?2, best_cssim = ?3 WHERE epoch = ?1",
+            "UPDATE epochs SET seen_ms = ?2, best_score = ?3 WHERE epoch = ?1",
             params![self.epoch, unix_ms(), best],
         );
         if let Err(error) = seen {
@@ -240,46 +239,39 @@ fn write(
 
 fn write_node(transaction: &Transaction<'_>, id: u64, row: &NodeRow) -> rusqlite::Result<()> {
     let NodeRow { added, state, attempts, deaths, key, error } = row;
-    let Deaths { in_company, alone, excused } = deaths;
+    let Deaths { in_company, alone, not_counted } = deaths;
     let (state, key) = (*state as u8, key.as_ref().map(|key| key.0));
     match added {
         Some((kind, label)) => transaction
             .prepare_cached(
                 "INSERT INTO nodes
-                     (id, kind, label, state, attempts, deaths, deaths_alone, deaths_excused, key, error)
+                     (id, kind, label, state, attempts, deaths, deaths_alone, deaths_not_counted, key, error)
                  VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10)",
             )?
-            .execute(params![id, kind, label, state, attempts, in_company, alone, excused, key, error])?,
+            .execute(params![id, kind, label, state, attempts, in_company, alone, not_counted, key, error])?,
         None => transaction
             .prepare_cached(
-                "UPDATE nodes SET state = ?2, attempts = ?3, deaths = ?4, deaths_alone = ?5, deaths_excused = ?6, key = ?7,
+                "UPDATE nodes SET state = ?2, attempts = ?3, deaths = ?4, deaths_alone = ?5, deaths_not_counted = ?6, key = ?7,
                      error = ?8
                  WHERE id = ?1",
             )?
-            .execute(params![id, state, attempts, in_company, alone, excused, key, error])?,
+            .execute(params![id, state, attempts, in_company, alone, not_counted, key, error])?,
     };
     Ok(())
 }
 
 fn write_workers(transaction: &Transaction<'_>, epoch: u64, batch: &Batch) -> rusqlite::Result<()> {
     for row in &batch.workers {
-        let WorkerProcess { id, name, is_local } = row.process;
         transaction
             .prepare_cached(
-                "INSERT INTO workers (epoch, worker, process, name, local, threads, joined_ms)
-                 VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7)",
+                "INSERT INTO workers (epoch, worker, process, threads, joined_ms) VALUES (?1, ?2, ?3, ?4, ?5)",
             )?
-            .execute(params![epoch, row.worker, id, name.0, is_local, row.threads, ms(row.at)])?;
+            .execute(params![epoch, row.worker, row.process, row.threads, ms(row.at)])?;
     }
     for row in &batch.left {
         transaction
             .prepare_cached("UPDATE workers SET left_ms = ?3, why = ?4 WHERE epoch = ?1 AND worker = ?2")?
             .execute(params![epoch, row.worker, ms(row.at), row.why])?;
-    }
-    for process in &batch.local_workers {
-        transaction
-            .prepare_cached("INSERT OR IGNORE INTO local_workers (epoch, process) VALUES (?1, ?2)")?
-            .execute(params![epoch, process])?;
     }
     if let Some(listen) = &batch.listen {
         transaction.execute("UPDATE epochs SET listen = ?2 WHERE epoch = ?1", params![epoch, listen])?;

@@ -1,7 +1,7 @@
 //! The numbers, as the events of a run change them.
 
 use super::histogram::Histogram;
-use crate::comm::{RunEvent, Site};
+use crate::events::{RunEvent, Site};
 use lookalike::graph::{NodeId, WorkerId};
 use std::{collections::BTreeMap, time::Instant};
 

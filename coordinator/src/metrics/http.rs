@@ -41,7 +41,7 @@ pub(super) async fn serve(listener: TcpListener, pages: impl Pages) {
             Ok((stream, _)) => {
                 let pages = Arc::clone(&pages);
                 tokio::spawn(async move {
-                    // Nobody but the scraper cares how it ended.
+                    // How it ended matters to the scraper alone.
                     let _ = timeout(PATIENCE, answer(stream, &*pages)).await;
                     drop(place);
                 });

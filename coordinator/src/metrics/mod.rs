@@ -1,14 +1,14 @@
 //! `--metrics`: the counters of a run for Prometheus, over HTTP in its text format.
 //!
-//! What is counted is told by the events of the run and by the states of the fits, so that nothing else knows of metrics. They are
-//! for people: nothing of them reaches a result. docs/batch.md lists their names, which are a contract.
+//! The counts come from the events of the run and from the states of the fits, so that no other module knows of metrics. They are for
+//! people: none of them reaches a result. docs/batch.md lists their names, which are a contract.
 
 mod book;
 mod histogram;
 mod http;
 mod text;
 
-use crate::{comm::RunEvent, runner::Pulse};
+use crate::{events::RunEvent, runner::Pulse};
 use book::Book;
 use std::{
     io,
@@ -26,7 +26,7 @@ pub struct Metrics {
     pulse: Arc<Pulse>,
 }
 
-/// A loop that does not go round for so long hangs: it reads at most a photo and its light in one go.
+/// A loop that has not turned for this long hangs: the longest single step reads one photo and its light.
 const LONGEST_ROUND: Duration = Duration::from_secs(30);
 
 impl Metrics {

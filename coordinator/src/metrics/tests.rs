@@ -6,7 +6,7 @@ use super::{
     http::{Pages, response},
     text::{escaped, page},
 };
-use crate::comm::{Departure, NodeName, RunEvent, Site};
+use crate::events::{Departure, NodeName, RunEvent, Site};
 use lookalike::graph::{FailureReason, NodeFailure, NodeId, WorkerId};
 use std::time::{Duration, Instant};
 

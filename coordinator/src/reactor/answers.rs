@@ -1,32 +1,18 @@
-//! Workers begin with nodes and answer for them: which answer counts, and what becomes of the others.
+//! Answers of workers: which one counts, and what happens to the others.
 
 use std::time::Duration;
 
-use lookalike::graph::{Blob, BlobHash, Completion, FailureReason, NodeFailure, NodeId, NodeSpec, NodeState, WorkerId};
+use lookalike::graph::{Blob, BlobHash, FailureReason, NodeFailure, NodeId, NodeSpec, NodeState};
 use lookalike::protocol::ProcessName;
 
-use super::{membership, schedule};
-use crate::comm::{Action, Departure, Outbox, RunEvent, Site};
-use crate::core::{Candidate, Core, Place};
-use crate::runner::{NodeAnswer, RunError};
+use super::error::{NodeAnswer, Stop};
+use super::{leases, membership, results};
+use crate::actions::{Action, Outbox};
+use crate::events::{Departure, Site};
+use crate::state::{Candidate, Core};
 
 /// An answer: (where from, for which node, for which attempt).
 pub(super) type Answer = (Site, NodeId, u32);
-
-pub(super) fn started(
-    core: &mut Core,
-    worker: WorkerId,
-    (node, attempt): (NodeId, u32),
-    (arrived, now): (Duration, Duration),
-    outbox: &mut Outbox,
-) {
-    membership::renew(core, worker, now);
-    // A lease that has ended or changed meanwhile: the message crossed ours.
-    if core.members.change(worker, |member| member.begin(node, attempt, (arrived, now))) == Some(true) {
-        core.watch(node);
-        outbox.tell(RunEvent::NodeStarted { name: core.name(node), site: Site::Worker(worker) });
-    }
-}
 
 pub(super) fn finished(
     core: &mut Core,
@@ -34,7 +20,7 @@ pub(super) fn finished(
     output: Blob,
     (arrived, now): (Duration, Duration),
     outbox: &mut Outbox,
-) -> Result<(), RunError> {
+) -> Result<(), Stop> {
     let (site, node, attempt) = answer;
     let process = process_of(core, site);
     let Some(since) = answered(core, answer, now, outbox) else {
@@ -53,29 +39,12 @@ fn process_of(core: &Core, site: Site) -> Option<ProcessName> {
 }
 
 /// Take an output, or keep it until a second one has come.
-fn take(core: &mut Core, node: NodeId, result: Candidate, now: Duration, outbox: &mut Outbox) -> Result<(), RunError> {
+fn take(core: &mut Core, node: NodeId, result: Candidate, now: Duration, outbox: &mut Outbox) -> Result<(), Stop> {
     let is_open = core.graph.state(node) == Some(&NodeState::Ready);
     if is_open && core.look(node).is_some_and(|record| record.is_verified) {
         return verify(core, node, result, now, outbox);
     }
-    accept(core, node, result, now, outbox)
-}
-
-/// An output has come that an earlier coordinator of this run had asked for.
-pub(super) fn recovered(
-    core: &mut Core,
-    worker: WorkerId,
-    node: NodeId,
-    output: Blob,
-    now: Duration,
-    outbox: &mut Outbox,
-) -> Result<(), RunError> {
-    membership::renew(core, worker, now);
-    core.summary.output_bytes_received += output.len() as u64;
-    // No attempt of today has this number: a second computation is another one.
-    let site = Site::Worker(worker);
-    let result = Candidate { site, process: process_of(core, site), attempt: 0, output, took: None };
-    take(core, node, result, now, outbox)
+    results::accept(core, node, result, now, outbox)
 }
 
 pub(super) fn failed(
@@ -84,16 +53,16 @@ pub(super) fn failed(
     failure: NodeFailure,
     now: Duration,
     outbox: &mut Outbox,
-) -> Result<(), RunError> {
+) -> Result<(), Stop> {
     let (second_site, node, _) = answer;
     if answered(core, answer, now, outbox).is_none() {
         return Ok(());
     }
     if !core.graph.is_open(node) {
         let has_output = matches!(core.graph.state(node), Some(NodeState::Completed(_)));
-        // What was stopped because nobody wants it has no opinion.
+        // A cancelled execution says nothing about the node.
         if has_output && failure != NodeFailure::Cancelled {
-            tell_difference(core, node, second_site, failure.to_string(), outbox);
+            results::tell_difference(core, node, second_site, failure.to_string(), outbox);
         }
         return Ok(());
     }
@@ -101,28 +70,22 @@ pub(super) fn failed(
         let first_answer = NodeAnswer::Output(first.output.hash());
         let second = NodeAnswer::Failure(Box::new(failure));
         let name = Box::new(core.name(node));
-        return Err(RunError::ResultsDiffer { name, first_site: first.site, first: first_answer, second_site, second });
+        return Err(Stop::ResultsDiffer { name, first_site: first.site, first: first_answer, second_site, second });
     }
     core.record(node).into_iter().for_each(|record| record.finished_by = Some(second_site));
     core.graph.fail(node, FailureReason::Node(failure));
     Ok(())
 }
 
-/// A node has an output and an error. Whoever acted upon the first one cannot take that back.
-fn tell_difference(core: &Core, node: NodeId, second: Site, error: String, outbox: &mut Outbox) {
-    let first = core.look(node).and_then(|record| record.finished_by).unwrap_or(Site::Coordinator);
-    outbox.tell(RunEvent::AnswersDiffer { name: core.name(node), first, second, error });
-}
-
-/// An answer has come: its lease ends. Since when the node has run under it, as far as it is known; `None` if nobody asked for this
-/// answer. What worker gives one to nothing is thrown out.
+/// An answer has come: its lease ends. Returns since when the node has run under it, as far as known; `None` if the attempt was never
+/// given out. A worker that answers for such an attempt is dropped.
 fn answered(core: &mut Core, answer: Answer, now: Duration, outbox: &mut Outbox) -> Option<Option<Duration>> {
     let (site, node, attempt) = answer;
     let was_asked = core.was_given_out(node, attempt);
     let since = match site {
         Site::Coordinator => core.record(node).and_then(|record| record.here_since.take()),
         Site::Worker(worker) if was_asked => {
-            membership::renew(core, worker, now);
+            leases::renew(core, worker, now);
             let member = core.members.get(worker);
             if member.is_some() {
                 outbox.push(Action::Acknowledge { worker, node, attempt });
@@ -143,110 +106,36 @@ fn answered(core: &mut Core, answer: Answer, now: Duration, outbox: &mut Outbox)
     was_asked.then_some(since)
 }
 
-/// An output of a node whose output has to come twice: keep the first, compare the second.
-fn verify(
-    core: &mut Core,
-    node: NodeId,
-    result: Candidate,
-    now: Duration,
-    outbox: &mut Outbox,
-) -> Result<(), RunError> {
-    // Whoever may kill its workers runs as often as it has to and not more.
+/// An output of a node that is verified by a second computation: keep the first output, compare the second.
+fn verify(core: &mut Core, node: NodeId, result: Candidate, now: Duration, outbox: &mut Outbox) -> Result<(), Stop> {
+    // A suspect node's first result is accepted without a second computation.
     let is_suspect = core.is_suspect(node);
     let Some(record) = core.record(node) else { return Ok(()) };
     let first = match record.candidate.take() {
-        None if is_suspect => return accept(core, node, result, now, outbox),
+        None if is_suspect => return results::accept(core, node, result, now, outbox),
         None => result,
         Some(first) if first.output != result.output => {
-            return Err(differ(core, node, (first.site, first.output.hash()), &result));
+            return Err(results::differ(core, node, (first.site, first.output.hash()), &result));
         }
         Some(first) if is_second_computation(&first, &result) => {
             core.summary.verified_nodes += 1;
-            return accept(core, node, *first, now, outbox);
+            return results::accept(core, node, *first, now, outbox);
         }
-        // Sent again by a worker that did not hear our thanks.
+        // A duplicate: the worker never received our acknowledgement.
         Some(first) => *first,
     };
     record.candidate = Some(Box::new(first));
     if record.holders.is_empty() {
-        schedule::await_now(core, node, now);
+        leases::await_now(core, node, now);
     }
     Ok(())
 }
 
-/// Whether an output was computed anew. A process that has lost its connection may send one and the same output under two leases; but
-/// one that it began with it has not answered before.
+/// Whether an output was computed a second time. A process that has lost its connection may send one output under two leases, but
+/// not under a lease whose execution it has announced.
 fn is_second_computation(first: &Candidate, second: &Candidate) -> bool {
     let is_another = first.process.is_some() && second.process.is_some() && first.process != second.process;
     first.attempt != second.attempt && (is_another || second.took.is_some())
-}
-
-/// Take the output of a node that is waiting for its verification as it is; `false` if there is none.
-pub(super) fn accept_candidate(core: &mut Core, node: NodeId, now: Duration, outbox: &mut Outbox) -> bool {
-    let candidate = core.record(node).and_then(|record| record.candidate.take());
-    // The node is open, so nothing can differ.
-    candidate.is_some_and(|candidate| accept(core, node, *candidate, now, outbox).is_ok())
-}
-
-fn accept(
-    core: &mut Core,
-    node: NodeId,
-    result: Candidate,
-    now: Duration,
-    outbox: &mut Outbox,
-) -> Result<(), RunError> {
-    let (site, bytes, took) = (result.site, result.output.len(), result.took);
-    match core.graph.complete(node, result.output.clone()) {
-        Completion::Accepted => {
-            retract(core, node, now, outbox);
-            core.record(node).into_iter().for_each(|record| record.finished_by = Some(site));
-            let name = core.name(node);
-            took.filter(|took| !took.is_zero()).into_iter().for_each(|took| core.pace.note(&name.kind, took));
-            if core.recall.is_some() {
-                outbox.push(Action::Keep { node, output: result.output });
-            }
-            outbox.tell(RunEvent::NodeFinished { name, site, bytes, elapsed: took.unwrap_or_default() });
-        }
-        Completion::Duplicate => {
-            core.summary.duplicate_results += 1;
-            outbox.tell(RunEvent::DuplicateResult { node, site });
-        }
-        // The node has failed before; the planner knows it, and nothing can be taken back.
-        Completion::Refused => {
-            if let Some(NodeState::Failed(FailureReason::Node(failure))) = core.graph.state(node) {
-                let error = failure.to_string();
-                tell_difference(core, node, site, error, outbox);
-            }
-        }
-        Completion::Different { first } => {
-            let site = core.look(node).and_then(|record| record.finished_by).unwrap_or(Site::Coordinator);
-            return Err(differ(core, node, (site, first), &result));
-        }
-    }
-    Ok(())
-}
-
-fn differ(core: &Core, node: NodeId, (first_site, first): (Site, BlobHash), second: &Candidate) -> RunError {
-    RunError::ResultsDiffer {
-        name: Box::new(core.name(node)),
-        first_site,
-        first: NodeAnswer::Output(first),
-        second_site: second.site,
-        second: NodeAnswer::Output(second.output.hash()),
-    }
-}
-
-/// Nobody needs to run this node any more.
-pub(super) fn retract(core: &mut Core, node: NodeId, now: Duration, outbox: &mut Outbox) {
-    core.put(node, Place::Nowhere);
-    let Some(record) = core.record(node) else { return };
-    record.candidate = None;
-    if record.here_since.is_some() {
-        outbox.push(Action::CancelHere { node });
-    }
-    for worker in std::mem::take(&mut record.holders) {
-        schedule::take_back(core, worker, node, now, outbox);
-    }
 }
 
 /// Whether this node is among the share that is verified: the same nodes in every run.
@@ -261,6 +150,6 @@ pub(super) fn is_chosen(core: &Core, spec: &NodeSpec, node: NodeId) -> bool {
     named.extend_from_slice(&BlobHash::of(&spec.parameters).0);
     inputs.iter().for_each(|input| named.extend_from_slice(&input.hash().0));
     let [a, b, c, d, ..] = BlobHash::of(&named).0;
-    // Evenly spread over 0 to 1, the end not included.
+    // Uniform in [0, 1).
     f64::from(u32::from_le_bytes([a, b, c, d])) / (f64::from(u32::MAX) + 1.0) < fraction
 }

@@ -1,31 +1,19 @@
-//! Workers come, are heard of, are asked to end, leave.
+//! Membership: workers join, send signs of life, drain, leave.
 
 use std::time::Duration;
 
 use lookalike::graph::{BlobHash, FailureReason, NodeId, NodeState, WorkerId};
 
-use super::{answers, quarantine, schedule};
-use crate::comm::{Action, Departure, Lease, Outbox, RunEvent, WorkerProcess};
-use crate::core::{Core, Lost, Place};
+use super::{leases, quarantine, results};
+use crate::actions::{Action, Lease, Outbox, WorkerProcess};
+use crate::events::{Departure, RunEvent};
+use crate::state::{Core, Lost, Place};
 
 /// The pause after a node in execution has lost its worker for the second time; each further one is twice as long.
 const FIRST_DELAY: Duration = Duration::from_millis(100);
 
 /// The longest of these pauses.
 const LONGEST_DELAY: Duration = Duration::from_secs(5);
-
-/// A worker executes a node for an earlier coordinator: keep it for that one if it is about to join. Whoever has to run alone
-/// begins anew.
-pub(super) fn go_on(core: &mut Core, worker: WorkerId, node: NodeId, now: Duration, outbox: &mut Outbox) {
-    if core.members.get(worker).is_some() {
-        if may_go_on(core, worker, node) {
-            adopt(core, worker, node, now, outbox);
-        }
-    } else if core.look(node).is_some_and(|record| matches!(record.place, Place::Queue(_))) {
-        core.put(node, Place::Nowhere);
-        core.continued.push((worker, node));
-    }
-}
 
 pub(super) fn join(
     core: &mut Core,
@@ -45,19 +33,10 @@ pub(super) fn join(
         quarantine::take_back_death(core, process.name, &std::mem::take(&mut lost.deaths), now, outbox);
         core.members.change(worker, |member| member.resume(lost));
     }
-    for (_, node) in core.continued.extract_if(.., |(continuing, _)| *continuing == worker).collect::<Vec<_>>() {
-        // Its output may have come meanwhile.
-        if core.graph.is_open(node) {
-            schedule::assign(core, worker, node, now, outbox);
-            // It has begun: nobody else shall get it for having idle threads.
-            let attempt = core.look(node).map_or(0, |record| record.attempts);
-            answers::started(core, worker, (node, attempt), (now, now), outbox);
-        }
-    }
 }
 
-/// A worker executes a node of which it has no lease, under one that it had before it lost its connection: it goes on with it, or
-/// has to be told that nobody wants it.
+/// A worker reports a node that it executes under a lease from before its connection broke: it gets a new lease and continues, or is
+/// told to cancel.
 pub(super) fn found(
     core: &mut Core,
     worker: WorkerId,
@@ -66,7 +45,7 @@ pub(super) fn found(
     outbox: &mut Outbox,
 ) {
     let earlier = core.members.get(worker).and_then(|member| member.earlier.get(&node));
-    // What was taken back on this connection it has been told already.
+    // For leases taken back on this connection the cancellation has been sent already.
     if earlier != Some(&attempt) {
         return;
     }
@@ -78,48 +57,44 @@ pub(super) fn found(
     }
 }
 
-/// Whether a worker may have a node that it executes: it is not done, not to be run alone, and at most one other one executes it.
+/// Whether a worker may continue a node: the node is open, not a suspect, and at most one other worker executes it.
 fn may_go_on(core: &Core, worker: WorkerId, node: NodeId) -> bool {
     let (Some(member), Some(record)) = (core.members.get(worker), core.look(node)) else { return false };
     let is_begun =
         |holder: &&WorkerId| core.members.get(**holder).is_some_and(|holder| !holder.waiting.contains(&node));
     let is_free = !member.leases.contains_key(&node) && member.alone_with.is_none();
     let is_wanted = core.graph.state(node) == Some(&NodeState::Ready) && !core.is_suspect(node);
-    let is_other = !schedule::is_origin(core, node, worker);
+    let is_other = !leases::is_origin(core, node, worker);
     is_free && is_wanted && is_other && record.holders.iter().filter(is_begun).count() < 2
 }
 
-/// Give a worker the lease of a node that it executes. Who has not begun with it need not, nor with what is too much for this one.
+/// Give a worker the lease of a node that it executes. Workers that hold the node without having begun it lose that lease, and this
+/// worker loses the leases that are too many for it now.
 fn adopt(core: &mut Core, worker: WorkerId, node: NodeId, now: Duration, outbox: &mut Outbox) {
     for holder in core.look(node).map(|record| record.holders.clone()).unwrap_or_default() {
         if core.members.get(holder).is_some_and(|holder| holder.waiting.contains(&node)) {
-            schedule::take_back(core, holder, node, now, outbox);
+            leases::take_back(core, holder, node, now, outbox);
         }
     }
-    schedule::assign(core, worker, node, now, outbox);
+    leases::assign(core, worker, node, now, outbox);
     let attempt = core.look(node).map_or(0, |record| record.attempts);
-    answers::started(core, worker, (node, attempt), (now, now), outbox);
+    leases::started(core, worker, (node, attempt), (now, now), outbox);
     let spare_leases = core.policy.spare_leases;
     while let Some(excess) = core.members.get(worker).and_then(|member| member.excess(spare_leases)) {
-        schedule::take_back(core, worker, excess, now, outbox);
+        leases::take_back(core, worker, excess, now, outbox);
         if core.look(excess).is_some_and(|record| record.holders.is_empty()) {
-            schedule::await_now(core, excess, now);
+            leases::await_now(core, excess, now);
         }
     }
 }
 
-/// A worker was heard of.
-pub(super) fn renew(core: &mut Core, worker: WorkerId, now: Duration) {
-    core.members.renew(worker, now + core.policy.lost_after);
-}
-
-/// Take back what a worker held. The nodes it executed are suspects if it may have died of them.
+/// Take back the leases of a worker. Its death counts against the nodes that it executed if they may have caused it.
 pub(super) fn leave(core: &mut Core, worker: WorkerId, departure: &Departure, now: Duration, outbox: &mut Outbox) {
     let Some(member) = core.members.remove(worker) else { return };
     core.clearing = core.clearing.filter(|clearing| *clearing != worker);
     core.summary.workers_left += 1;
     outbox.tell(RunEvent::WorkerLeft { worker, departure: departure.clone() });
-    // Whoever was asked to end may be ended by force, a time limit later: nobody's fault.
+    // A draining worker may be killed when its time limit ends: no node is to blame.
     let was_asked = member.is_draining || *departure == Departure::Goodbye;
     let counts = departure.is_suspicious() && !was_asked;
     let deaths = if counts { quarantine::count_death(core, &member, now, outbox) } else { Vec::new() };
@@ -136,9 +111,9 @@ pub(super) fn leave(core: &mut Core, worker: WorkerId, departure: &Departure, no
     }
 }
 
-/// A worker begins with nothing more: take back what it has not begun with.
+/// A worker drains: take back the leases that it has not begun.
 pub(super) fn drain(core: &mut Core, worker: WorkerId, now: Duration, outbox: &mut Outbox) {
-    renew(core, worker, now);
+    leases::renew(core, worker, now);
     core.clearing = core.clearing.filter(|clearing| *clearing != worker);
     let drained = core.members.change(worker, |member| {
         let was_draining = std::mem::replace(&mut member.is_draining, true);
@@ -154,7 +129,7 @@ pub(super) fn drain(core: &mut Core, worker: WorkerId, now: Duration, outbox: &m
     }
 }
 
-/// Let a node that was taken from this worker wait for another one, unless another one has it already.
+/// Re-queue a node that was taken from this worker, unless another worker holds it or it waits already.
 fn requeue(core: &mut Core, node: NodeId, worker: WorkerId, now: Duration, outbox: &mut Outbox) {
     let Some(record) = core.look(node) else { return };
     let is_cared_for = !record.holders.is_empty() || record.place != Place::Nowhere;
@@ -162,7 +137,7 @@ fn requeue(core: &mut Core, node: NodeId, worker: WorkerId, now: Duration, outbo
         return;
     }
     let deaths = record.deaths;
-    if core.is_suspect(node) && answers::accept_candidate(core, node, now, outbox) {
+    if core.is_suspect(node) && results::accept_candidate(core, node, now, outbox) {
         return;
     }
     if deaths.alone >= core.policy.node_crashes {
@@ -174,19 +149,19 @@ fn requeue(core: &mut Core, node: NodeId, worker: WorkerId, now: Duration, outbo
     outbox.tell(RunEvent::NodeRequeued { name: core.name(node), worker, crashes: deaths.total() });
 }
 
-/// Let a node wait in its place; after each loss while it was executed a little longer, so that what always fails does not spin.
+/// Queue a node. After the second loss of its worker it waits, each time longer, so that a node that always fails does not spin.
 fn await_worker(core: &mut Core, node: NodeId, now: Duration) {
     let losses = core.look(node).map_or(0, |record| record.losses);
     let doublings = losses.saturating_sub(2).min(16);
     let delay = (FIRST_DELAY * 2_u32.pow(doublings)).min(LONGEST_DELAY);
     if losses < 2 || core.is_suspect(node) {
-        schedule::await_now(core, node, now);
+        leases::await_now(core, node, now);
     } else {
         core.put(node, Place::Delayed(now + delay));
     }
 }
 
-/// Throw a worker out.
+/// Close the connection of a worker and remove it.
 pub(super) fn drop_worker(
     core: &mut Core,
     worker: WorkerId,
@@ -201,14 +176,14 @@ pub(super) fn drop_worker(
 }
 
 pub(super) fn send_blob(core: &mut Core, worker: WorkerId, hash: BlobHash, now: Duration, outbox: &mut Outbox) {
-    renew(core, worker, now);
+    leases::renew(core, worker, now);
     let Some(member) = core.members.get(worker) else { return };
     if !member.readable.contains(&hash) {
         let what = format!("it asked for blob {hash}, which none of its nodes reads");
         drop_worker(core, worker, &Departure::Violation(what), now, outbox);
         return;
     }
-    // A node that was taken back meanwhile may have been completed, and its inputs may be gone; it is not needed then.
+    // The node may have been taken back and completed meanwhile, and its inputs dropped: then the blob is not needed.
     let Some(blob) = core.graph.blob(hash).cloned() else {
         outbox.push(Action::ForgoBlob { worker });
         return;

@@ -9,14 +9,15 @@ use proptest::prelude::*;
 
 use super::tests::{Script, node, process};
 use super::{Event, Executing, handle, start};
-use crate::comm::{Action, Departure, Outbox, Site};
-use crate::core::{Core, Policy};
+use crate::actions::{Action, Outbox};
+use crate::events::{Departure, Site};
 use crate::policy::Speculation;
+use crate::state::{Core, Policy};
 use lookalike::graph::FailureReason;
 
 /// One thing that the outside world does. Numbers choose among what is there, modulo.
 #[derive(Clone, Debug)]
-enum Deed {
+enum Step {
     Join {
         threads: usize,
     },
@@ -55,21 +56,21 @@ enum Deed {
     RunHere,
 }
 
-fn deed() -> impl Strategy<Value = Deed> {
+fn step() -> impl Strategy<Value = Step> {
     prop_oneof![
-        2 => (1..4_usize).prop_map(|threads| Deed::Join { threads }),
-        1 => (0..9_usize, 0..5_u8).prop_map(|(worker, departure)| Deed::Leave { worker, departure }),
-        4 => (0..9_usize, 0..9_usize).prop_map(|(worker, lease)| Deed::Begin { worker, lease }),
+        2 => (1..4_usize).prop_map(|threads| Step::Join { threads }),
+        1 => (0..9_usize, 0..5_u8).prop_map(|(worker, departure)| Step::Leave { worker, departure }),
+        4 => (0..9_usize, 0..9_usize).prop_map(|(worker, lease)| Step::Begin { worker, lease }),
         6 => (0..9_usize, 0..9_usize, any::<bool>())
-            .prop_map(|(worker, lease, again)| Deed::Answer { worker, lease, again }),
-        2 => (0..99_usize).prop_map(|lease| Deed::LateAnswer { lease }),
-        1 => (0..9_usize).prop_map(|worker| Deed::Fetch { worker }),
-        1 => (0..9_usize).prop_map(|worker| Deed::Drain { worker }),
-        1 => (0..4_000_000_u64, any::<u8>()).prop_map(|(microseconds, heard)| Deed::PassTime { microseconds, heard }),
+            .prop_map(|(worker, lease, again)| Step::Answer { worker, lease, again }),
+        2 => (0..99_usize).prop_map(|lease| Step::LateAnswer { lease }),
+        1 => (0..9_usize).prop_map(|worker| Step::Fetch { worker }),
+        1 => (0..9_usize).prop_map(|worker| Step::Drain { worker }),
+        1 => (0..4_000_000_u64, any::<u8>()).prop_map(|(microseconds, heard)| Step::PassTime { microseconds, heard }),
         // So little that nodes are short.
-        3 => (0..400_u64, any::<u8>()).prop_map(|(microseconds, heard)| Deed::PassTime { microseconds, heard }),
-        2 => (0..9_usize, any::<bool>()).prop_map(|(which, is_at_it)| Deed::Return { which, is_at_it }),
-        2 => Just(Deed::RunHere),
+        3 => (0..400_u64, any::<u8>()).prop_map(|(microseconds, heard)| Step::PassTime { microseconds, heard }),
+        2 => (0..9_usize, any::<bool>()).prop_map(|(which, is_at_it)| Step::Return { which, is_at_it }),
+        2 => Just(Step::RunHere),
     ]
 }
 
@@ -301,10 +302,10 @@ impl World {
         self.telling = None;
     }
 
-    fn act(&mut self, deed: Deed) {
-        match deed {
-            Deed::Join { threads } => self.join(threads),
-            Deed::Leave { worker, departure } => {
+    fn act(&mut self, step: Step) {
+        match step {
+            Step::Join { threads } => self.join(threads),
+            Step::Leave { worker, departure } => {
                 let Some(worker) = self.chosen(worker) else { return };
                 let violation = Departure::Violation("test".into());
                 let departures =
@@ -317,12 +318,12 @@ impl World {
                 self.lose(worker, departure);
                 self.cut_off.push((name, at_it));
             }
-            Deed::Begin { worker, lease } => {
+            Step::Begin { worker, lease } => {
                 let Some(worker) = self.chosen(worker) else { return };
                 let Some(lease) = self.lease_of(worker, lease) else { return };
                 self.begin(worker, lease);
             }
-            Deed::Answer { worker, lease, again } => {
+            Step::Answer { worker, lease, again } => {
                 let Some(worker) = self.chosen(worker) else { return };
                 let Some(lease) = self.lease_of(worker, lease) else { return };
                 self.answer(Site::Worker(worker), lease);
@@ -330,17 +331,17 @@ impl World {
                     self.answer(Site::Worker(worker), lease);
                 }
             }
-            Deed::LateAnswer { lease } => {
+            Step::LateAnswer { lease } => {
                 // From a worker that is gone, or from whoever is there now.
                 let site = Site::Worker(self.chosen(lease).unwrap_or(WorkerId(999)));
                 let lease = self.ever.get(lease % self.ever.len().max(1)).copied();
                 lease.into_iter().for_each(|lease| self.answer(site, lease));
             }
-            Deed::Fetch { worker } => {
+            Step::Fetch { worker } => {
                 let Some(worker) = self.chosen(worker) else { return };
                 self.tell(Event::BlobRequested { worker, hash: BlobHash::of(&[1, 2, 3]) });
             }
-            Deed::Drain { worker } => {
+            Step::Drain { worker } => {
                 let Some(worker) = self.chosen(worker) else { return };
                 let begun = |node: &NodeId| self.executing.contains(&(worker, *node));
                 let kept = self.connected[&worker].iter().filter(|(node, _)| begun(node));
@@ -348,19 +349,19 @@ impl World {
                 self.connected.insert(worker, kept);
                 self.tell(Event::WorkerDrains { worker });
             }
-            Deed::PassTime { microseconds, heard } => {
+            Step::PassTime { microseconds, heard } => {
                 self.now += Duration::from_micros(microseconds);
                 let heard = self.connected.keys().copied().filter(|worker| heard >> (worker.0 % 8) & 1 == 1);
                 self.pass(heard.collect());
             }
-            Deed::Return { which, is_at_it } => {
+            Step::Return { which, is_at_it } => {
                 if self.cut_off.is_empty() {
                     return;
                 }
                 let (name, at_it) = self.cut_off.swap_remove(which % self.cut_off.len());
                 self.come_back((name, if is_at_it { at_it } else { BTreeMap::new() }));
             }
-            Deed::RunHere => {
+            Step::RunHere => {
                 if let Some(run) = self.here.pop_first() {
                     self.answer(Site::Coordinator, run);
                 }
@@ -421,10 +422,10 @@ proptest! {
     #[test]
     fn every_node_completes_or_fails_by_name(
         shape in prop::collection::vec((0..6_usize, prop::bool::weighted(0.2)), 1..20),
-        deeds in prop::collection::vec(deed(), 0..150),
+        steps in prop::collection::vec(step(), 0..150),
     ) {
         let mut world = World::new(&shape);
-        deeds.into_iter().for_each(|deed| world.act(deed));
+        steps.into_iter().for_each(|step| world.act(step));
         world.finish();
         let told: BTreeSet<_> = world.planner.completed.iter().copied().collect();
         let failed: BTreeMap<_, _> = world.planner.failed.iter().cloned().collect();

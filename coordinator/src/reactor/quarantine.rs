@@ -1,32 +1,33 @@
-//! Nodes that may kill their workers: whom to suspect of a death, and when to believe it.
+//! Nodes that may kill their workers: which node to suspect of a death, and when to count it.
 //!
 //! Only what a worker was executing can have killed it. After a few deaths in which a node took part
-//! ([`Policy::suspect_after`](crate::core::Policy::suspect_after)) it is a *suspect*: it runs alone, on a worker that has
+//! ([`Policy::suspect_after`](crate::state::Policy::suspect_after)) it is a *suspect*: it runs alone, on a worker that has
 //! executed nothing before or at least nothing else at the same time. Only deaths there count against it, and so many of
-//! them ([`Policy::node_crashes`](crate::core::Policy::node_crashes)) fail it by name.
+//! them ([`Policy::node_crashes`](crate::state::Policy::node_crashes)) fail it by name.
 //!
-//! Somebody who kills workers from outside may hit a suspect's worker as well. What tells the two apart is whom else they
-//! hit: as long as workers die whose deaths no suspect explains, a suspect is excused, though not for ever.
+//! A kill from outside may also hit the worker of a suspect. Other deaths tell the two apart: as long as workers die whose deaths no
+//! suspect explains, a suspect's deaths are not counted, up to a limit.
 //!
-//! A connection that breaks looks like a death, too. When its process comes back, what was counted is taken back.
+//! A broken connection looks like a death. When its process comes back, the count is taken back.
 
 use std::time::Duration;
 
 use lookalike::graph::NodeId;
 use lookalike::protocol::ProcessName;
 
-use super::schedule;
-use crate::comm::{Outbox, RunEvent};
-use crate::core::{Core, Death, Deaths, Member, Place, Unexplained};
+use super::leases;
+use crate::actions::Outbox;
+use crate::events::RunEvent;
+use crate::state::{Core, Death, Deaths, Member, Place, Unexplained};
 
-/// How many deaths of a suspect's workers are excused for one that would count: where a machine fails all the time, a node that
-/// kills its workers has to fail in the end.
-const EXCUSES_PER_CRASH: u32 = 10;
+/// How many deaths of a suspect's workers are not counted for one that would count: where a machine fails all the time, a node that
+/// kills its workers still fails after a bounded number.
+const NOT_COUNTED_PER_CRASH: u32 = 10;
 
 /// How many unexplained deaths are remembered.
 const REMEMBERED: usize = 8;
 
-/// A worker has died, it seems: count it against the nodes that it executed. What was counted.
+/// A worker seems to have died: count it against the nodes that it executed. Returns what was counted.
 pub(super) fn count_death(
     core: &mut Core,
     member: &Member,
@@ -61,13 +62,13 @@ fn count(core: &mut Core, nodes: &[NodeId], death: Death, outbox: &mut Outbox) -
             core.summary.suspected_nodes += 1;
             outbox.tell(RunEvent::NodeSuspected { name: core.name(*node), deaths });
         }
-        // Another worker may run it too; a third shall not.
+        // A second worker may run it too, but not a third.
         core.watch(*node);
     }
     nodes.iter().map(|node| (*node, death)).collect()
 }
 
-/// A process is back that was thought to have died: its nodes have killed nobody.
+/// A process that seemed to have died is back: take back the deaths that were counted for it.
 pub(super) fn take_back_death(
     core: &mut Core,
     process: ProcessName,
@@ -83,7 +84,7 @@ pub(super) fn take_back_death(
         let (deaths, place) = (record.deaths.total(), record.place);
         outbox.tell(RunEvent::DeathsCounted { name: core.name(*node), deaths });
         if matches!(place, Place::Suspects(_)) && !core.is_suspect(*node) {
-            schedule::await_now(core, *node, now);
+            leases::await_now(core, *node, now);
         }
         core.watch(*node);
     }
@@ -93,16 +94,16 @@ fn of(deaths: &mut Deaths, death: Death) -> &mut u32 {
     match death {
         Death::InCompany => &mut deaths.in_company,
         Death::Alone => &mut deaths.alone,
-        Death::Excused => &mut deaths.excused,
+        Death::NotCounted => &mut deaths.not_counted,
     }
 }
 
-/// What the death of a suspect's worker is, which it had for itself since then.
+/// How the death of a suspect's worker counts; the suspect ran there alone since `since`.
 fn judge_death_alone(core: &Core, suspect: NodeId, since: Duration) -> Death {
     let lately = since.saturating_sub(core.policy.lost_after);
     let is_other = |death: &Unexplained| death.when >= lately && !death.executed.contains(&suspect);
     let others_die = core.unexplained.iter().any(is_other);
-    let most_excuses = core.policy.node_crashes.saturating_mul(EXCUSES_PER_CRASH);
-    let excused = core.look(suspect).map_or(0, |record| record.deaths.excused);
-    if others_die && excused < most_excuses { Death::Excused } else { Death::Alone }
+    let most = core.policy.node_crashes.saturating_mul(NOT_COUNTED_PER_CRASH);
+    let not_counted = core.look(suspect).map_or(0, |record| record.deaths.not_counted);
+    if others_die && not_counted < most { Death::NotCounted } else { Death::Alone }
 }

@@ -1,16 +1,17 @@
-//! Who gets what: suspects first, then second runs of outputs to be verified, then the queue; with nothing left there, work
-//! is moved to workers that have none.
+//! The order of leases: suspects first, then second computations for verification, then the queue; when it is empty, waiting leases move
+//! to idle workers.
 
 use std::time::Duration;
 
 use lookalike::graph::{NodeId, WorkerId};
 
+use super::leases::{assign, await_now, is_origin, take_back};
 use super::speculation;
-use crate::comm::{Action, Lease, Outbox, RunEvent, Site};
-use crate::core::{Core, Place};
+use crate::actions::Outbox;
+use crate::state::Core;
 
-/// How many nodes are looked at to find one that a worker may check. More are only more of the same: outputs of this very
-/// worker, which another one will check.
+/// How many nodes are tried to find one that a worker may verify. The rest are most likely outputs of the same worker, which another
+/// worker will verify.
 const CHECKS_LOOKED_AT: usize = 8;
 
 /// Give out leases as long as there are both nodes and places.
@@ -28,19 +29,8 @@ pub(super) fn schedule(core: &mut Core, now: Duration, outbox: &mut Outbox) {
     speculation::speculate(core, now, outbox);
 }
 
-/// Let a node wait for a worker from now on.
-pub(super) fn await_now(core: &mut Core, node: NodeId, now: Duration) {
-    let has_candidate = core.look(node).is_some_and(|record| record.candidate.is_some());
-    let place = match (core.is_suspect(node), has_candidate) {
-        (true, _) => Place::Suspects(now),
-        (false, true) => Place::Checks,
-        (false, false) => Place::Queue(core.graph.spec(node).map_or(0, |spec| spec.priority)),
-    };
-    core.put(node, place);
-}
-
-/// Give every suspect a worker for itself: a fresh one, or after a while any that holds nothing; if there is none, one after
-/// the other gets no more leases until it holds nothing.
+/// Give every suspect a worker of its own: a fresh one, or after a while any that holds no lease. If there is none, clear one worker
+/// after the other: it gets no more leases until it holds none.
 fn isolate_suspects(core: &mut Core, now: Duration, outbox: &mut Outbox) {
     core.next_patience = None;
     while let Some((since, node)) = core.waiting.suspect() {
@@ -56,7 +46,7 @@ fn isolate_suspects(core: &mut Core, now: Duration, outbox: &mut Outbox) {
             return;
         }
     }
-    // Nobody waits for it any more.
+    // No suspect waits for it any more.
     if let Some(worker) = core.clearing.take() {
         core.members.change(worker, |member| member.is_clearing = false);
     }
@@ -93,7 +83,7 @@ fn isolate(core: &mut Core, worker: WorkerId, node: NodeId, now: Duration, outbo
     assign(core, worker, node, now, outbox);
 }
 
-/// Give nodes whose output is to be verified to another worker than the one it came from, if there is another.
+/// Give nodes to be verified to another worker than the one that the first output came from, if there is one.
 fn give_checks(core: &mut Core, now: Duration, outbox: &mut Outbox) {
     loop {
         let is_only_one = core.members.accepting() == 1;
@@ -105,15 +95,6 @@ fn give_checks(core: &mut Core, now: Duration, outbox: &mut Outbox) {
         let Some((node, worker)) = pair else { return };
         assign(core, worker, node, now, outbox);
     }
-}
-
-/// Whether the output that is to be verified came from this worker, under whatever number.
-pub(super) fn is_origin(core: &Core, node: NodeId, worker: WorkerId) -> bool {
-    let candidate = core.look(node).and_then(|record| record.candidate.as_ref());
-    let process = core.members.get(worker).map(|member| member.process.name);
-    candidate.is_some_and(|candidate| {
-        candidate.site == Site::Worker(worker) || (process.is_some() && candidate.process == process)
-    })
 }
 
 /// Move nodes that merely wait on one worker to a worker with an idle thread.
@@ -131,26 +112,5 @@ fn balance(core: &mut Core, now: Duration, outbox: &mut Outbox) {
         let Some(node) = movable.copied().find(|node| !has(node) && !is_origin(core, *node, idle)) else { return };
         take_back(core, from, node, now, outbox);
         assign(core, idle, node, now, outbox);
-    }
-}
-
-/// Give a worker a lease of a node.
-pub(super) fn assign(core: &mut Core, worker: WorkerId, node: NodeId, now: Duration, outbox: &mut Outbox) {
-    core.put(node, Place::Nowhere);
-    let epoch = core.epoch;
-    let Some(record) = core.record(node) else { return };
-    record.attempts += 1;
-    let attempt = record.attempts;
-    core.summary.attempts += 1;
-    core.give(worker, node, attempt, now);
-    outbox.push(Action::Assign { worker, lease: Lease { node, attempt, epoch } });
-    outbox.tell(RunEvent::NodeAssigned { node, worker });
-}
-
-/// End a lease and tell its worker.
-pub(super) fn take_back(core: &mut Core, worker: WorkerId, node: NodeId, now: Duration, outbox: &mut Outbox) {
-    let epoch = core.epoch;
-    if let Some(held) = core.end_lease(worker, node, now) {
-        outbox.push(Action::Cancel { worker, lease: Lease { node, attempt: held.attempt, epoch } });
     }
 }

@@ -4,12 +4,12 @@ use std::time::Duration;
 
 use lookalike::graph::{NodeId, WorkerId};
 
-use super::schedule::{assign, is_origin};
-use crate::comm::{Outbox, RunEvent};
-use crate::core::Core;
+use super::leases::{assign, is_origin};
+use crate::actions::Outbox;
+use crate::events::RunEvent;
+use crate::state::Core;
 
-/// How many workers that do not get on are looked at. More are not needed at a time: what they hold that a second worker has
-/// been given ends soon.
+/// How many stalled workers are tried at a time. More are not needed: the nodes of theirs that a second worker runs end soon.
 const STALLED_LOOKED_AT: usize = 8;
 
 /// Give slow nodes to workers that have a thread without a lease, and note when the next node will be slow.
@@ -33,7 +33,7 @@ pub(super) fn speculate(core: &mut Core, now: Duration, outbox: &mut Outbox) {
     }
 }
 
-/// A node that its only holder has not begun with, though it has had a thread for it since then.
+/// A node that its only holder has not begun, though it has had a free thread since `since`.
 fn unbegun(core: &Core, idle: &Idle, since: Duration) -> Option<NodeId> {
     let is_wanted = |node: &&NodeId| {
         let is_held_once = core.look(**node).is_some_and(|record| record.holders.len() == 1);
@@ -43,7 +43,7 @@ fn unbegun(core: &Core, idle: &Idle, since: Duration) -> Option<NodeId> {
     stalled.filter_map(|(_, member)| member.waiting.iter().find(is_wanted)).next().copied()
 }
 
-/// Two workers with a thread without a lease: no node that one of them has is had by both.
+/// Two workers with a thread without a lease: at least one of them does not hold a given node with one holder.
 struct Idle {
     first: WorkerId,
     second: Option<WorkerId>,

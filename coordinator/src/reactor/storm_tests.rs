@@ -8,8 +8,9 @@ use lookalike::graph::{Blob, FailureReason, NodeId, Placement, WorkerId};
 
 use super::tests::{Script, node, process};
 use super::{Event, handle, start};
-use crate::comm::{Action, Departure, Outbox, Site};
-use crate::core::{Core, Policy};
+use crate::actions::{Action, Outbox};
+use crate::events::{Departure, Site};
+use crate::state::{Core, Policy};
 
 /// What happens at its time.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]

@@ -8,11 +8,11 @@ use lookalike::graph::{
 };
 use lookalike::protocol::ProcessName;
 
-use super::{Event, Executing, handle, handle_arrived, start};
-use crate::comm::{Action, Departure, Outbox, RunEvent, Site, WorkerProcess};
-use crate::core::{Core, Policy};
+use super::{Event, Executing, Stop, handle, handle_arrived, start};
+use crate::actions::{Action, Outbox, WorkerProcess};
+use crate::events::{Departure, RunEvent, Site};
 use crate::policy::Speculation;
-use crate::runner::RunError;
+use crate::state::{Core, Policy};
 
 mod differing;
 mod draining;
@@ -118,7 +118,7 @@ impl Bench {
         bench
     }
 
-    fn try_handle(&mut self, event: Event) -> Result<Vec<String>, RunError> {
+    fn try_handle(&mut self, event: Event) -> Result<Vec<String>, Stop> {
         let outcome = handle(&mut self.core, &mut self.planner, event, self.now, &mut self.outbox);
         let said = self.outbox.take().iter().filter_map(line).collect();
         outcome.map(|()| said)
@@ -150,7 +150,7 @@ impl Bench {
         self.handle(Event::WorkerLeft { worker, departure })
     }
 
-    fn pass_time(&mut self, seconds: u64) -> Result<Vec<String>, RunError> {
+    fn pass_time(&mut self, seconds: u64) -> Result<Vec<String>, Stop> {
         self.now += Duration::from_secs(seconds);
         self.try_handle(Event::DeadlinePassed)
     }
@@ -279,7 +279,7 @@ fn second_result_is_dropped_when_equal_and_an_error_when_different() {
     assert_eq!(bench.finish(C, 0, 1, 7), ["worker 3 is thanked for 0.1"]);
     assert_eq!(bench.core.summary().duplicate_results, 1);
     let error = bench.try_handle(finished(Site::Worker(C), 0, 1, 8)).unwrap_err();
-    assert!(matches!(&error, RunError::ResultsDiffer { name, .. } if name.label == "n0"), "{error}");
+    assert!(matches!(&error, Stop::ResultsDiffer { name, .. } if name.label == "n0"), "{error}");
     assert!(
         error.to_string().contains("from worker 2, output") && error.to_string().contains("from worker 3)"),
         "{error}"
@@ -422,7 +422,7 @@ fn without_any_worker_the_user_is_reminded_and_then_told() {
     assert_eq!(bench.pass_time(31).unwrap(), ["waiting since 61 s"]);
     assert_eq!(bench.core.next_deadline(), Some(Duration::from_secs(91)));
     let error = bench.pass_time(539).unwrap_err();
-    assert!(error.to_string().starts_with("no worker has come in 600 s"), "{error}");
+    assert!(error.to_string().starts_with("no worker connected in 600 s"), "{error}");
 }
 
 #[test]
@@ -435,7 +435,7 @@ fn after_the_last_worker_there_is_a_grace_and_a_new_one_ends_it() {
     bench.lose(B, Departure::Lost);
     assert!(bench.pass_time(1).unwrap().is_empty());
     let error = bench.pass_time(59).unwrap_err();
-    assert!(error.to_string().starts_with("all workers were lost, and no other has come in 60 s"), "{error}");
+    assert!(error.to_string().starts_with("all workers were lost, and no other connected in 60 s"), "{error}");
 }
 
 #[test]
@@ -470,7 +470,7 @@ fn wrong_result_ends_the_run_and_names_gamma_numbers_and_worker() {
     bench.start(A, 0, 1);
     let error = bench.try_handle(finished(Site::Worker(A), 0, 1, 7)).unwrap_err();
     let text = error.to_string();
-    for part in ["\"n0\"", "from worker 1", "the cost of gamma 2 is said to be 0.5, but is 0.25"] {
+    for part in ["\"n0\"", "from worker 1", "the cost of gamma 2: the output says 0.5, recomputation gives 0.25"] {
         assert!(text.contains(part), "{text}");
     }
     assert_eq!(error.exit_code(), 3);
@@ -498,7 +498,7 @@ fn cancelled_nodes_leave_queue_and_workers_and_are_no_failures() {
     bench.join(A, 1);
     bench.start(A, 1, 1);
     let said = bench.finish(A, 0, 1, 0);
-    let cancelled = "failed: cancelled: its output is not wanted any more";
+    let cancelled = "failed: cancelled: its output is no longer needed";
     let expected = [
         "worker 1 is thanked for 0.1".to_owned(),
         "worker 1 drops 1.1".to_owned(),

@@ -13,7 +13,7 @@ use tokio::sync::mpsc::{UnboundedReceiver, UnboundedSender, unbounded_channel};
 use tokio::time::{Instant, Sleep, sleep};
 use tokio_util::sync::CancellationToken;
 
-use super::Outgoing;
+use super::outgoing::Outgoing;
 
 /// What a message takes in a queue beside what it points to.
 const MESSAGE_BYTES: usize = 128;
@@ -126,7 +126,7 @@ impl<W> Patient<W> {
         let patience = self.patience;
         let running_out = self.running_out.get_or_insert_with(|| Box::pin(sleep(patience)));
         ready!(running_out.as_mut().poll(context));
-        // Whoever polls again after this error starts anew.
+        // A poll after this error starts a new wait.
         running_out.as_mut().reset(Instant::now() + patience);
         Poll::Ready(Err(io::Error::new(io::ErrorKind::TimedOut, "the worker does not read")))
     }

@@ -18,9 +18,11 @@ use tokio::sync::oneshot;
 use tokio::time::{Instant, MissedTickBehavior, interval_at, timeout};
 use tracing::info;
 
+use super::gate::{Gate, Greeted};
+use super::inbound::Inbound;
 use super::mailbox::{Patient, Postman, mailbox};
-use super::{Gate, Greeted, Inbound, Outgoing};
-use crate::comm::{Departure, Site};
+use super::outgoing::Outgoing;
+use crate::events::{Departure, Site};
 use crate::reactor::{Event, Executing};
 
 /// How many bytes of small outputs a worker may send before it is asked for how many the reactor has taken (8 MiB).
@@ -42,7 +44,6 @@ pub(super) async fn serve<W: World>(greeted: Greeted<W::Stream>, worker: WorkerI
     let mut reader = Reader {
         worker,
         epoch: gate.epoch,
-        has_reported: gate.epoch == 1,
         output: None,
         unasked_bytes: 0,
         pending_blobs: Arc::clone(&pending_blobs),
@@ -57,12 +58,12 @@ pub(super) async fn serve<W: World>(greeted: Greeted<W::Stream>, worker: WorkerI
     let writer = Patient::new(writer, gate.policy.lost_after);
     let departure = tokio::select! {
         biased;
-        // Thrown out: whoever did it knows.
+        // Closed by the reactor, which knows why.
         () = closed => return,
         () = overflowing => Departure::TooSlow,
         departure = &mut reading => departure,
         written = write(writer, postman, gate.policy.heartbeat, &pending_blobs) => match written {
-            // We have said our last word: let the worker say its own, so that closing does not destroy ours.
+            // All is sent: wait for the worker to close, because closing over unread bytes would destroy our last message.
             Ok(()) => timeout(gate.limits.farewell_time, reading).await.unwrap_or(Departure::Lost),
             Err(WireError::Stream(error)) if error.kind() == io::ErrorKind::TimedOut => Departure::TooSlow,
             Err(error) => departure_of(&error),
@@ -70,7 +71,7 @@ pub(super) async fn serve<W: World>(greeted: Greeted<W::Stream>, worker: WorkerI
     };
     info!(%worker, %departure, "left");
     let left = Event::WorkerLeft { worker, departure };
-    // When nobody listens any more the run is over.
+    // An error means that the run is over.
     let _ = gate.inbound.send(Inbound::Event(left)).await;
 }
 
@@ -81,7 +82,7 @@ async fn write(
     pending_blobs: &AtomicUsize,
 ) -> Result<(), WireError> {
     let (mut together, mut parcel) = (Vec::new(), Parcel::default());
-    // So that a worker notices when nobody is there any more, whatever it waits for.
+    // So that a worker notices a dead coordinator, whatever it waits for.
     let mut heart = interval_at(Instant::now() + heartbeat, heartbeat);
     heart.set_missed_tick_behavior(MissedTickBehavior::Delay);
     loop {
@@ -124,10 +125,8 @@ fn departure_of(error: &WireError) -> Departure {
 /// The reading end of one worker's connection.
 struct Reader<R> {
     worker: WorkerId,
-    /// That of this coordinator.
+    /// That of this coordinator, and of every lease that it gives out.
     epoch: u64,
-    /// Whether it has told what it does for earlier ones.
-    has_reported: bool,
     incoming: Incoming<R>,
     /// The output that is being received.
     output: Option<(LeaseName, IncomingBlob)>,
@@ -136,7 +135,7 @@ struct Reader<R> {
     pending_blobs: Arc<AtomicUsize>,
     max_pending_blobs: usize,
     heartbeat: Duration,
-    /// When the reactor was told of a sign of life: what came no later is known.
+    /// When the reactor was last told of a sign of life.
     told: Instant,
     inbound: Sender<Inbound>,
 }
@@ -151,8 +150,8 @@ impl<R: AsyncRead + Unpin> Reader<R> {
                 Err(error) => Err(error),
             };
             match event {
-                // When nobody listens any more the run is over. Then we still read until the worker has closed its end:
-                // closing over unread bytes would destroy our last word to it.
+                // An error means that the run is over. Then still read until the worker has closed its end:
+                // closing over unread bytes would destroy our last message to it.
                 Ok(Some(event)) => {
                     self.told = self.incoming.heard();
                     _ = self.inbound.send(event).await;
@@ -172,7 +171,7 @@ impl<R: AsyncRead + Unpin> Reader<R> {
             }
             if self.incoming.heard() >= self.told + self.heartbeat {
                 self.told = self.incoming.heard();
-                // When nobody listens any more the run is over.
+                // An error means that the run is over.
                 _ = self.inbound.send(Inbound::Event(self.life())).await;
             }
             if !self.incoming.read().await? {
@@ -194,18 +193,15 @@ impl<R: AsyncRead + Unpin> Reader<R> {
             }
         };
         Ok(Some(Inbound::Event(match message {
-            ToCoordinator::Heartbeat { executing } if !self.has_reported => {
-                self.has_reported = true;
-                let earlier = executing.iter().map(|node| node.lease).filter(|lease| lease.epoch < self.epoch);
-                let (executing, ours) = (earlier.collect(), self.ours(&executing));
-                return Ok(Some(Inbound::Reported { worker, executing, ours }));
+            ToCoordinator::Heartbeat { executing } => {
+                let executing = executing.iter().map(|node| self.executing(node)).collect::<Result<_, _>>()?;
+                Event::Heartbeat { worker, executing }
             }
-            ToCoordinator::Heartbeat { executing } => Event::Heartbeat { worker, executing: self.ours(&executing) },
-            ToCoordinator::Started(lease) if self.is_ours(lease)? => {
+            ToCoordinator::Started(lease) => {
+                self.check_epoch(lease)?;
                 let event = Event::Started { worker, node: NodeId(lease.node), attempt: lease.attempt };
                 return Ok(Some(Inbound::Timed { arrived: self.incoming.heard(), event }));
             }
-            ToCoordinator::Started(_) => self.life(),
             ToCoordinator::Fetch { hash } => {
                 if self.pending_blobs.fetch_add(1, Ordering::Relaxed) >= self.max_pending_blobs {
                     return Err(unexpected("a worker that reads what it asked for", "still more requests for blobs"));
@@ -216,14 +212,13 @@ impl<R: AsyncRead + Unpin> Reader<R> {
                 if self.output.is_some() {
                     return Err(unexpected("the rest of an output", "another output"));
                 }
+                self.check_epoch(lease)?;
                 self.output = Some((lease, IncomingBlob::begin(BlobHash(hash), length)?));
                 self.ask_before(lease, length).await?;
                 return self.output();
             }
             ToCoordinator::Failed { lease, kind, message } => {
-                if !self.is_ours(lease)? {
-                    return Ok(Some(Inbound::Late { worker, lease, output: None }));
-                }
+                self.check_epoch(lease)?;
                 let failure = failure(kind, bounded_text(&message));
                 Event::Failed { site: Site::Worker(worker), node: NodeId(lease.node), attempt: lease.attempt, failure }
             }
@@ -232,41 +227,35 @@ impl<R: AsyncRead + Unpin> Reader<R> {
         })))
     }
 
-    /// Whether this coordinator gave out a lease; else an earlier one of the run did.
-    fn is_ours(&self, lease: LeaseName) -> Result<bool, WireError> {
-        if lease.epoch == 0 || lease.epoch > self.epoch {
-            return Err(unexpected("a lease of this run", &format!("one of epoch {}", lease.epoch)));
+    /// That this coordinator gave out a lease: a worker drops those of earlier ones when it joins.
+    fn check_epoch(&self, lease: LeaseName) -> Result<(), WireError> {
+        if lease.epoch == self.epoch {
+            return Ok(());
         }
-        Ok(lease.epoch == self.epoch)
+        Err(WireError::Unexpected {
+            expected: "a lease of this coordinator",
+            found: format!("one of epoch {} in epoch {}", lease.epoch, self.epoch),
+        })
     }
 
-    /// What a worker executes for this coordinator. What was begun for an earlier one has another number there.
-    fn ours(&self, executing: &[protocol::Executing]) -> Vec<Executing> {
-        let ours = executing.iter().filter(|node| node.lease.epoch == self.epoch);
-        let known = ours.map(|protocol::Executing { lease, permille }| Executing {
-            node: NodeId(lease.node),
-            attempt: lease.attempt,
-            permille: (*permille).min(1000),
-        });
-        known.collect()
+    fn executing(&self, node: &protocol::Executing) -> Result<Executing, WireError> {
+        let protocol::Executing { lease, permille } = *node;
+        self.check_epoch(lease)?;
+        Ok(Executing { node: NodeId(lease.node), attempt: lease.attempt, permille: permille.min(1000) })
     }
 
     fn life(&self) -> Event {
         Event::Heartbeat { worker: self.worker, executing: Vec::new() }
     }
 
-    /// Before much is received, ask whether anybody wants it. The answer also tells that what came before has been taken: at most
-    /// one large output of a worker is in memory without being kept. What fits into one frame is here already.
+    /// Before a large output is received, ask the reactor whether its lease was given out. The answer also says that the outputs before it
+    /// were processed, so at most one large output of a worker waits in memory. An output of one frame is here already.
     async fn ask_before(&mut self, lease: LeaseName, length: u64) -> Result<(), WireError> {
         self.unasked_bytes = self.unasked_bytes.saturating_add(length);
         if length <= PART_BYTES as u64 && self.unasked_bytes <= UNASKED_BYTES {
             return Ok(());
         }
         self.unasked_bytes = length;
-        // Of an earlier coordinator's leases nobody knows all.
-        if !self.is_ours(lease)? {
-            return Ok(());
-        }
         let (answer, answered) = oneshot::channel();
         let _ = self.inbound.send(Inbound::Ask { lease, answer }).await;
         match answered.await {
@@ -274,7 +263,7 @@ impl<R: AsyncRead + Unpin> Reader<R> {
                 let found = format!("one for node {}, attempt {}", lease.node, lease.attempt);
                 Err(unexpected("an output for a lease that was given out", &found))
             }
-            // When nobody answers any more the run is over.
+            // An error means that the run is over.
             Ok(true) | Err(_) => Ok(()),
         }
     }
@@ -285,9 +274,6 @@ impl<R: AsyncRead + Unpin> Reader<R> {
             return Ok(None);
         };
         let (worker, output) = (self.worker, output.finish()?);
-        if !self.is_ours(lease)? {
-            return Ok(Some(Inbound::Late { worker, lease, output: Some(output) }));
-        }
         let (site, node, attempt) = (Site::Worker(worker), NodeId(lease.node), lease.attempt);
         let event = Event::Finished { site, node, attempt, output };
         Ok(Some(Inbound::Timed { arrived: self.incoming.heard(), event }))
@@ -321,7 +307,6 @@ mod tests {
         Reader {
             worker: WorkerId(1),
             epoch: 1,
-            has_reported: true,
             output: None,
             unasked_bytes: 0,
             pending_blobs: Arc::default(),

@@ -1,11 +1,14 @@
-//! The sockets: strangers come in, workers that know the secret come through, their messages become events.
+//! The sockets: connections are accepted, workers that know the secret are admitted, their messages become events.
 //!
 //! A stranger gets little: a place that the next one may need, a short time, a TLS handshake, fixed lengths, no decoder. A worker
 //! gets two tasks, one that reads and one that writes, so that a large blob in one direction never blocks the other. What either
-//! may cost is in [`Limits`].
+//! may cost is in [`Limits`](crate::limits::Limits).
 
+mod gate;
+mod inbound;
 mod mailbox;
 mod member;
+mod outgoing;
 mod strangers;
 
 use std::io;
@@ -14,75 +17,29 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
-use lookalike::graph::{Blob, WorkerId};
-use lookalike::protocol::{
-    FrameReader, HandshakeError, Hello, LeaseName, ProofKey, RunName, Secret, ToCoordinator, ToWorker, bounded_text,
-};
-use lookalike_worker::tls::{TlsError, Transport, channel_binding};
+use lookalike::graph::WorkerId;
+use lookalike::protocol::{FrameReader, HandshakeError, ProofKey, ToCoordinator, bounded_text};
+use lookalike_worker::tls::{TlsError, channel_binding};
 use lookalike_worker::wire::{Incoming, WireError, greet_worker};
 use lookalike_worker::world::World;
-use tokio::io::{ReadHalf, WriteHalf, split};
-use tokio::sync::mpsc::Sender;
-use tokio::sync::oneshot;
+use tokio::io::split;
 use tokio::task::JoinSet;
-use tokio::time::{Instant, sleep, timeout};
-use tokio_rustls::{TlsAcceptor, server::TlsStream};
+use tokio::time::{sleep, timeout};
 use tokio_util::sync::CancellationToken;
 use tracing::{debug, warn};
 
+pub(crate) use self::gate::Gate;
+use self::gate::Greeted;
+pub(crate) use self::inbound::Inbound;
 pub(crate) use self::mailbox::Mailbox;
+pub(crate) use self::outgoing::Outgoing;
 use self::strangers::{Place, Strangers};
-use crate::comm::RunEvent;
-use crate::limits::Limits;
-use crate::policy::Policy;
-use crate::reactor::{Event, Executing};
 use crate::tls::accept;
 
 /// The pause after the system refuses to accept a connection, such as for want of file descriptors.
 const ACCEPT_PAUSE: Duration = Duration::from_millis(100);
 
-/// What comes from the sockets.
-#[derive(Debug)]
-pub(crate) enum Inbound {
-    /// A worker has said hello. What is put into the mailbox goes to it.
-    Joined { worker: WorkerId, hello: Hello, mailbox: Mailbox },
-    /// A worker announces an output for this lease: may it come? A lease that was never given out is answered with `false`.
-    Ask { lease: LeaseName, answer: oneshot::Sender<bool> },
-    /// Something happened.
-    Event(Event),
-    /// Something happened at this time, which matters, though it may be looked at later.
-    Timed { arrived: Instant, event: Event },
-    /// A worker's first sign of life to a coordinator that has gone on with a run: it executes these for an earlier one, and `ours` for
-    /// this one. What it had finished has come before.
-    Reported { worker: WorkerId, executing: Vec<LeaseName>, ours: Vec<Executing> },
-    /// An answer to a lease of an earlier coordinator of this run: the output, whose hash was verified, or none.
-    Late { worker: WorkerId, lease: LeaseName, output: Option<Blob> },
-    /// Something to tell the user that the reactor does not care about.
-    Tell(RunEvent),
-}
-
-/// What goes to a worker.
-#[derive(Debug)]
-pub(crate) enum Outgoing {
-    Message(ToWorker),
-    Blob(Blob),
-    /// Nothing, for a blob that was asked for.
-    NoBlob,
-}
-
-/// What every connection of a run needs.
-pub(crate) struct Gate<W> {
-    pub(crate) world: W,
-    pub(crate) tls: TlsAcceptor,
-    pub(crate) secret: Secret,
-    pub(crate) limits: Limits,
-    pub(crate) run: RunName,
-    pub(crate) epoch: u64,
-    pub(crate) policy: Policy,
-    pub(crate) inbound: Sender<Inbound>,
-}
-
-/// Let workers in until `stop`, then give the connected ones a moment to take their leave.
+/// Accept workers until `stop`, then give the connected ones a moment to close.
 pub(crate) async fn serve_forever<W: World>(listener: W::Listener, gate: Gate<W>, stop: CancellationToken) {
     let limits = gate.limits;
     let gate = Arc::new(gate);
@@ -126,7 +83,7 @@ pub(crate) async fn serve_forever<W: World>(listener: W::Listener, gate: Gate<W>
     connections.shutdown().await;
 }
 
-/// A wrong secret or version is worth a word to the user: somebody means us. Anything else is noise of the network.
+/// A wrong secret or version comes from a Lookalike and is a warning to the user. Anything else is noise of the network.
 fn report_stranger(peer: SocketAddr, error: &WireError) {
     if means_us(error) {
         warn!(%peer, "refused: {error}");
@@ -140,16 +97,7 @@ fn means_us(error: &WireError) -> bool {
     matches!(error, WireError::Handshake(why) if *why != HandshakeError::Magic)
 }
 
-type Connection<S> = TlsStream<Transport<S>>;
-
-/// A stranger that has become a worker.
-struct Greeted<S> {
-    incoming: Incoming<ReadHalf<Connection<S>>>,
-    writer: WriteHalf<Connection<S>>,
-    hello: Hello,
-}
-
-/// Make a worker of a stranger, in the time that it may take and as long as nobody else needs its place.
+/// Do the handshake with a stranger, within its time and as long as no newer stranger needs its place.
 async fn greet<W: World>(stream: W::Stream, place: Place, gate: &Gate<W>) -> Result<Greeted<W::Stream>, WireError> {
     tokio::select! {
         biased;

@@ -1,6 +1,6 @@
 //! The cluster of a run: listener, connections, local worker processes. Started together, stopped together.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::io;
 use std::net::SocketAddr;
 use std::path::PathBuf;
@@ -8,20 +8,18 @@ use std::sync::Arc;
 use std::time::SystemTime;
 
 use lookalike::graph::WorkerId;
-use lookalike::protocol::{ProcessName, RunName, ToWorker};
+use lookalike::protocol::{RunName, ToWorker};
 use lookalike_worker::world::World;
 use tokio::sync::mpsc::Sender;
-use tokio::sync::watch;
 use tokio::task::{JoinHandle, JoinSet};
 use tokio_rustls::TlsAcceptor;
 use tokio_util::sync::CancellationToken;
 
 use super::{RunError, RunnerOptions};
 use crate::access::{Credentials, CredentialsError};
-use crate::comm::WorkerProcess;
-use crate::journal::Past;
+use crate::actions::WorkerProcess;
 use crate::rpc::{Gate, Inbound, Mailbox, Outgoing, serve_forever};
-use crate::spawn::{LocalWorkers, Worked, WorkerCommand, is_worker_alive, threads_per_worker};
+use crate::spawn::{LocalWorkers, SpawnError, Worked, WorkerCommand, threads_per_worker};
 use crate::tls::server_config;
 
 /// Everything of a run that has to end with it.
@@ -34,50 +32,30 @@ pub(crate) struct Cluster {
     /// The processes and mailboxes of the members.
     members: BTreeMap<WorkerId, (WorkerProcess, Mailbox)>,
     worked: Worked,
-    /// The process ids of the local members.
-    present: watch::Sender<BTreeSet<u32>>,
-    /// Local workers of an earlier coordinator that are not wanted any more.
-    surplus: BTreeSet<u32>,
     stop: CancellationToken,
     serving: JoinHandle<()>,
     local_workers: JoinSet<()>,
 }
 
-/// What a coordinator takes over from an earlier one of its run.
+/// What the journal of a resumed run says of its earlier coordinators.
 #[derive(Debug)]
-pub(crate) struct Takeover {
-    /// Where that one listened.
-    listen: Option<SocketAddr>,
-    /// Its local workers that are still alive.
-    orphans: Vec<u32>,
-    /// Those of its workers that may come back, from wherever.
-    pub(crate) survivors: Vec<ProcessName>,
+pub(crate) struct Resumed {
+    /// Where the last one listened.
+    pub(crate) listen: Option<SocketAddr>,
     /// How many nodes have their results already.
     pub(crate) results: usize,
 }
 
-impl Takeover {
-    /// What there is to be taken over.
-    pub(crate) fn of(past: &Past, options: &RunnerOptions) -> Self {
-        let access = access_path(options);
-        let local = past.local_workers.iter().copied();
-        let orphans = local.filter(|process| is_worker_alive(*process, access)).collect::<Vec<_>>();
-        let may_come = |worker: &&WorkerProcess| !worker.is_local || orphans.contains(&worker.id);
-        let survivors = past.workers.iter().filter(may_come).map(|worker| worker.name).collect();
-        Self { listen: past.listen, survivors, orphans, results: past.results }
-    }
-}
-
 impl Cluster {
-    /// Listen, write the access file or take the one that is there, start the local workers that have not survived.
+    /// Listen, write the access file or reuse the one that is there, start the local workers.
     pub(crate) async fn start<W: World>(
         world: W,
         options: &RunnerOptions,
         (run, epoch): (RunName, u64),
-        takeover: Option<Takeover>,
+        resumed: Option<Resumed>,
         inbound: Sender<Inbound>,
     ) -> Result<Self, RunError> {
-        let (listener, credentials) = listen(&world, options, takeover.as_ref()).await?;
+        let (listener, credentials) = listen(&world, options, resumed.as_ref()).await?;
         let (bound, Credentials { access, identity }) = credentials;
         let tls = server_config(&identity).map_err(RunError::Tls)?;
         let stop = CancellationToken::new();
@@ -94,27 +72,15 @@ impl Cluster {
             policy: options.policy,
             inbound: inbound.clone(),
         };
-        let mut orphans = takeover.map(|takeover| takeover.orphans).unwrap_or_default();
-        let surplus = orphans.split_off(orphans.len().min(options.workers)).into_iter().collect();
-        let present = watch::Sender::new(BTreeSet::new());
-        let local_workers = workers.start(&inbound, &stop, &orphans, &present)?;
+        let local_workers = workers.start(&inbound, &stop)?;
         let serving = tokio::spawn(serve_forever(listener, gate, stop.clone()));
         let (address, members) = (access.address, BTreeMap::new());
-        Ok(Self { address, bound, members, worked, present, surplus, stop, serving, local_workers })
+        Ok(Self { address, bound, members, worked, stop, serving, local_workers })
     }
 
-    /// A worker can be sent to from now on. Whether it is wanted: one that an earlier coordinator had started, and that is one too
-    /// many now, is told to end.
-    pub(crate) fn admit(&mut self, worker: WorkerId, process: WorkerProcess, mailbox: Mailbox) -> bool {
-        if process.is_local && self.surplus.contains(&process.id) {
-            mailbox.send(Outgoing::Message(ToWorker::Stop { reason: "fewer workers are wanted now".into() }));
-            return false;
-        }
+    /// Messages can be sent to a worker from now on.
+    pub(crate) fn admit(&mut self, worker: WorkerId, process: WorkerProcess, mailbox: Mailbox) {
         self.members.insert(worker, (process, mailbox));
-        if process.is_local {
-            self.present.send_modify(|present| _ = present.insert(process.id));
-        }
-        true
     }
 
     /// A worker executes a node.
@@ -133,12 +99,8 @@ impl Cluster {
 
     /// Send nothing more to a worker and close its connection, whether or not it has read what was sent before.
     pub(crate) fn dismiss(&mut self, worker: WorkerId) {
-        if let Some((process, member)) = self.members.remove(&worker) {
+        if let Some((_, member)) = self.members.remove(&worker) {
             member.close();
-            let is_back = self.members.values().any(|(other, _)| other.name == process.name);
-            if process.is_local && !is_back {
-                self.present.send_modify(|present| _ = present.remove(&process.id));
-            }
         }
     }
 
@@ -166,19 +128,19 @@ impl Drop for Cluster {
 async fn listen<W: World>(
     world: &W,
     options: &RunnerOptions,
-    takeover: Option<&Takeover>,
+    resumed: Option<&Resumed>,
 ) -> Result<(W::Listener, (SocketAddr, Credentials)), RunError> {
     let now = SystemTime::now();
     let given = options.access.as_ref().map(|path| Credentials::read(path, now)).transpose()?;
-    let earlier = match (&given, takeover) {
+    let earlier = match (&given, resumed) {
         (None, Some(_)) => earlier_credentials(options, now)?,
         _ => None,
     };
-    let listen = match (&given, takeover) {
-        (None, Some(takeover)) => options.listen_again(takeover.listen),
+    let listen = match (&given, resumed) {
+        (None, Some(resumed)) => options.listen_again(resumed.listen),
         _ => options.listen_address(given.as_ref().map(|given| given.access.address.as_str()))?,
     };
-    let is_again = takeover.is_some_and(|takeover| takeover.listen == Some(listen));
+    let is_again = resumed.is_some_and(|resumed| resumed.listen == Some(listen));
     let listen_error = |source| match is_again {
         true => RunError::PortTaken { listen, source },
         false => RunError::Listen { listen, source },
@@ -228,7 +190,7 @@ fn access_path(options: &RunnerOptions) -> &PathBuf {
 
 fn local_workers(options: &RunnerOptions, address: String) -> Result<LocalWorkers, RunError> {
     let command = options.worker_command.clone().map_or_else(WorkerCommand::this_program, Ok);
-    let unknown_program = |source| RunError::Spawn { program: "this program".into(), source };
+    let unknown_program = |source| SpawnError { program: "this program".into(), source };
     Ok(LocalWorkers {
         count: options.workers,
         command: command.map_err(unknown_program)?,
@@ -238,6 +200,5 @@ fn local_workers(options: &RunnerOptions, address: String) -> Result<LocalWorker
         threads: options.threads_per_worker.unwrap_or_else(|| threads_per_worker(options.workers)),
         others_may_come: options.others_may_come(),
         worked: Worked::default(),
-        may_survive: options.journal.as_ref().is_some_and(|journal| journal.survivors),
     })
 }

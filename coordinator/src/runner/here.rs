@@ -7,7 +7,7 @@ use lookalike::graph::{Blob, DecodedCache, NodeId, NodeSpec, Registry, RunContex
 use lookalike_worker::world::Pool;
 use tokio::sync::mpsc::UnboundedSender;
 
-use crate::comm::{RunEvent, Site};
+use crate::events::{RunEvent, Site};
 use crate::reactor::Event;
 
 /// How many encoded bytes of inputs are kept decoded for them (128 MiB).
@@ -43,7 +43,7 @@ impl<P: Pool> Here<P> {
                 Ok(output) => Event::Finished { site, node, attempt, output },
                 Err(failure) => Event::Failed { site, node, attempt, failure },
             };
-            // When nobody listens any more the run is over.
+            // An error means that the run is over.
             let _ = results.send(result);
         });
     }

@@ -1,6 +1,6 @@
 //! Ctrl-C and SIGTERM. While a run goes on they stop it in order; a second one, or one while there is no run, ends the
-//! process at once, as if nobody listened. (Once a process listens for a signal it can never stop listening, so what
-//! happens after the run has to be said too.)
+//! process at once, as by default. (A process cannot stop handling a signal once it has begun, so this has to be implemented also
+//! for the time after the run.)
 
 use std::io;
 use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError, mpsc};

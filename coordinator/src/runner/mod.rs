@@ -5,8 +5,8 @@
 //!   nodes run here --Event------------+--> reactor::handle --Outbox--> sockets, nodes run here, observer
 //!   the next deadline ----------------+
 //! ```
-//! Events that have come together are one group. With a journal, a group is written down as one transaction before anything of it
-//! is done; what comes while it is being written is the next.
+//! Events that arrive together form a group. With a journal, a group is committed as one transaction before its actions are performed;
+//! events that arrive meanwhile form the next group.
 //!
 //! One task owns the state; everything else talks to it through channels. Stopping is a message to every worker and then
 //! waiting for what was started: when [`run`] returns, there is no process and no connection left.
@@ -18,7 +18,6 @@ mod interrupt;
 mod memory;
 mod options;
 mod pulse;
-mod survivors;
 
 use std::error::Error as _;
 use std::sync::Arc;
@@ -33,19 +32,19 @@ use tokio::time::{Instant, MissedTickBehavior, interval, sleep_until};
 use tokio_util::sync::CancellationToken;
 use tracing::{info, trace};
 
-use self::cluster::{Cluster, Takeover};
-pub use self::error::{NodeAnswer, RunError};
+use self::cluster::{Cluster, Resumed};
+pub use self::error::RunError;
 use self::here::Here;
 use self::interrupt::Interrupt;
 use self::memory::{Group, Memory};
 pub use self::options::RunnerOptions;
 pub use self::pulse::Pulse;
-use self::survivors::{Arrival, Survivors};
-use crate::comm::{Action, Lease, Outbox, RunEvent, Site, WorkerProcess};
-use crate::core::{Core, RunSummary};
+use crate::actions::{Action, Lease, Outbox, WorkerProcess};
+use crate::events::{RunEvent, Site};
 use crate::journal::Journal;
-use crate::reactor::{self, Event};
+use crate::reactor::{self, Event, Stop};
 use crate::rpc::{Inbound, Outgoing};
+use crate::state::{Core, RunSummary};
 
 /// Counts the coordinator processes of a run; without a journal there is only one.
 const FIRST_EPOCH: u64 = 1;
@@ -60,8 +59,8 @@ const EVENTS_PER_GROUP: usize = 1024;
 /// has seen every output, when no node is open any more. `observer` is told what happens, as it happens; it should be
 /// quick, for the run waits for it.
 ///
-/// With a [journal](RunnerOptions::journal) everything is written down before it is acknowledged, and a run that is there is gone
-/// on with, if the journal's options allow it. When nothing is left to run, nobody is listened for and no worker is started.
+/// With a [journal](RunnerOptions::journal) everything is committed before it is acknowledged, and an unfinished run is resumed if the
+/// journal's options allow it. When nothing is left to run, the coordinator does not listen and starts no worker.
 ///
 /// Needs a tokio runtime with time and I/O; a multi-threaded one keeps connections alive while the planner is busy.
 ///
@@ -97,10 +96,10 @@ pub async fn run_in<W: World, P: Planner>(
     let journal = options.journal.as_ref().map(open).transpose()?;
     let (run, epoch) = journal.as_ref().map_or((RunName(name), FIRST_EPOCH), |journal| (journal.run, journal.epoch));
     let earlier = journal.as_ref().filter(|_| epoch > FIRST_EPOCH);
-    let takeover = earlier.map(|journal| Takeover::of(&journal.past, &options));
+    let resumed = earlier.map(|journal| Resumed { listen: journal.past.listen, results: journal.past.results });
     let core = Core::new(options.policy, epoch);
     let core = match &journal {
-        Some(journal) => core.with_recall(journal.recall()),
+        Some(journal) => core.with_past_outputs(journal.past_outputs()),
         None => core,
     };
     let (results_sender, results) = unbounded_channel();
@@ -111,12 +110,11 @@ pub async fn run_in<W: World, P: Planner>(
         cluster: None,
         observer,
         here: Here::new(world.common_pool(), registry, results_sender),
-        memory: Memory::new(journal, &options.policy),
-        survivors: None,
+        memory: Memory::new(journal),
         began: Instant::now(),
         world,
     };
-    let begin = Begin { options, run, takeover };
+    let begin = Begin { options, run, resumed };
     let outcome = driver.drive(begin, results, interrupted).await;
     info!(summary = ?driver.core.summary(), "the run is over");
     driver.here.cancel();
@@ -125,7 +123,7 @@ pub async fn run_in<W: World, P: Planner>(
         cluster.stop(reason).await;
     }
     let closed = driver.memory.close(outcome.as_ref().err().map(with_causes));
-    // What ended the run first is the one to tell.
+    // The first error is the one to report.
     outcome.and(closed).map(|()| (driver.planner, driver.core.summary()))
 }
 
@@ -133,7 +131,7 @@ pub async fn run_in<W: World, P: Planner>(
 struct Begin {
     options: RunnerOptions,
     run: RunName,
-    takeover: Option<Takeover>,
+    resumed: Option<Resumed>,
 }
 
 struct Driver<W: World, P, O> {
@@ -146,8 +144,6 @@ struct Driver<W: World, P, O> {
     observer: O,
     here: Here<W::Pool>,
     memory: Memory,
-    /// The workers of an earlier coordinator, as long as they are waited for.
-    survivors: Option<Survivors>,
     began: Instant,
 }
 
@@ -171,13 +167,12 @@ impl<W: World, P: Planner, O: FnMut(&RunEvent)> Driver<W, P, O> {
             pulse.iter().for_each(|pulse| pulse.beat());
             let is_over = failure.is_some() || self.core.is_finished();
             if is_over && self.memory.is_written() {
-                return failure.map_or(Ok(()), Err);
+                return failure.map_or(Ok(()), |stop| Err(stop.into()));
             }
             let may_act = !is_over && self.memory.has_room();
             let deadline = self.core.next_deadline().map(|deadline| self.began + deadline);
-            let return_time = self.survivors.as_ref().map(|survivors| survivors.until);
             tokio::select! {
-                // What has come is looked at before the time is: a late look must not make a worker late.
+                // Events before deadlines: a late coordinator must not make a worker late.
                 biased;
                 () = interrupted.cancelled() => return Err(RunError::Interrupted),
                 written = self.memory.written() => {
@@ -193,11 +188,10 @@ impl<W: World, P: Planner, O: FnMut(&RunEvent)> Driver<W, P, O> {
                 }
                 () = told(wake.as_deref()), if may_act => events.push(Inbound::Event(Event::LookAgain)),
                 _ = beat.tick(), if pulse.is_some() => continue,
-                () = sleep_or_wait(return_time), if may_act => {}
                 () = sleep_or_wait(deadline), if may_act => {}
             }
             more(&mut inbound, &mut events);
-            // Where events never cease to come, the time is looked at after them.
+            // If events never cease, deadlines are checked after each group.
             if deadline.is_some_and(|deadline| deadline <= Instant::now()) {
                 events.push(Inbound::Event(Event::DeadlinePassed));
             }
@@ -205,31 +199,30 @@ impl<W: World, P: Planner, O: FnMut(&RunEvent)> Driver<W, P, O> {
         }
     }
 
-    /// Let the planner begin, and everything follow that is known already; then, if something is left to do, listen and start
-    /// workers. What the planner cannot do is not an error of this function: what was said before shall be heard.
+    /// Start the planner and complete what the journal has; then, if something is left to do, listen and start workers. An error of the
+    /// planner is returned as a value, so that the events before it are still reported.
     async fn begin(
         &mut self,
-        Begin { options, run, takeover }: Begin,
+        Begin { options, run, resumed }: Begin,
         inbound: tokio::sync::mpsc::Sender<Inbound>,
-    ) -> Result<Option<RunError>, RunError> {
+    ) -> Result<Option<Stop>, RunError> {
         let (mut group, now) = (Group::default(), self.now());
-        if let Some(takeover) = &takeover {
-            let (epoch, results) = (self.core.epoch, takeover.results);
+        if let Some(resumed) = &resumed {
+            let (epoch, results) = (self.core.epoch, resumed.results);
             self.outbox.tell(RunEvent::Resumed { epoch, results });
         }
         let started = reactor::start(&mut self.core, &mut self.planner, now, &mut self.outbox);
         self.forget_if_wrong(started.as_ref().err(), &mut group);
         self.collect(&mut group, now);
         if started.is_ok() && !self.core.is_finished() {
-            let is_new = takeover.is_none();
-            let survivors = takeover.as_ref().map(|takeover| takeover.survivors.clone()).unwrap_or_default();
+            let is_new = resumed.is_none();
             let world = self.world.clone();
-            match Cluster::start(world, &options, (run, self.core.epoch), takeover, inbound).await {
+            match Cluster::start(world, &options, (run, self.core.epoch), resumed, inbound).await {
                 Ok(cluster) => {
-                    (self.observer)(&RunEvent::Listening { address: cluster.address.clone() });
+                    let (address, local_workers) = (cluster.address.clone(), options.workers);
+                    (self.observer)(&RunEvent::Listening { address, local_workers });
                     group.batch.listens(cluster.bound.to_string());
                     self.cluster = Some(cluster);
-                    self.survivors = Survivors::expect(survivors, Instant::now());
                 }
                 Err(error) => {
                     if is_new {
@@ -248,47 +241,22 @@ impl<W: World, P: Planner, O: FnMut(&RunEvent)> Driver<W, P, O> {
     }
 
     /// Act upon events, as one group.
-    fn handle_all(&mut self, events: &mut Vec<Inbound>) -> Result<(), RunError> {
+    fn handle_all(&mut self, events: &mut Vec<Inbound>) -> Result<(), Stop> {
         let mut group = Group::default();
-        let mut handle_all = || {
-            for inbound in events.drain(..) {
-                let arrived = match &inbound {
-                    Inbound::Timed { arrived, .. } => Some(*arrived),
-                    _ => None,
-                };
-                if let Some(event) = self.event(inbound, &mut group)? {
-                    self.handle_arrived(event, arrived, &mut group)?;
-                }
-            }
-            let back = self.survivors.take_if(|survivors| survivors.are_complete(Instant::now()));
-            let arrivals = back.map(Survivors::into_arrivals).unwrap_or_default();
-            self.welcome(arrivals, &mut group)
-        };
-        let outcome = handle_all();
-        // Also after an error: what was said before it shall be heard.
+        let outcome = events.drain(..).try_for_each(|inbound| {
+            let arrived = match &inbound {
+                Inbound::Timed { arrived, .. } => Some(*arrived),
+                _ => None,
+            };
+            let event = self.event(inbound, &mut group);
+            event.map_or(Ok(()), |event| self.handle_arrived(event, arrived, &mut group))
+        });
+        // Also after an error, so that the events before it are reported.
         self.submit(group);
         outcome
     }
 
-    /// Let the workers in that had to wait for each other. First each gets what it has in hand.
-    fn welcome(&mut self, arrivals: Vec<Arrival>, group: &mut Group) -> Result<(), RunError> {
-        for Arrival { worker, executing, .. } in &arrivals {
-            for lease in executing.iter().flatten() {
-                if let Some(node) = self.memory.today(*lease) {
-                    self.handle(Event::Continues { worker: *worker, node }, group)?;
-                }
-            }
-        }
-        arrivals.into_iter().try_for_each(|Arrival { worker, threads, process, .. }| {
-            self.handle(Event::WorkerJoined { worker, threads, process }, group)
-        })
-    }
-
-    fn handle(&mut self, event: Event, group: &mut Group) -> Result<(), RunError> {
-        self.handle_arrived(event, None, group)
-    }
-
-    fn handle_arrived(&mut self, event: Event, arrived: Option<Instant>, group: &mut Group) -> Result<(), RunError> {
+    fn handle_arrived(&mut self, event: Event, arrived: Option<Instant>, group: &mut Group) -> Result<(), Stop> {
         trace!(?event);
         self.here.forget(&event);
         let now = self.now();
@@ -300,7 +268,7 @@ impl<W: World, P: Planner, O: FnMut(&RunEvent)> Driver<W, P, O> {
         outcome
     }
 
-    /// Move what the reactor has said into the group, and tell the journal.
+    /// Move the reactor's actions into the group, and note them for the journal.
     fn collect(&mut self, group: &mut Group, now: Duration) {
         let actions = self.outbox.take();
         if self.memory.is_kept() {
@@ -309,9 +277,9 @@ impl<W: World, P: Planner, O: FnMut(&RunEvent)> Driver<W, P, O> {
         group.actions.extend(actions);
     }
 
-    /// A result that is wrong, or one of two that differ, must not be there when the run is gone on with.
-    fn forget_if_wrong(&self, error: Option<&RunError>, group: &mut Group) {
-        if let Some(RunError::WrongResult { name, .. } | RunError::ResultsDiffer { name, .. }) = error {
+    /// A result that is wrong, or one of two that differ, must not be in the journal when the run is resumed.
+    fn forget_if_wrong(&self, error: Option<&Stop>, group: &mut Group) {
+        if let Some(Stop::WrongResult { name, .. } | Stop::ResultsDiffer { name, .. }) = error {
             let index = usize::try_from(name.node.0).unwrap_or(usize::MAX);
             let key = self.core.records.get(index).and_then(|record| record.key);
             key.into_iter().for_each(|key| group.batch.forget(key));
@@ -324,40 +292,23 @@ impl<W: World, P: Planner, O: FnMut(&RunEvent)> Driver<W, P, O> {
         }
     }
 
-    fn event(&mut self, inbound: Inbound, group: &mut Group) -> Result<Option<Event>, RunError> {
-        Ok(match inbound {
+    fn event(&mut self, inbound: Inbound, group: &mut Group) -> Option<Event> {
+        match inbound {
             Inbound::Event(event) | Inbound::Timed { event, .. } => {
                 if let Event::WorkerLeft { worker, .. } = &event {
                     self.cluster.iter_mut().for_each(|cluster| cluster.dismiss(*worker));
                 }
-                // Who is asked to end while others are waited for need not join any more.
-                if let Event::WorkerLeft { worker, .. } | Event::WorkerDrains { worker } = &event {
-                    self.survivors.iter_mut().for_each(|survivors| survivors.left(*worker));
-                }
                 Some(event)
             }
             Inbound::Joined { worker, hello, mailbox } => {
-                let Some(cluster) = self.cluster.as_mut() else { return Ok(None) };
+                let cluster = self.cluster.as_mut()?;
                 let process = WorkerProcess { id: hello.process, name: hello.name, is_local: hello.is_local };
                 let threads = usize::try_from(hello.threads).unwrap_or(usize::MAX).clamp(1, MAX_THREADS);
-                let is_wanted = cluster.admit(worker, process, mailbox);
-                match &mut self.survivors {
-                    Some(survivors) if is_wanted => survivors.joined(worker, threads, process),
-                    Some(survivors) => survivors.dismissed(process.name),
-                    None => return Ok(is_wanted.then_some(Event::WorkerJoined { worker, threads, process })),
-                }
-                None
+                cluster.admit(worker, process, mailbox);
+                Some(Event::WorkerJoined { worker, threads, process })
             }
-            Inbound::Reported { worker, executing, ours } => {
-                match &mut self.survivors {
-                    Some(survivors) => survivors.reported(worker, executing),
-                    None => self.go_on(worker, &executing, group)?,
-                }
-                Some(Event::Heartbeat { worker, executing: ours })
-            }
-            Inbound::Late { worker, lease, output } => Some(self.memory.late_answer(worker, lease, output, group)),
             Inbound::Ask { lease, answer } => {
-                // Whoever asked may be gone.
+                // The connection that asked may be gone.
                 let _ = answer.send(self.core.was_given_out(NodeId(lease.node), lease.attempt));
                 None
             }
@@ -366,20 +317,11 @@ impl<W: World, P: Planner, O: FnMut(&RunEvent)> Driver<W, P, O> {
                 group.actions.push(Action::Tell(event));
                 None
             }
-        })
-    }
-
-    /// A worker that nobody waited for any more goes on with what an earlier coordinator gave it.
-    fn go_on(&mut self, worker: WorkerId, executing: &[LeaseName], group: &mut Group) -> Result<(), RunError> {
-        let today: Vec<_> = executing.iter().filter_map(|lease| self.memory.today(*lease)).collect();
-        today.into_iter().try_for_each(|node| self.handle(Event::Continues { worker, node }, group))
-    }
-
-    /// Do what a group asks for.
-    fn perform(&mut self, group: Group) {
-        for (worker, lease) in group.late {
-            self.send(worker, ToWorker::Acknowledge(lease));
         }
+    }
+
+    /// Perform the actions of a group.
+    fn perform(&mut self, group: Group) {
         for action in group.actions {
             match action {
                 Action::Assign { worker, lease } => self.assign(worker, lease),
@@ -440,7 +382,7 @@ fn name_of(lease: Lease) -> LeaseName {
     LeaseName { node: lease.node.0, attempt: lease.attempt, epoch: lease.epoch }
 }
 
-/// Take what else has come, as far as there is room in the group.
+/// Add the events that have arrived, as far as the group has room.
 fn more(inbound: &mut Receiver<Inbound>, events: &mut Vec<Inbound>) {
     while events.len() < EVENTS_PER_GROUP {
         let Ok(event) = inbound.try_recv() else { return };
@@ -459,7 +401,7 @@ fn with_causes(error: &RunError) -> String {
     text
 }
 
-/// How often to look how far the nodes are that run here.
+/// How often to read the progress of the nodes that run here.
 const GLANCE: Duration = Duration::from_millis(250);
 
 /// More threads than this on one worker are a mistake or a lie.

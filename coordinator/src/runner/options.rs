@@ -8,10 +8,10 @@ use std::sync::Arc;
 use tokio::sync::Notify;
 
 use super::{Pulse, RunError};
-use crate::core::Policy;
 use crate::journal::JournalOptions;
 use crate::limits::Limits;
 use crate::spawn::WorkerCommand;
+use crate::state::Policy;
 
 /// How to run a graph on workers.
 #[derive(Clone, Debug)]
@@ -37,9 +37,9 @@ pub struct RunnerOptions {
     pub limits: Limits,
     /// How workers and nodes are treated.
     pub policy: Policy,
-    /// Where to write the run down, so that it can be gone on with; `None` forgets it when this process ends.
+    /// Where to keep the journal, so that the run can be resumed; `None` keeps none.
     pub journal: Option<JournalOptions>,
-    /// By whom the planner is told to [look again](lookalike::graph::Planner::look_again); `None` never tells it.
+    /// Notified when the planner is to [look again](lookalike::graph::Planner::look_again); `None`: never.
     pub wake: Option<Arc<Notify>>,
     /// Where the run shows that it goes round, about once a second.
     pub pulse: Option<Arc<Pulse>>,
@@ -86,7 +86,7 @@ impl RunnerOptions {
         }
     }
 
-    /// The address to listen on for a run that an earlier coordinator listened for at `before`: the same one, so that its workers find
+    /// The address to listen on for a resumed run whose earlier coordinator listened at `before`: the same one, so that its workers find
     /// it, unless the user names another port.
     pub(crate) fn listen_again(&self, before: Option<SocketAddr>) -> SocketAddr {
         let anywhere = SocketAddr::from((Ipv4Addr::LOCALHOST, 0));

@@ -1,4 +1,4 @@
-//! Whether the loop of a run still goes round, for somebody who watches from outside of it.
+//! Whether the loop of a run still turns, for the health check of the metrics.
 
 use std::sync::Mutex;
 use std::sync::PoisonError;

@@ -1,4 +1,4 @@
-//! Bars side by side in groups, one group below the other so that long names stay readable.
+//! Horizontal bars in groups, one group below the other, so that long names stay readable.
 
 use super::{
     range, sheet,
@@ -11,7 +11,7 @@ use plotters::{prelude::*, style::text_anchor::HPos};
 /// The bars of one name.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Group {
-    /// Left of the bars.
+    /// The label left of the bars.
     pub(crate) name: String,
     /// One for each of the chart's kinds.
     pub(crate) bars: Vec<Option<f64>>,
@@ -20,28 +20,28 @@ pub(crate) struct Group {
 /// A chart of bars from zero.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Bars {
-    /// Above the chart.
+    /// The heading above the chart.
     pub(crate) title: String,
-    /// What the bars measure, with its unit.
+    /// The measured quantity, with its unit.
     pub(crate) label: String,
     /// Names and colours of the bars of each group.
     pub(crate) kinds: Vec<(String, RGBColor)>,
-    /// From the top down.
+    /// The groups, from top to bottom.
     pub(crate) groups: Vec<Group>,
 }
 
-/// Shown pixels that a bar is high.
+/// Height of a bar, in shown pixels.
 const BAR: u32 = 11;
-/// Shown pixels between groups.
+/// Gap between groups, in shown pixels.
 const GAP: u32 = 12;
-/// Shown pixels of the part with the bars.
+/// Width of the area with the bars, in shown pixels.
 const CHART: u32 = 440;
 
 impl Bars {
-    /// Draws it.
+    /// Draws the chart.
     ///
     /// # Errors
-    /// Where the drawing library refuses.
+    /// If the drawing library fails.
     pub(crate) fn svg(&self) -> anyhow::Result<String> {
         let names = self.groups.iter().map(|group| width(&group.name)).max().unwrap_or(0) + 12;
         let kinds = self.kinds.iter().map(|kind| width(&kind.0)).max().unwrap_or(0) + 34;
@@ -70,7 +70,7 @@ impl Bars {
                 .axis_desc_style(font(TEXT, HPos::Center))
                 .draw()?;
             for (i, group) in self.groups.iter().enumerate() {
-                // From the top down, where the axis goes up.
+                // Groups go from top to bottom, but the axis goes up.
                 let middle = chart.backend_coord(&(0.0, rows - number(i) - 0.5)).1;
                 let label_end = px(names + 4);
                 root.draw(&Text::new(group.name.clone(), (label_end, middle), font(TEXT, HPos::Right)))?;
@@ -85,7 +85,7 @@ impl Bars {
                     y += bar;
                 }
             }
-            // Squares: what bars are filled with.
+            // Filled squares in the colour of the bars.
             let entries: Vec<_> = self.kinds.iter().map(|(name, colour)| (name.as_str(), 1, *colour)).collect();
             legend(&beside, (px(14), px(54)), &entries)
         })

@@ -1,6 +1,6 @@
 //! Charts as SVG: the same bytes for the same data.
 //!
-//! Plotters places everything on whole pixels, so a chart is drawn [`SCALE`] times as large as it is shown.
+//! Plotters rounds positions to whole pixels, so a chart is drawn [`SCALE`] times as large as it is shown.
 
 mod bars;
 mod plot;
@@ -14,13 +14,13 @@ pub(super) use style::{colour, method_colour};
 
 use plotters::{coord::Shift, prelude::*};
 
-/// Where a chart is drawn.
+/// The drawing area of a chart.
 type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 
-/// Pixels drawn for each that is shown.
+/// Drawn pixels per shown pixel.
 const SCALE: i32 = 4;
 
-/// Draws on a white sheet of `width` x `height` shown pixels; `title` is what a screen reader says.
+/// Draws on a white sheet of `width` x `height` shown pixels; `title` is for screen readers.
 fn sheet(
     title: &str,
     (width, height): (u32, u32),
@@ -44,7 +44,7 @@ fn sheet(
     ))
 }
 
-/// Text between tags.
+/// Escapes text between tags.
 fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }
@@ -60,7 +60,7 @@ fn range(numbers: impl Iterator<Item = f64>, from_zero: bool) -> (f64, f64) {
     (low - below, high + margin)
 }
 
-/// A tick of an axis without the digits that say nothing.
+/// A tick of an axis without trailing zeros.
 fn tick(value: f64) -> String {
     let text = if value.abs() >= 1000.0 { format!("{value:.0}") } else { format!("{value:.4}") };
     let text = if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &text };

@@ -24,17 +24,17 @@ pub(crate) struct Axis {
 }
 
 impl Axis {
-    /// With equal steps; the label names the unit.
+    /// A linear axis; the label names the unit.
     pub(crate) fn linear(label: &str) -> Self {
         Self { label: label.to_owned(), log: false, from_zero: false }
     }
 
-    /// With equal steps from zero.
+    /// A linear axis from zero.
     pub(crate) fn from_zero(label: &str) -> Self {
         Self { from_zero: true, ..Self::linear(label) }
     }
 
-    /// With equal factors: of `x` only.
+    /// A logarithmic axis; for `x` only.
     pub(crate) fn log(label: &str) -> Self {
         Self { log: true, ..Self::linear(label) }
     }
@@ -43,39 +43,39 @@ impl Axis {
 /// Points that belong together.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Series {
-    /// As the legend says.
+    /// The name in the legend.
     pub(crate) name: String,
-    /// Of marks and line.
+    /// The colour of marks and line.
     pub(crate) colour: RGBColor,
-    /// In the order of the line.
+    /// The points, in the order of the line.
     pub(crate) points: Vec<(f64, f64)>,
     /// Whether a line joins them.
     pub(crate) joined: bool,
-    /// Whether the lowest is circled.
+    /// Whether the lowest point is circled.
     pub(crate) minimum: bool,
 }
 
-/// A chart over two axes, its legend beside it.
+/// A chart over two axes, with its legend at the side.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Plot {
-    /// Above the chart.
+    /// The heading above the chart.
     pub(crate) title: String,
-    /// From left to right.
+    /// The horizontal axis.
     pub(crate) x: Axis,
-    /// Upwards.
+    /// The vertical axis.
     pub(crate) y: Axis,
-    /// What it shows.
+    /// The shown series.
     pub(crate) series: Vec<Series>,
 }
 
-/// Shown pixels of the part with the axes, without the legend.
+/// Size of the area with the axes, without the legend, in shown pixels.
 const CHART: (u32, u32) = (560, 360);
 
 impl Plot {
-    /// Draws it.
+    /// Draws the chart.
     ///
     /// # Errors
-    /// Where the drawing library refuses.
+    /// If the drawing library fails.
     pub(crate) fn svg(&self) -> anyhow::Result<String> {
         let names = self.series.iter().map(|series| width(&series.name)).max().unwrap_or(0);
         let beside = u32::try_from(names + 34)?;
@@ -146,7 +146,7 @@ impl Plot {
     }
 }
 
-/// Ticks between two powers of ten: the powers, or 1, 2 and 5 times each where those would be few.
+/// Ticks of a logarithmic axis: powers of ten, or 1, 2 and 5 times each power if there are only a few.
 fn decades(low: f64, high: f64) -> Vec<f64> {
     let steps: &[f64] = if high - low < 2.5 { &[1.0, 2.0, 5.0] } else { &[1.0] };
     let powers = (-12_i32..=12).flat_map(|power| steps.iter().map(move |step| step * 10.0_f64.powi(power)));

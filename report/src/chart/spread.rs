@@ -1,4 +1,4 @@
-//! How numbers spread: every one as a dot, the middle half as a box, the median as a line.
+//! The spread of numbers: each number as a dot, the middle half as a box, the median as a line.
 
 use super::{
     range, sheet,
@@ -11,35 +11,35 @@ use plotters::{prelude::*, style::text_anchor::HPos};
 /// The numbers of one name.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct SpreadRow {
-    /// Left of the dots.
+    /// The label left of the dots.
     pub(crate) name: String,
-    /// Of the dots.
+    /// The colour of the dots.
     pub(crate) colour: RGBColor,
-    /// The dots.
+    /// The numbers.
     pub(crate) values: Vec<f64>,
 }
 
 /// A chart of spreads, one row below the other.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Spread {
-    /// Above the chart.
+    /// The heading above the chart.
     pub(crate) title: String,
-    /// What the dots measure, with its unit.
+    /// The measured quantity, with its unit.
     pub(crate) label: String,
-    /// From the top down.
+    /// The rows, from top to bottom.
     pub(crate) rows: Vec<SpreadRow>,
 }
 
-/// Shown pixels of a row.
+/// Height of a row, in shown pixels.
 const ROW: u32 = 34;
-/// Shown pixels of the part with the dots.
+/// Width of the area with the dots, in shown pixels.
 const CHART: u32 = 520;
 
 impl Spread {
-    /// Draws it.
+    /// Draws the chart.
     ///
     /// # Errors
-    /// Where the drawing library refuses.
+    /// If the drawing library fails.
     pub(crate) fn svg(&self) -> anyhow::Result<String> {
         let names = self.rows.iter().map(|row| width(&row.name)).max().unwrap_or(0) + 12;
         let high = 100 + ROW * u32::try_from(self.rows.len())?;
@@ -83,7 +83,7 @@ fn draw_row(root: &super::Area<'_>, row: &SpreadRow, place: impl Fn(f64) -> (i32
     }
     for (i, value) in row.values.iter().enumerate().filter(|(_, value)| value.is_finite()) {
         let (x, y) = place(*value);
-        // Dots that would cover each other step aside, the same way each time.
+        // Dots are shifted by a fixed pattern so that they do not cover each other.
         let aside = px(i32::try_from(i % 5)? * 3 - 6);
         root.draw(&Circle::new((x, y + aside), px(3), row.colour.mix(0.75).filled()))?;
     }

@@ -1,4 +1,4 @@
-//! Colours, type and marks, the same in every chart.
+//! Colours, fonts and marks of all charts.
 
 use super::{Area, SCALE};
 use crate::measured::Method;
@@ -7,7 +7,7 @@ use plotters::{
     style::text_anchor::{HPos, Pos, VPos},
 };
 
-/// Okabe and Ito's palette, which the colour-blind can tell apart, without its yellow, which is lost on white.
+/// Okabe and Ito's palette, which colour-blind readers can distinguish, without its yellow, which is too faint on white.
 const PALETTE: [RGBColor; 7] = [
     RGBColor(0, 114, 178),
     RGBColor(213, 94, 0),
@@ -18,14 +18,14 @@ const PALETTE: [RGBColor; 7] = [
     RGBColor(60, 60, 60),
 ];
 
-/// Of text and axes.
+/// The colour of text and axes.
 pub(super) const INK: RGBColor = RGBColor(34, 34, 34);
-/// Of the lines of the grid.
+/// The colour of grid lines.
 pub(super) const GRID: RGBColor = RGBColor(225, 225, 225);
-/// Shown pixels of text.
+/// Size of text, in shown pixels.
 pub(super) const TEXT: f64 = 13.0;
 
-/// The colour of what has no colour of its own, by its number.
+/// The colour of the series of this number, for series without a fixed colour.
 pub(crate) fn colour(index: usize) -> RGBColor {
     PALETTE[index % PALETTE.len()]
 }
@@ -43,14 +43,14 @@ pub(crate) const fn method_colour(method: Method) -> RGBColor {
     }]
 }
 
-/// Shown pixels as drawn ones.
+/// Converts shown pixels to drawn ones.
 pub(super) const fn px(shown: i32) -> i32 {
     shown * SCALE
 }
 
-/// Text of so many shown pixels, anchored left, in the middle or right of its place.
+/// Text of this size in shown pixels, anchored at its left end, middle or right end.
 pub(super) fn font(shown: f64, horizontal: HPos) -> TextStyle<'static> {
-    // The backend divides by 1.24, its ratio of a line to its type.
+    // The backend divides by 1.24, its ratio of line height to font size.
     let size = shown * f64::from(SCALE) * 1.24;
     ("sans-serif", size).into_font().color(&INK).pos(Pos::new(horizontal, VPos::Center))
 }
@@ -79,7 +79,7 @@ pub(super) fn legend(area: &Area<'_>, (x, y): (i32, i32), entries: &[(&str, usiz
     Ok(())
 }
 
-/// Shown pixels that a text is wide, about: the backend has no fonts to measure.
+/// Approximate width of a text in shown pixels; the backend has no fonts to measure it.
 pub(super) fn width(text: &str) -> i32 {
     let letters = i32::try_from(text.chars().count()).unwrap_or(i32::MAX / 64);
     letters * 15 / 2 + 8

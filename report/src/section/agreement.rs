@@ -1,4 +1,4 @@
-//! How well Eq. 1 ranks matches as CSSIM does, and what more candidates bring.
+//! The agreement of Eq. 1 with CSSIM in the ranking of matches, and the gain from more candidates.
 
 use crate::{
     chart::{Axis, Plot, Series, colour},
@@ -63,7 +63,7 @@ fn ranks(study: &Study<'_>, section: &mut Section) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Means by gamma, in its order.
+/// Means by gamma, in ascending order.
 fn by_gamma(agreements: &[Agreement], keep: impl Fn(&Agreement) -> bool) -> Vec<(f64, f64)> {
     let mut kept: Vec<(f64, f64)> =
         agreements.iter().filter(|a| keep(a) && a.spearman.is_finite()).map(|a| (a.gamma, a.spearman)).collect();

@@ -10,7 +10,7 @@ use crate::{
 };
 use std::collections::BTreeSet;
 
-/// A column: a method, and the size it searched at where that is not the grid's.
+/// A column: a method, and the size at which it searched if that is not the grid's.
 type Column = (Method, Option<u32>);
 
 pub(super) fn section(study: &Study<'_>) -> anyhow::Result<Section> {
@@ -87,7 +87,7 @@ fn heading((method, size): &Column) -> String {
     }
 }
 
-/// How often each column is the best, from the marks of the table itself.
+/// How often each column is the best, counted from the marks in the table.
 fn wins(table: &Table) -> String {
     let cells = &table.rows[..table.rows.len() - table.totals];
     let count = |i: usize| cells.iter().filter(|row: &&Vec<Entry>| row[i].best).count();

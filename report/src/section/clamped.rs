@@ -12,9 +12,9 @@ use crate::{
 
 /// The paper's setting.
 const SAMPLES: u32 = 32;
-/// What a study without it lacks.
+/// What a study needs for this section.
 const NEEDS: &str = "the experiment \"clamped\" with several seeds, in the paper under Grace Cathedral";
-/// The part of the unclamped spread from which on it is said to remain.
+/// Share of the unclamped spread from which on the spread counts as remaining.
 const REMAINS: f64 = 0.25;
 
 pub(super) fn section(study: &Study<'_>) -> anyhow::Result<Section> {
@@ -73,7 +73,7 @@ pub(super) fn section(study: &Study<'_>) -> anyhow::Result<Section> {
     Ok(section)
 }
 
-/// The paper: the dependence on the subset remains, less visibly.
+/// The claim of the paper: the dependence on the subset remains, but is less visible.
 fn judged(deviations: &[Vec<(Option<f64>, Option<f64>)>; 2]) -> (Verdict, String) {
     let of = |i: usize| {
         let gammas: Vec<f64> = deviations[i].iter().filter_map(|pair| pair.0).collect();
@@ -86,7 +86,7 @@ fn judged(deviations: &[Vec<(Option<f64>, Option<f64>)>; 2]) -> (Verdict, String
         let ratio = free.zip(clamped).filter(|(free, _)| *free > 0.0).map(|(free, clamped)| 100.0 * clamped / free);
         text::fixed(ratio, 0)
     };
-    // Less spread, yet most of it still there; of both.
+    // Less spread, but most of it remains, in both gamma and score.
     let remains = gamma.zip(clamped_gamma).map(|(free, clamped)| clamped >= REMAINS * free);
     let remains =
         remains.zip(score.zip(clamped_score)).map(|(gamma, (free, clamped))| gamma && clamped >= REMAINS * free);
@@ -107,7 +107,7 @@ fn judged(deviations: &[Vec<(Option<f64>, Option<f64>)>; 2]) -> (Verdict, String
     (Verdict::of(holds), words)
 }
 
-/// The light that was measured so, the paper's if it was.
+/// The light with clamped measurements; the paper's if it is among them.
 fn probe<'a>(study: &Study<'a>) -> Option<&'a str> {
     let measured = |probe: &&String| study.data.rows.iter().any(|row| row.clamped && row.probe == **probe);
     let mut probes: Vec<&String> = study.data.about.probes.iter().filter(measured).collect();

@@ -1,4 +1,4 @@
-//! What a match costs: by the number of samples, and against brute force.
+//! The cost of a match by the number of samples, and compared with brute force.
 
 use crate::{
     chart::{Axis, Plot, Series, method_colour},
@@ -14,13 +14,13 @@ use std::collections::BTreeSet;
 /// The paper's speed-up of 256 samples over brute force.
 pub(super) const PAPER_RATIO: f64 = 10.0;
 
-/// What a second is.
+/// The definition of a second.
 pub(super) const SECONDS: &str = "CPU seconds are wall time from the start of a node to the arrival of its output, on workers \
                                   of one thread each if they are local; where a worker shares a core with other work they count \
                                   that as well, and where a remote one has more threads they leave the others out.";
-/// What the charge leaves out.
+/// What the charged seconds leave out.
 const SCORE: &str = "about a millisecond at 128 x 128";
-/// The start of brute force that is the paper's.
+/// The paper's start of brute force.
 const PAPER_START: &str = "paper";
 
 pub(super) fn section(study: &Study<'_>) -> anyhow::Result<Section> {
@@ -60,9 +60,9 @@ pub(super) fn section(study: &Study<'_>) -> anyhow::Result<Section> {
     Ok(section)
 }
 
-/// Seconds of one core that a search would have taken without tables: its evaluations times the median direct rendering of
-/// its cell, else under its light, else of its size; scaled by pixels from another size where its own was not measured.
-/// The score of each rendering is not charged.
+/// Core-seconds that a search would have taken without tables: its evaluations times the median time of a direct rendering of its cell,
+/// otherwise under its light, otherwise of its size. If its size was not measured, the time is scaled by pixels from another size. The
+/// time to score each rendering is not included.
 pub(super) fn charged(study: &Study<'_>, found: &Match<'_>) -> Option<f64> {
     let row = found.row;
     let direct = &study.data.direct;
@@ -93,8 +93,8 @@ fn one_start<'a>(study: &Study<'a>, cell: (&str, &str)) -> Option<Match<'a>> {
     Match::best(&rows)
 }
 
-/// Charged seconds of brute force, from the paper's start or from all of them, over the seconds of a method, in every cell
-/// that has both starts and the method.
+/// Charged seconds of brute force, from the paper's start or from all starts, divided by the seconds of a method, for every cell that
+/// has both starts and the method.
 fn ratios(study: &Study<'_>, method: Method, all_starts: bool) -> Vec<f64> {
     let ratio = |cell| {
         let (ours, one, all) = (study.grid(method, cell)?, one_start(study, cell)?, study.grid(Method::Brute, cell)?);
@@ -141,7 +141,7 @@ fn samples_per_pixel(study: &Study<'_>) -> String {
     format!("{} samples per pixel", text::list(&samples))
 }
 
-/// How much of two stages the second takes; the paper calls it negligible.
+/// The share of stage two in the time of both stages; the paper calls it negligible.
 fn stage_two(study: &Study<'_>) -> Option<String> {
     let share = |cell| {
         let found = study.grid(Method::Ours, cell)?;
@@ -159,7 +159,7 @@ fn stage_two(study: &Study<'_>) -> Option<String> {
     ))
 }
 
-/// The search that was run without tables, against what it is charged.
+/// Compares the measured time of a search without tables with its charged time.
 fn direct_check(study: &Study<'_>) -> Option<String> {
     let row = study.data.rows.iter().find(|row| row.method == Method::BruteDirect)?;
     let found = Match::best(&[row])?;
@@ -175,8 +175,8 @@ fn direct_check(study: &Study<'_>) -> Option<String> {
     ))
 }
 
-/// The numbers of samples that `ours` has in some cell of the grid; all pixels last, and only where they were tried with as
-/// many exponents, as fewer cost less.
+/// The numbers of samples that `ours` has in some cell of the grid. All pixels come last, and only if they were tried with as many
+/// gammas, because fewer gammas cost less.
 fn levels(study: &Study<'_>) -> Vec<Option<u32>> {
     let rows = study.data.rows.iter().filter(|row| row.method == Method::Ours && row.size == study.size());
     let levels: BTreeSet<Option<u32>> = rows.map(|row| row.samples).collect();
@@ -185,7 +185,7 @@ fn levels(study: &Study<'_>) -> Vec<Option<u32>> {
     levels.into_iter().filter(Option::is_some).chain(full).filter(some).collect()
 }
 
-/// Why all pixels are not beside samples, where they are not.
+/// Why the column of all pixels is missing, if it is.
 fn left_out(study: &Study<'_>) -> Option<String> {
     let gammas = |samples| {
         let of = |cell| Some(sampled(study, samples, cell)?.row.gammas);

@@ -12,21 +12,21 @@ use crate::{
 };
 use std::collections::BTreeSet;
 
-/// A cell and its scores from samples and from all pixels, of the same exponents.
+/// A cell and its scores from samples and from all pixels, for the same gammas.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Pair<'a> {
     cell: (&'a str, &'a str),
-    /// The winner among the exponents that all pixels were tried with.
+    /// The score of the winner among the gammas that all pixels were tried with.
     pub(super) sampled: f64,
     pub(super) full: f64,
-    /// The exponents that both were tried with.
+    /// Number of gammas that both were tried with.
     pub(super) gammas: u32,
-    /// Whether samples were tried with more.
+    /// Whether samples were tried with more gammas.
     pub(super) is_restricted: bool,
 }
 
 impl Pair<'_> {
-    /// What sampling costs; below 0 it is better.
+    /// The excess in CSSIM due to sampling; negative if samples are better.
     fn excess(&self) -> f64 {
         self.sampled - self.full
     }
@@ -92,8 +92,8 @@ pub(super) fn pairs<'a>(study: &Study<'a>) -> Vec<Pair<'a>> {
     study.six().into_iter().filter_map(of).collect()
 }
 
-/// A cell's scores from so many samples and from all pixels: where all pixels were tried with fewer exponents, samples are
-/// held to the same ones.
+/// A cell's scores from `samples` pixels and from all pixels. If all pixels were tried with fewer gammas, only these gammas are used for
+/// the samples as well.
 pub(super) fn pair<'a>(study: &Study<'a>, cell: (&'a str, &'a str), samples: u32) -> Option<Pair<'a>> {
     let full = study.find(&Pick { samples: None, ..study.pick(Method::Ours, cell) })?;
     let sampled = study.find(&Pick { samples: Some(samples), ..study.pick(Method::Ours, cell) })?;
@@ -104,7 +104,7 @@ pub(super) fn pair<'a>(study: &Study<'a>, cell: (&'a str, &'a str), samples: u32
     let candidates = |samples| study.rows(&Pick { samples, ..study.pick(Method::Candidate, cell) });
     let tried: Vec<f64> = candidates(None).iter().filter_map(|row| row.gamma).collect();
     let is_tried = |row: &&Row| row.gamma.is_some_and(|gamma| tried.iter().any(|tried| (tried - gamma).abs() < 1e-9));
-    // Of a match that was found again the first counts, as it does for the others.
+    // Of several rows of the same match the first counts, as everywhere.
     let mut same: Vec<&Row> = Vec::new();
     for row in candidates(Some(samples)).into_iter().filter(is_tried) {
         if same.iter().all(|known| known.gamma != row.gamma) {
@@ -116,7 +116,7 @@ pub(super) fn pair<'a>(study: &Study<'a>, cell: (&'a str, &'a str), samples: u32
     best.filter(|_| is_whole).map(|best| of(best, true))
 }
 
-/// How many exponents the comparison has.
+/// The number of gammas of the comparison, in words.
 fn exponents(pairs: &[Pair<'_>]) -> String {
     let gammas: BTreeSet<u32> = pairs.iter().map(|pair| pair.gammas).collect();
     let gammas: Vec<String> = gammas.into_iter().map(|gammas| gammas.to_string()).collect();
@@ -153,7 +153,7 @@ pub(super) fn claim(pairs: &[Pair<'_>]) -> (Verdict, String) {
     (verdict, words)
 }
 
-/// Of each material the first light that has pictures of both.
+/// For each material, the first light with pictures of both.
 fn strip(study: &Study<'_>, samples: &str) -> Vec<StripRow> {
     let mut rows: Vec<StripRow> = Vec::new();
     let mut done: Vec<&str> = Vec::new();

@@ -10,9 +10,9 @@ use crate::{
     verdict::Verdict,
 };
 
-/// As many as the paper's figure has, and as the experiment extends.
+/// Number of materials in the paper's figure, and in the experiment with more gammas.
 const SHOWN: usize = 3;
-/// The largest exponent of the grid.
+/// The largest gamma of the grid.
 const LARGEST: f64 = 3.0;
 
 pub(super) fn section(study: &Study<'_>) -> anyhow::Result<Section> {
@@ -70,14 +70,14 @@ pub(super) fn section(study: &Study<'_>) -> anyhow::Result<Section> {
     Ok(section)
 }
 
-/// The first of the six, which are those that the experiment extends; of all, where the study does not name the six.
+/// The first materials of the six, for which the experiment has more gammas; the first of all if the study does not name the six.
 fn materials<'a>(study: &Study<'a>) -> Vec<&'a str> {
     let about = &study.data.about;
     let from = if about.six.is_empty() { &about.materials } else { &about.six };
     from.iter().take(SHOWN).map(String::as_str).collect()
 }
 
-/// The candidates of the grid's seed by gamma, of equal ones the first.
+/// The candidates of the grid's seed by gamma; of several rows of one gamma the first.
 pub(super) fn candidates<'a>(study: &Study<'a>, cell: (&str, &str)) -> Vec<&'a Row> {
     let mut rows: Vec<&Row> = study.rows(&study.pick(Method::Candidate, cell));
     rows.retain(|row| row.gamma.is_some_and(f64::is_finite));
@@ -87,7 +87,7 @@ pub(super) fn candidates<'a>(study: &Study<'a>, cell: (&str, &str)) -> Vec<&'a R
     rows
 }
 
-/// Those of them that every cell has: without the exponents beyond 3 of an experiment of its own.
+/// The candidates of gammas that every cell has: without those above 3, which belong to a separate experiment.
 pub(super) fn grid_candidates<'a>(study: &Study<'a>, cell: (&str, &str)) -> Vec<&'a Row> {
     let mut rows = candidates(study, cell);
     rows.retain(|row| row.gamma.is_some_and(|gamma| gamma <= LARGEST + 1e-9));

@@ -1,4 +1,4 @@
-//! The paper's Figure 4: matches under a light that the fit has not seen.
+//! The paper's Figure 4: matches under a light that was not used for the fit.
 
 use crate::{
     chart::{Bars, Group, method_colour},
@@ -11,9 +11,9 @@ use crate::{
 };
 use std::collections::BTreeSet;
 
-/// As the bars are ordered.
+/// The methods, in the order of the bars.
 const METHODS: [Method; 4] = [Method::L2, Method::RunnerUp, Method::Ours, Method::OursPolished];
-/// Pictures of so many materials.
+/// Number of materials with pictures.
 const SHOWN: usize = 4;
 
 /// A match under another light: the cell, that light, and the scores by [`METHODS`].
@@ -57,7 +57,7 @@ pub(super) fn section(study: &Study<'_>) -> anyhow::Result<Section> {
     Ok(section)
 }
 
-/// Every match that was shown under another light and has a rival.
+/// Every match that was scored under another light and has a rival.
 fn cases<'a>(study: &Study<'a>) -> Vec<Case<'a>> {
     let about = &study.data.about;
     let lights: Vec<&str> = about.probes.iter().chain(&about.held_out).map(String::as_str).collect();
@@ -77,7 +77,7 @@ fn cases<'a>(study: &Study<'a>) -> Vec<Case<'a>> {
     cases
 }
 
-/// How much lower a method's CSSIM is than that of L2 under held-out lights.
+/// The difference by which a method's CSSIM is lower than that of L2, under held-out lights.
 pub(super) fn margins(study: &Study<'_>, method: Method) -> Vec<f64> {
     let place = METHODS.iter().position(|other| *other == method);
     let margin = |case: &Case<'_>| Some(case.2[0]? - case.2[place?]?);
@@ -119,7 +119,7 @@ fn polish(cases: &[Case<'_>]) -> Option<(Verdict, String)> {
     Some((verdict::paired(&margins), words))
 }
 
-/// Whether stage two, which judges under the fitting light, takes what is best under another.
+/// Whether the winner of stage two, which judges under the light of the fit, is also the best under another light.
 fn runner_up(cases: &[Case<'_>]) -> Option<String> {
     let pairs: Vec<(f64, f64)> =
         cases.iter().filter_map(|(_, _, [_, runner_up, ours, _])| Some(((*runner_up)?, (*ours)?))).collect();

@@ -14,7 +14,7 @@ use std::collections::BTreeSet;
 
 /// The samples that the paper compares.
 const SAMPLES: u32 = 32;
-/// Pictures of so many cells.
+/// Number of cells with pictures.
 const SHOWN: usize = 3;
 
 pub(super) fn section(study: &Study<'_>) -> anyhow::Result<Section> {
@@ -56,7 +56,7 @@ pub(super) fn section(study: &Study<'_>) -> anyhow::Result<Section> {
     Ok(section)
 }
 
-/// What the rival is.
+/// The name of the rival.
 const ONE_START: &str = "Low resolution searches from one start, the paper's. It is charged its evaluations of CSSIM at the cost \
                          of a direct rendering of the size that it searched at, without the score.";
 
@@ -87,7 +87,7 @@ pub(super) fn claim(study: &Study<'_>) -> (Verdict, String) {
     claim_at(study, study.size())
 }
 
-/// So for images of another size.
+/// The same for images of another size.
 fn claim_at(study: &Study<'_>, image: u32) -> (Verdict, String) {
     let mut margins = Vec::new();
     let mut parts = Vec::new();
@@ -97,7 +97,7 @@ fn claim_at(study: &Study<'_>, image: u32) -> (Verdict, String) {
             let wins = text::share(of.iter().filter(|margin| **margin > 0.0).count(), of.len());
             parts.push(format!("at {size} pixels in {wins} cells, by {} in the mean", text::signed(mean(&of))));
         }
-        // At the size of the image it is brute force itself.
+        // At the full size of the image, low resolution is brute force itself.
         margins.extend(of.into_iter().filter(|_| size < image));
     }
     if parts.is_empty() {
@@ -112,7 +112,7 @@ fn claim_at(study: &Study<'_>, image: u32) -> (Verdict, String) {
     (verdict::paired(&margins), words)
 }
 
-/// The sizes of images that both were measured at, that of the grid first.
+/// The sizes of images at which both were measured; the grid's size first.
 fn images(study: &Study<'_>) -> Vec<u32> {
     let rows = study.data.rows.iter().filter(|row| row.method == Method::LowRes);
     let images: BTreeSet<u32> = rows.map(|row| row.size).collect();
@@ -122,7 +122,7 @@ fn images(study: &Study<'_>) -> Vec<u32> {
     images
 }
 
-/// The sizes that low resolution was searched at, for images of a size.
+/// The sizes at which low resolution was searched, for images of a size.
 fn sizes(study: &Study<'_>, image: u32) -> BTreeSet<u32> {
     let rows = study.data.rows.iter().filter(|row| row.method == Method::LowRes && row.size == image);
     rows.map(|row| row.searched_size).collect()

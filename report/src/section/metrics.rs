@@ -1,5 +1,5 @@
-//! The same matches under variants of the metric and at another size: do the conclusions hold, and which comes near the
-//! paper's figures?
+//! The same matches under variants of the metric and at another size: whether the conclusions hold, and which variant is nearest to the
+//! numbers of the paper.
 
 use super::table_one::paper_256;
 use crate::{
@@ -69,7 +69,7 @@ struct Variant {
     means: [Option<f64>; 3],
 }
 
-/// The variants that matches of the grid's size were scored by.
+/// The variants of the metric for matches of the grid's size.
 fn named<'a>(study: &Study<'a>) -> BTreeSet<&'a str> {
     let is_variant =
         |row: &&crate::measured::Row| row.metric != CSSIM && row.size == study.size() && METHODS.contains(&row.method);
@@ -113,7 +113,7 @@ fn table(methods: &[usize], variants: &[Variant], caption: &str) -> (Table, BTre
     (table, orders)
 }
 
-/// Plain CSSIM at other sizes, beside the same cells at the grid's.
+/// Plain CSSIM at other sizes, compared with the same cells at the grid's size.
 fn sizes(study: &Study<'_>, section: &mut Section) {
     let rows = study.data.rows.iter().filter(|row| row.method == Method::OursPolished && row.metric == CSSIM);
     let others: BTreeSet<u32> = rows.map(|row| row.size).filter(|size| *size != study.size()).collect();
@@ -137,10 +137,10 @@ fn sizes(study: &Study<'_>, section: &mut Section) {
     }
 }
 
-/// What is set beside the paper's means: a metric, a method and a model.
+/// A comparison with the paper's means: a metric, a method and a model.
 type Rival<'a> = (&'a str, Method, &'a str);
 
-/// Means over the six under each light beside the paper's, and which are the nearest.
+/// Means over the six materials under each light with the paper's, and which of them are nearest.
 fn nearest(study: &Study<'_>, section: &mut Section) {
     let model = study.model.as_str();
     let mut rivals: Vec<Rival<'_>> = vec![
@@ -205,7 +205,7 @@ fn by_light(
     (scores.iter().map(Vec::len).sum(), scores.iter().map(|scores| mean(scores)).collect())
 }
 
-/// The methods from the lowest mean on.
+/// The methods, by ascending mean.
 fn order(methods: &[usize], means: &[Option<f64>]) -> String {
     let mut order: Vec<(f64, &str)> =
         methods.iter().zip(means).filter_map(|(i, mean)| Some(((*mean)?, text::method(METHODS[*i])))).collect();

@@ -26,7 +26,7 @@ use super::{
 /// All sections.
 ///
 /// # Errors
-/// Where a figure cannot be drawn.
+/// If a figure cannot be drawn.
 pub(super) fn all(study: &Study<'_>) -> anyhow::Result<Vec<Section>> {
     let sections = [
         summary::section,
@@ -56,7 +56,7 @@ impl Section {
         self.blocks.push(Block::Figure(Figure { caption: caption.to_owned(), svg, csv }));
     }
 
-    /// Adds pictures; a line instead where there are none at all.
+    /// Adds pictures, or a line of text if there are none.
     fn strip(&mut self, caption: &str, rows: Vec<StripRow>) {
         let some = rows.iter().any(|row| row.panels.iter().any(|panel| panel.file.is_some()));
         self.blocks.push(if some {

@@ -1,4 +1,4 @@
-//! The BRDF models against each other, GGX against Cook-Torrance above all.
+//! The BRDF models compared with each other, mainly GGX with Cook-Torrance.
 
 use crate::{
     document::{Block, Entry, Section, Table},
@@ -99,7 +99,8 @@ const FREE_RIM: &str = "ggx-f90";
 
 const GGX: &str = "ggx";
 
-/// What the bright rim of Schlick's Fresnel term costs: GGX beside GGX whose rim is free, where the paper's model was fitted too.
+/// The cost of the bright rim of Schlick's Fresnel term: GGX compared with GGX of free reflectance at grazing incidence, in cells where
+/// the paper's model was fitted too.
 pub(super) fn grazing(study: &Study<'_>) -> Option<String> {
     let of = study.cells().into_iter().map(|cell| scores(study, cell, &[GGX, FREE_RIM, PAPER]));
     let complete: Vec<Vec<f64>> = of.filter_map(|scores| scores.into_iter().collect()).collect();
@@ -123,7 +124,7 @@ fn scores(study: &Study<'_>, cell: (&str, &str), models: &[&str]) -> Vec<Option<
     models.iter().map(score).collect()
 }
 
-/// The mean of each column over the rows that have every column that the first has.
+/// The mean of each column over the rows that have all columns of the first row.
 fn means(rows: &[&Vec<Option<f64>>], columns: usize) -> Vec<Option<f64>> {
     let has = |i: usize| rows.iter().any(|row| row[i].is_some());
     let complete: Vec<_> = rows.iter().filter(|row| (0..columns).all(|i| row[i].is_some() || !has(i))).collect();
@@ -138,14 +139,14 @@ fn best(scores: &[Option<f64>]) -> Option<usize> {
 /// CSSIM of the study's model with polish, and of the paper's, in the cells that have both.
 type Pairs<'a> = Vec<((&'a str, &'a str), f64, f64)>;
 
-/// The paper's model by a method beside the study's with polish, in some cells.
+/// The paper's model with a method, and the study's model with polish, in some cells.
 fn pairs<'a>(study: &Study<'a>, cells: Vec<(&'a str, &'a str)>, rival: Method) -> Pairs<'a> {
     let score = |method, model, cell| Some(study.find(&Pick { model: Some(model), ..study.pick(method, cell) })?.cssim);
     let pair = |cell| Some((cell, score(Method::OursPolished, &study.model, cell)?, score(rival, PAPER, cell)?));
     cells.into_iter().filter_map(pair).collect()
 }
 
-/// Both models cell by cell.
+/// The scores of both models by cell.
 fn cells(study: &Study<'_>) -> Option<Table> {
     let pairs = pairs(study, study.cells(), Method::OursPolished);
     let model = study.model.as_str();
@@ -176,7 +177,7 @@ pub(super) fn claim(study: &Study<'_>) -> (Verdict, String) {
     .into_iter()
     .flatten()
     .collect();
-    // The paper's method has no polish: it is the judge only where the models alone were not compared.
+    // The paper's method has no polish, so it is compared only if there is no comparison of the models alone.
     let judged = if rival.is_empty() { &all } else { &rival };
     if parts.is_empty() {
         return (Verdict::NotDecided, text::ABSENT.to_owned());
@@ -186,7 +187,7 @@ pub(super) fn claim(study: &Study<'_>) -> (Verdict, String) {
     (verdict::paired(judged), words)
 }
 
-/// Which of the two models wins, by how much and where most, said plainly; none where no cell has both.
+/// Which of the two models wins, by how much, and where most; `None` if no cell has both.
 fn compared(study: &Study<'_>, pairs: &Pairs<'_>, how: &str) -> Option<String> {
     let ours = mean(&pairs.iter().map(|pair| pair.1).collect::<Vec<_>>())?;
     let rival = mean(&pairs.iter().map(|pair| pair.2).collect::<Vec<_>>())?;

@@ -1,4 +1,4 @@
-//! How much the subset of pixels matters, which gamma wins, and what polish gains.
+//! The effect of the pixel subset on the score, the distribution of winning gammas, and the gain from polish.
 
 use crate::{
     chart::{Axis, Plot, Series, Spread, SpreadRow, colour},
@@ -115,7 +115,7 @@ fn spread(levels: &[(u32, Vec<Cell<'_>>)], section: &mut Section) -> anyhow::Res
     Ok(())
 }
 
-/// How often each gamma wins, in its order.
+/// How often each gamma wins, by ascending gamma.
 fn wins(cells: &[Cell<'_>]) -> Vec<(f64, usize)> {
     let mut gammas: Vec<f64> = cells.iter().flatten().filter_map(|row| row.gamma).collect();
     gammas.sort_by(f64::total_cmp);

@@ -87,7 +87,7 @@ fn fitting(study: &Study<'_>) -> (Verdict, String) {
     (verdict::paired(&margins), words)
 }
 
-/// Every cell where ours loses by more than a reader may overlook.
+/// Every cell where ours is worse by more than [`CELL_SLACK`].
 fn worse(study: &Study<'_>, section: &mut Section) {
     let pairs = study.pairs(Method::OursPolished, Method::Brute);
     if pairs.is_empty() {

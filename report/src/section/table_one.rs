@@ -11,19 +11,19 @@ use crate::{
 };
 use std::collections::BTreeSet;
 
-/// The numbers of samples of the paper's table; none is all pixels.
+/// The numbers of samples in the paper's table; `None` is all pixels.
 const LEVELS: [Option<u32>; 4] = [Some(32), Some(64), Some(256), None];
-/// What the paper prints, by the file of the light.
+/// The values in the paper, by the file of the light.
 const PAPER: [(&str, [f64; 4]); 3] = [
     ("grace_cross", [0.0735, 0.0656, 0.0631, 0.6282]),
     ("uffizi", [0.0684, 0.0579, 0.0532, 0.6115]),
     ("rnl_cross", [0.0449, 0.0410, 0.0410, 0.0436]),
 ];
-/// The column of 256 samples held to the exponents that all pixels were tried with.
+/// The heading of the column of 256 samples with only the gammas that all pixels were tried with.
 const OF_FULL: &str = "256, gammas of full";
-/// How much worse 32 samples may be than 256: the paper's own largest ratio is 1.29.
+/// Largest ratio of 32 samples to 256 that counts as usable; the largest ratio in the paper is 1.29.
 const USABLE: f64 = 1.3;
-/// More than this is not usable.
+/// A ratio above this counts as not usable.
 const USELESS: f64 = 1.6;
 
 pub(super) fn section(study: &Study<'_>) -> anyhow::Result<Section> {
@@ -70,21 +70,21 @@ pub(super) fn section(study: &Study<'_>) -> anyhow::Result<Section> {
     Ok(section)
 }
 
-/// What the paper prints for 256 samples under a light.
+/// The paper's value for 256 samples under a light.
 pub(super) fn paper_256(probe: &str) -> Option<f64> {
     PAPER.iter().find(|(name, _)| *name == probe).map(|(_, scores)| scores[2])
 }
 
-/// Means under one light, over the materials that have every level that the study has there.
+/// Means under one light, over the materials that have every number of samples that the study has there.
 struct Means {
     materials: usize,
-    /// By [`LEVELS`].
+    /// In the order of [`LEVELS`].
     scores: [Option<f64>; 4],
-    /// 256 samples, by the exponents that all pixels were tried with, where those are fewer.
+    /// 256 samples with only the gammas that all pixels were tried with, if those are fewer.
     of_full: Option<f64>,
 }
 
-/// 256 samples and all pixels by the exponents of the latter, where those are fewer.
+/// 256 samples and all pixels with the gammas of the latter, if those are fewer.
 fn restricted<'a>(study: &Study<'a>, cell: (&'a str, &'a str)) -> Option<Pair<'a>> {
     full::pair(study, cell, 256).filter(|pair| pair.is_restricted)
 }

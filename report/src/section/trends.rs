@@ -1,4 +1,4 @@
-//! How the parameters of the candidates move with gamma.
+//! The dependence of the candidates' parameters on gamma.
 
 use super::gamma::grid_candidates;
 use crate::{
@@ -104,7 +104,7 @@ fn draw(
                 points.iter().find(|point| (point.0 - gamma).abs() < 1e-9).map(|point| point.1)
             };
             let values: Vec<f64> = of.iter().filter_map(there).collect();
-            // A mean over fewer materials would jump where a curve ends.
+            // Only gammas that every curve has: a mean over fewer materials would jump where a curve ends.
             if let Some(mean) = mean(&values).filter(|_| values.len() == of.len()) {
                 csv.row([
                     probe.clone(),

@@ -9,9 +9,9 @@ use crate::{
     verdict::{self, Verdict},
 };
 
-/// As many as the paper shows.
+/// Number of cells in the paper's figure.
 const SHOWN: usize = 3;
-/// What is compared, in the order of the strip.
+/// The compared methods, in the order of the pictures.
 const METHODS: [Method; 3] = [Method::Ours, Method::OursPolished, Method::Brute];
 
 /// A material, a light and a size.
@@ -64,7 +64,7 @@ pub(super) fn section(study: &Study<'_>) -> anyhow::Result<Section> {
     Ok(section)
 }
 
-/// The first cells with brute force at the largest size that has it, then at the next.
+/// The first cells with brute force, at the largest size that has it, then at the next size.
 fn shown<'a>(study: &Study<'a>) -> Vec<Shown<'a>> {
     let mut sizes: Vec<u32> =
         study.data.rows.iter().filter(|row| row.method == Method::Brute).map(|row| row.size).collect();
@@ -83,7 +83,7 @@ fn shown<'a>(study: &Study<'a>) -> Vec<Shown<'a>> {
             }
         }
     }
-    // Different lights say more than one light again.
+    // Prefer different lights, because they add more information.
     let mut chosen: Vec<Shown<'a>> = Vec::new();
     for (cell, size) in &shown {
         if chosen.iter().all(|((material, probe), _)| *material != cell.0 && *probe != cell.1) {

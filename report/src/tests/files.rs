@@ -1,4 +1,4 @@
-//! What is written: pages, figures, data, and nothing that is not a number.
+//! The written files: pages, figures and data, without values that are not numbers.
 
 use super::{
     super::write,
@@ -24,7 +24,7 @@ fn written(data: &StudyData, with_pictures: bool) -> BTreeMap<String, String> {
             }
         }
     }
-    // To look at: LOOKALIKE_KEEP=1 cargo test ... -- --nocapture
+    // To keep the files and print their folder: LOOKALIKE_KEEP=1 cargo test ... -- --nocapture
     if std::env::var_os("LOOKALIKE_KEEP").is_some() {
         println!("kept in {}", folder.keep().display());
     }
@@ -66,7 +66,7 @@ fn the_html_page_needs_no_other_file_and_escapes_the_study() {
         assert!(link.starts_with("data:") || link.starts_with('#'), "{}", &link[..40]);
     }
     assert!(html.matches("data:image/png;base64,").count() > 20);
-    // Every element but those that have no end is closed: what XML asks for as well.
+    // Every element except void ones is closed, as XML requires.
     let xml = html.split_once("<body>").unwrap().1.split_once("</body>").unwrap().0;
     let xml = xml.replace("<img ", "<img/><i ").replace("\"><span>", "\"/><span>");
     let closed = ["section", "figure", "table", "div", "p", "svg", "main", "nav"];

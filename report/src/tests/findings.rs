@@ -1,4 +1,4 @@
-//! Numbers and verdicts of each section, both ways.
+//! Numbers and verdicts of each section, confirmed and refuted.
 
 use super::{
     super::verdict::Verdict,
@@ -8,7 +8,7 @@ use super::{
 };
 use crate::measured::{Method, Row, StudyData};
 
-/// The study with every CSSIM of a method changed.
+/// The study with every CSSIM of a method changed by a function.
 fn changed(keep: impl Fn(&Row) -> bool, by: f64) -> StudyData {
     let mut data = whole();
     data.rows.iter_mut().filter(|row| keep(row)).for_each(|row| row.cssim += by);
@@ -20,7 +20,7 @@ fn verdict(data: &StudyData, claim: &str) -> String {
 }
 
 #[test]
-fn every_claim_of_the_synthetic_study_is_borne_out() {
+fn every_claim_of_the_synthetic_study_is_confirmed() {
     let summary = section_of(&whole(), "summary");
     let claims = tables(&summary)[0];
     for entry in &claims.rows {
@@ -100,7 +100,7 @@ fn figure_two_names_the_lowest_gamma_and_the_ends() {
 }
 
 #[test]
-fn table_one_stands_beside_the_papers_and_names_its_misprints() {
+fn table_one_is_compared_with_the_papers_and_names_its_misprints() {
     let section = section_of(&whole(), "table-1");
     let table = tables(&section)[0];
     assert_eq!(row(table, &["Grace Cathedral", "the paper"])[3..], ["0.0735", "0.0656", "0.0631", "0.6282"]);

@@ -1,4 +1,4 @@
-//! Rules that keep unlike things apart: what is compared, and what is left out, both ways.
+//! Rules of comparison: which rows are compared, and which are left out.
 
 use super::{
     super::{study::Study, verdict::Verdict},
@@ -9,7 +9,7 @@ use super::{
 use crate::measured::{Method, Row, StudyData};
 use std::collections::BTreeSet;
 
-/// The finding of a section that holds these words.
+/// The finding of a section that contains these words.
 fn finding(data: &StudyData, id: &str, words: &str) -> (Verdict, String) {
     let section = section_of(data, id);
     let found = findings(&section).into_iter().find(|(_, text)| text.contains(words));
@@ -17,7 +17,7 @@ fn finding(data: &StudyData, id: &str, words: &str) -> (Verdict, String) {
     (verdict, text.to_owned())
 }
 
-/// All pixels tried with three exponents, of this much more CSSIM than polish.
+/// All pixels with three gammas, with CSSIM higher than that of polish by this much.
 fn with_few_gammas(more: f64) -> StudyData {
     let mut data = whole();
     let mut candidates = Vec::new();
@@ -42,7 +42,7 @@ fn all_pixels_of_few_exponents_are_compared_with_samples_of_the_same() {
     assert!(words.contains("by 0.0005 in the mean of 9 cells") && words.contains("best of 3 exponents"), "{words}");
     assert_eq!(finding(&with_few_gammas(0.003), "full", "differs").0, Verdict::NotDecided);
     assert_eq!(finding(&with_few_gammas(-0.002), "full", "differs").0, Verdict::Refuted);
-    // Better and worse cells do not make up for each other.
+    // Better and worse cells do not cancel.
     let mut data = whole();
     let full = data.rows.iter_mut().filter(|row| row.method == Method::Ours && row.samples.is_none());
     full.enumerate().for_each(|(i, row)| row.cssim += if i % 2 == 0 { 0.03 } else { -0.03 });
@@ -102,7 +102,7 @@ fn the_study_says_what_its_grid_is() {
 }
 
 #[test]
-fn a_default_model_that_loses_is_said_to_lose() {
+fn a_default_model_that_loses_is_reported_as_such() {
     let claim = "The study's model against the paper's";
     let summary = |data: &StudyData| row(tables(&section_of(data, "summary"))[0], &[claim]);
     assert!(summary(&whole())[2].starts_with("The default model ggx beats cook-torrance by 0.0060"));
@@ -139,7 +139,7 @@ fn polish_under_held_out_lights_helps_or_hurts() {
 }
 
 #[test]
-fn the_winner_stands_beside_its_runner_up_under_held_out_lights() {
+fn the_winner_is_compared_with_its_runner_up_under_held_out_lights() {
     let (_, words) = finding(&whole(), "held-out", "The winner of stage two");
     assert!(
         words.contains("0.0635 under") && words.contains("winner's) 0.0655; the winner is the better one in 36 of 36"),
@@ -148,10 +148,10 @@ fn the_winner_stands_beside_its_runner_up_under_held_out_lights() {
 }
 
 #[test]
-fn metrics_of_fewer_cells_and_other_sizes_stand_apart() {
+fn metrics_of_fewer_cells_and_other_sizes_have_separate_tables() {
     let mut data = whole();
     data.rows.retain(|row| row.metric != "multi-scale" || row.material == "aluminium");
-    // Among the few its order is another, which decides nothing.
+    // The order among the few cells is different, but does not count.
     let few = |row: &&mut Row| row.metric == "multi-scale" && row.method == Method::L2;
     data.rows.iter_mut().filter(few).for_each(|row| row.cssim = 0.0);
     let large =

@@ -1,4 +1,4 @@
-//! A study that was never run: numbers from formulas, pictures of one colour.
+//! A synthetic study: numbers from formulas, pictures of one colour.
 
 use crate::measured::{About, Agreement, DirectCost, Method, Photo, Row, StudyData};
 use lookalike::image::{Image, png};
@@ -38,7 +38,7 @@ pub(super) fn row(method: Method, material: &str, probe: &str, cssim: f64) -> Ro
     }
 }
 
-/// CSSIM of `ours+polish` in a cell: .040, .041, ... by materials, .01 more for each light.
+/// CSSIM of `ours+polish` in a cell: .040, .041, ... by material, .01 more per light.
 pub(super) fn base(material: usize, probe: usize) -> f64 {
     0.04 + 0.001 * f64::from(u32::try_from(material).unwrap()) + 0.01 * f64::from(u32::try_from(probe).unwrap())
 }
@@ -54,7 +54,7 @@ pub(super) fn whole() -> StudyData {
     data
 }
 
-/// A study that measured nothing.
+/// A study without measurements.
 pub(super) fn empty() -> StudyData {
     let names = |names: &[&str]| names.iter().map(|&name| name.to_owned()).collect::<Vec<_>>();
     let about = About {
@@ -89,7 +89,7 @@ fn cell(data: &mut StudyData, (m, material): (usize, &str), (p, probe): (usize, 
         Row { subsets: 8, cpu_seconds: 9.0, ..of(Method::Subsets, base + 0.002) },
         Row { subsets: 8, cpu_seconds: 11.0, ..of(Method::SubsetsPolished, base - 0.0005) },
         Row { samples: None, cpu_seconds: 20.0, ..of(Method::Ours, base + 0.003) },
-        // Another experiment found it again, from other tables.
+        // The same match from another experiment with other tables.
         Row { cpu_seconds: 1.0, ..of(Method::Ours, base + 0.0039) },
         Row { model: "cook-torrance".to_owned(), ..of(Method::OursPolished, base + 0.006) },
         Row {
@@ -200,7 +200,7 @@ fn draws(data: &mut StudyData, (material, probe): (&str, &str), base: f64) {
     }
 }
 
-/// A picture of one colour for each that the study would have written, all but those of the last material.
+/// One picture of one colour for each that a study would write, except those of the last material.
 pub(super) fn pictures(out: &Path) {
     let folder = out.join("pictures");
     fs::create_dir_all(&folder).unwrap();

@@ -7,7 +7,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use lookalike::graph::{Blob, GraphEdit, NodeId, PlanError, Planner};
-use lookalike_coordinator::comm::{RunEvent, Site};
+use lookalike_coordinator::events::{RunEvent, Site};
 use lookalike_coordinator::policy::Policy;
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;

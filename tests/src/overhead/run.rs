@@ -6,11 +6,11 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Duration;
 
 use lookalike::graph::Planner;
-use lookalike_coordinator::comm::RunEvent;
-use lookalike_coordinator::core::RunSummary;
+use lookalike_coordinator::events::RunEvent;
 use lookalike_coordinator::journal::{JOURNAL_FILE, JournalOptions, RunIdentity};
 use lookalike_coordinator::runner::{RunnerOptions, run};
 use lookalike_coordinator::spawn::WorkerCommand;
+use lookalike_coordinator::state::RunSummary;
 use nix::sys::resource::UsageWho;
 use serde_json::{Value, json};
 
@@ -87,7 +87,7 @@ pub(super) fn options(folder: &Path, resume: bool) -> Result<RunnerOptions> {
         worker_command: Some(command),
         threads_per_worker: Some(std::num::NonZeroUsize::MIN),
         handle_signals: false,
-        journal: Some(JournalOptions { resume, survivors: resume, ..journal }),
+        journal: Some(JournalOptions { resume, ..journal }),
         ..RunnerOptions::new(WORKERS, folder.join("access.json"))
     })
 }

@@ -5,12 +5,13 @@ mod fits;
 mod network;
 mod phases;
 mod random;
+mod resume;
 mod storms;
 
 use std::path::Path;
 use std::process::Command;
 
-use lookalike_coordinator::comm::{Departure, RunEvent};
+use lookalike_coordinator::events::{Departure, RunEvent};
 use lookalike_coordinator::runner::RunnerOptions;
 use lookalike_tests::cluster::{Cluster, options};
 use lookalike_tests::gate::Gate;

@@ -2,9 +2,9 @@
 
 use std::time::Duration;
 
-use lookalike_coordinator::comm::{Departure, RunEvent};
-use lookalike_coordinator::core::Policy;
+use lookalike_coordinator::events::{Departure, RunEvent};
 use lookalike_coordinator::runner::RunnerOptions;
+use lookalike_coordinator::state::Policy;
 use lookalike_tests::cluster::Cluster;
 use lookalike_tests::gate::{Gate, Waiting};
 use lookalike_tests::netns::Namespace;

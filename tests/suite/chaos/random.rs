@@ -21,7 +21,7 @@ pub(super) const FILES: [&str; 5] = ["match.exr", "match.png", "reference.png", 
 /// Columns and rows of the photo.
 const SIZE: usize = 64;
 
-fn setting(name: &str, otherwise: u64) -> u64 {
+pub(super) fn setting(name: &str, otherwise: u64) -> u64 {
     let text = std::env::var(name).ok();
     text.map_or(otherwise, |text| text.parse().unwrap_or_else(|_| panic!("{name}: expected a number, found {text}")))
 }

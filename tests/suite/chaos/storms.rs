@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
 
 use lookalike::math::sampling::{key, uniform};
-use lookalike_coordinator::comm::RunEvent;
+use lookalike_coordinator::events::RunEvent;
 use lookalike_tests::cluster::{Cluster, options};
 use lookalike_tests::gate::{Gate, Keeper, Waiting};
 use lookalike_tests::plan::Leaves;

@@ -75,8 +75,6 @@ fn fit_that_is_killed_time_and_again_still_ends() {
     assert_eq!(without_timing(&folder.path().join("whole")), without_timing(&out));
     let journal = JournalView::of(&out);
     assert_eq!((journal.run_twice(), journal.number("SELECT max(epoch) FROM epochs")), (0, 4));
-    // The workers of the first coordinator have served all four.
-    assert_eq!(journal.column::<u64>("SELECT DISTINCT epoch FROM local_workers"), [1]);
 }
 
 #[test]
@@ -195,7 +193,7 @@ fn full_disk_ends_the_run_by_name_and_costs_nothing_that_was_acknowledged() {
     fit(folder.path(), "whole", &format!("{FLAGS} --progress none")).done();
     let full = resume(folder.path(), "small/out");
     assert_eq!(full.code, Some(3), "{}", full.stderr);
-    for phrase in ["cannot write the journal small/out/run.sqlite: the disk is full", "go on with --resume"] {
+    for phrase in ["cannot write the journal small/out/run.sqlite: the disk is full", "continue with --resume"] {
         assert!(full.stderr.contains(phrase), "{}", full.stderr);
     }
     disk.grow("64m");

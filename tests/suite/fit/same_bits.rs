@@ -11,8 +11,8 @@ use lookalike::{
     render::subset::SampleCount,
 };
 use lookalike_app::{
-    inputs::{CaptureFiles, load_capture, resolve_display_exposure},
-    settings::{CameraSpec, DisplayExposure, EnvironmentSettings, ViewSettings},
+    inputs::{load_capture, resolve_display_exposure},
+    settings::{CaptureSettings, DisplayExposure, EnvironmentSettings, ViewSettings},
 };
 use lookalike_tests::process::{Process, signal};
 use serde_json::{Value, json};
@@ -87,9 +87,9 @@ fn in_this_process(folder: &Path, level: Level) -> FitOutcome {
     static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
     let _guard = ONE_AT_A_TIME.lock().unwrap_or_else(PoisonError::into_inner);
     let environment = EnvironmentSettings { path: folder.join("map.exr"), mapping: None, rotation_deg: 0.0 };
-    let view = ViewSettings { camera: CameraSpec::Orthographic, normals: None };
+    let view = ViewSettings { camera: lookalike::scene::Camera::Orthographic, normals: None };
     let photo = folder.join("photo.exr");
-    let files = CaptureFiles { photo: &photo, mask: None, environment: &environment, view: &view, sphere: None };
+    let files = CaptureSettings { photo, mask: None, environment, view, sphere: None };
     let capture = load_capture(&files).unwrap().capture;
     let coverage = capture.scoring_coverage();
     let exposure = resolve_display_exposure(&DisplayExposure::Auto, capture.photo(), &coverage).unwrap();

@@ -5,10 +5,11 @@ use lookalike::graph::BlobHash;
 use lookalike::protocol::{
     FailureKind, FrameTag, LeaseName, PART_BYTES, ToCoordinator, ToWorker, encode_message, frame_header,
 };
-use lookalike_coordinator::comm::{Departure, RunEvent};
-use lookalike_coordinator::core::Policy;
+use lookalike_coordinator::events::{Departure, RunEvent};
 use lookalike_coordinator::limits::Limits;
+use lookalike_coordinator::reactor::Stop;
 use lookalike_coordinator::runner::{RunError, RunnerOptions};
+use lookalike_coordinator::state::Policy;
 use lookalike_tests::cluster::{Cluster, options};
 use lookalike_tests::gate::Gate;
 use lookalike_tests::plan::{Leaves, TestPlanner};
@@ -210,7 +211,7 @@ fn wrong_output_is_found_out_where_outputs_are_verified() {
     hear(&mut liar, |message| matches!(message, ToWorker::Acknowledge(_)).then_some(()));
     let honest = worker(&cluster.access_file());
     let error = cluster.error();
-    assert!(matches!(error, RunError::ResultsDiffer { .. }), "{error}");
+    assert!(matches!(error, RunError::Stop(Stop::ResultsDiffer { .. })), "{error}");
     let text = error.to_string();
     assert!(text.contains("from worker 1") && text.contains("from worker 2"), "{text}");
     assert_eq!(honest.output().status.code(), Some(0));

@@ -5,7 +5,7 @@
 //! was given out again, no innocent node has failed, nobody has left or ended without a reason.
 
 mod chance;
-mod deeds;
+mod events;
 mod processes;
 mod run;
 mod stage;

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use lookalike::graph::WorkerId;
-use lookalike_coordinator::comm::{Departure, RunEvent};
+use lookalike_coordinator::events::{Departure, RunEvent};
 use lookalike_coordinator::journal::{JournalOptions, RunIdentity};
 use lookalike_coordinator::policy::{Policy, Speculation};
 use lookalike_coordinator::runner::{self, RunnerOptions};

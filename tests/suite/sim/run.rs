@@ -9,13 +9,13 @@ use std::time::{Duration, SystemTime};
 
 use lookalike::graph::{Execution, run_in_process};
 use lookalike_coordinator::access::Credentials;
-use lookalike_coordinator::core::RunSummary;
+use lookalike_coordinator::state::RunSummary;
 use lookalike_tests::journal::JournalView;
 use tempfile::TempDir;
 use turmoil::{Builder, Sim};
 
 use super::chance::Chance;
-use super::deeds::{Deed, Link};
+use super::events::{Event, Link};
 use super::processes::{PORT, coordinate, policy, work};
 use super::stage::{Place, Stage};
 use super::web::{Web, registry};
@@ -66,7 +66,7 @@ pub(super) struct Run {
     pub(super) chance: Chance,
     pub(super) workers: usize,
     /// By time, then in the order in which they were planned.
-    pub(super) deeds: BTreeMap<(Duration, u64), Deed>,
+    pub(super) events: BTreeMap<(Duration, u64), Event>,
     pub(super) planned: u64,
     pub(super) faults_left: u64,
     /// The longest time between two faults, in milliseconds.
@@ -124,7 +124,7 @@ impl Run {
             sim,
             chance,
             workers,
-            deeds: BTreeMap::new(),
+            events: BTreeMap::new(),
             planned: 0,
             faults_left,
             pause_ms,
@@ -141,11 +141,11 @@ impl Run {
     fn go_on(&mut self) -> Result<(), String> {
         loop {
             self.sim.step().map_err(|error| format!("a process has panicked: {error}"))?;
-            self.bury();
+            self.mark_dead();
             let now = self.sim.elapsed();
-            while let Some(next) = self.deeds.first_entry().filter(|next| next.key().0 <= now) {
-                let deed = next.remove();
-                self.perform(deed);
+            while let Some(next) = self.events.first_entry().filter(|next| next.key().0 <= now) {
+                let event = next.remove();
+                self.perform(event);
             }
             let state = self.stage.state();
             if let Some(wrong) = state.wrong.first() {

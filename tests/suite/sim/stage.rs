@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use std::sync::{Mutex, MutexGuard, PoisonError, Weak};
 use std::time::Duration;
 
-use lookalike_coordinator::core::RunSummary;
+use lookalike_coordinator::state::RunSummary;
 use lookalike_worker::ending::Wishes;
 
 use super::wire::Fate;

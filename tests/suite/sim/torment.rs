@@ -2,11 +2,11 @@
 
 use std::time::Duration;
 
-use super::deeds::{Deed, Fault, Link};
+use super::events::{Event, Fault, Link};
 use super::run::Run;
 use super::stage::Place;
 
-/// How many coordinators are killed at most: after each, workers are waited for.
+/// How many coordinators are killed at most.
 const MOST_COORDINATORS: u32 = 4;
 
 impl Run {
@@ -15,61 +15,64 @@ impl Run {
         if self.faults_left > 0 {
             self.faults_left -= 1;
             let pause = self.chance.time(0, self.pause_ms);
-            self.plan(pause, Deed::Fault);
+            self.plan(pause, Event::Fault);
         }
     }
 
     /// Do something after a while.
-    fn plan(&mut self, after: Duration, deed: Deed) {
+    fn plan(&mut self, after: Duration, event: Event) {
         self.planned += 1;
-        self.deeds.insert((self.sim.elapsed() + after, self.planned), deed);
+        self.events.insert((self.sim.elapsed() + after, self.planned), event);
     }
 
-    pub(super) fn perform(&mut self, deed: Deed) {
-        match deed {
-            Deed::Fault => {
+    pub(super) fn perform(&mut self, event: Event) {
+        match event {
+            Event::Fault => {
                 let (fault, victim) = (Fault::draw(&mut self.chance), self.chance.index(self.workers));
                 if self.hurt(fault, victim) {
                     *self.faults.entry(fault.name()).or_default() += 1;
                 }
                 self.plan_fault();
             }
-            Deed::MendLink(index, link) => self.mend(index, link),
-            Deed::Reset(fate) => fate.upgrade().iter().for_each(|fate| fate.reset()),
-            Deed::Start(place) => {
+            Event::MendLink(index, link) => self.mend(index, link),
+            Event::Reset(fate) => fate.upgrade().iter().for_each(|fate| fate.reset()),
+            Event::Start(place) => {
                 self.absent.remove(&place);
                 if place == Place::Coordinator {
                     self.stage.state().joined.clear();
                 }
                 self.sim.bounce(place.host());
             }
-            Deed::Unstick(index) => _ = self.stage.state().stuck.remove(&Place::Worker(index)),
-            Deed::Hurry(index) => _ = self.stage.state().slow.remove(&Place::Worker(index)),
-            Deed::Insist(wishes) => wishes.end.cancel(),
+            Event::Unstick(index) => _ = self.stage.state().stuck.remove(&Place::Worker(index)),
+            Event::Hurry(index) => _ = self.stage.state().slow.remove(&Place::Worker(index)),
+            Event::Insist(wishes) => wishes.end.cancel(),
         }
     }
 
     /// Do harm to a worker, or to the coordinator. Whether that was possible.
     fn hurt(&mut self, fault: Fault, index: usize) -> bool {
         let time = fault.time(&mut self.chance);
-        let place = if fault == Fault::KillCoordinator { Place::Coordinator } else { Place::Worker(index) };
+        let is_coordinator = matches!(fault, Fault::KillCoordinator | Fault::KillAll);
+        let place = if is_coordinator { Place::Coordinator } else { Place::Worker(index) };
         let needs_link = matches!(fault, Fault::Link(_) | Fault::PowerOff);
         if self.absent.contains(&place) || needs_link && self.broken.contains_key(&index) {
             return false;
         }
-        if fault == Fault::KillCoordinator && self.faults.get(fault.name()) == Some(&MOST_COORDINATORS) {
+        let kills = [Fault::KillCoordinator, Fault::KillAll].map(|fault| self.faults.get(fault.name()).copied());
+        if is_coordinator && kills.into_iter().flatten().sum::<u32>() >= MOST_COORDINATORS {
             return false;
         }
         let wishes = self.stage.state().wishes.get(&place).cloned();
         self.stage.note(self.sim.elapsed(), place, &format!("* {} for {time:?}", fault.name()));
         match fault {
-            Fault::Link(Link::Slow) | Fault::SlowDown | Fault::KillCoordinator => {}
+            Fault::Link(Link::Slow) | Fault::SlowDown | Fault::KillCoordinator | Fault::KillAll => {}
             _ => self.harm(place),
         }
         match fault {
             Fault::Link(link) => self.break_link(index, link, time),
             Fault::ResetConnections => self.reset_ends(index, time),
             Fault::KillWorker | Fault::KillCoordinator => self.kill(place, time),
+            Fault::KillAll => self.kill_all(time),
             Fault::PowerOff => {
                 self.break_link(index, Link::Cut, time);
                 self.kill(place, time);
@@ -78,17 +81,17 @@ impl Run {
                 let Some(wishes) = wishes else { return false };
                 wishes.drain.cancel();
                 if self.chance.happens(0.3) {
-                    self.plan(time, Deed::Insist(wishes));
+                    self.plan(time, Event::Insist(wishes));
                 }
             }
             Fault::Stick => {
                 self.stage.state().stuck.insert(place);
-                self.plan(time, Deed::Unstick(index));
+                self.plan(time, Event::Unstick(index));
             }
             Fault::SlowDown => {
                 let factor = u32::try_from(self.chance.between(2, 5)).unwrap_or(2);
                 self.stage.state().slow.insert(place, factor);
-                self.plan(time, Deed::Hurry(index));
+                self.plan(time, Event::Hurry(index));
             }
         }
         true
@@ -100,13 +103,26 @@ impl Run {
         self.stage.state().harmed.insert(process);
     }
 
+    /// Kill the coordinator and about half of the workers, which come back later than it, most of them one after the other.
+    fn kill_all(&mut self, time: Duration) {
+        self.kill(Place::Coordinator, time);
+        for index in 0..self.workers {
+            let place = Place::Worker(index);
+            if self.chance.happens(0.5) && !self.absent.contains(&place) {
+                self.harm(place);
+                let after = time + self.chance.time(0, 15_000);
+                self.kill(place, after);
+            }
+        }
+    }
+
     fn kill(&mut self, place: Place, time: Duration) {
         self.crash(place);
         if place == Place::Coordinator {
             self.coordinators_ended.push(self.sim.elapsed());
         }
         self.gone(place);
-        self.plan(time, Deed::Start(place));
+        self.plan(time, Event::Start(place));
     }
 
     /// End a process. In which order its connections end depends on how many tasks there ever were in the test's process, so none
@@ -159,7 +175,7 @@ impl Run {
         if matches!(link, Link::Cut | Link::CutDown | Link::CutUp) && self.chance.happens(0.5) {
             self.reset_ends(index, time + Duration::from_secs(2));
         }
-        self.plan(time, Deed::MendLink(index, link));
+        self.plan(time, Event::MendLink(index, link));
     }
 
     fn mend(&mut self, index: usize, link: Link) {
@@ -188,12 +204,12 @@ impl Run {
         let most = u64::try_from(within.as_millis()).unwrap_or(0);
         for (_, fate) in self.stage.wires(Place::Worker(index)) {
             let after = self.chance.time(0, most);
-            self.plan(after, Deed::Reset(fate));
+            self.plan(after, Event::Reset(fate));
         }
     }
 
     /// See to the processes that have come to their end.
-    pub(super) fn bury(&mut self) {
+    pub(super) fn mark_dead(&mut self) {
         let mut state = self.stage.state();
         let (doomed, ended) = (std::mem::take(&mut state.doomed), std::mem::take(&mut state.ended));
         drop(state);
@@ -209,7 +225,7 @@ impl Run {
             }
             let pause = self.chance.time(10, 3000);
             self.gone(Place::Worker(index));
-            self.plan(pause, Deed::Start(Place::Worker(index)));
+            self.plan(pause, Event::Start(Place::Worker(index)));
         }
     }
 }

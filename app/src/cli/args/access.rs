@@ -13,10 +13,10 @@ pub(crate) struct AccessArgs {
 
 #[derive(Debug, Subcommand)]
 enum AccessCommand {
-    /// Make a new access file for workers, and beside it the key for their coordinator
+    /// Create an access file for workers and, beside it, the key for the coordinator
     #[command(args_override_self = true, after_long_help = EXAMPLE)]
     New {
-        /// Host and port under which workers will reach the coordinator
+        /// Host and port where workers will reach the coordinator, for example node7:4100
         #[arg(long, value_name = "HOST:PORT", value_parser = with_port)]
         address: Advertise,
         /// File to write, readable by its owner only; the key goes beside it, cluster.key.pem to cluster.json
@@ -44,5 +44,6 @@ fn with_port(text: &str) -> anyhow::Result<Advertise> {
 const EXAMPLE: &str = "\
 Copy the access file to the workers, and keep the key with the coordinator; both are valid for two years. Example:
   lookalike access new --address node7:4100 -o cluster.json
-  lookalike fit ball.exr --env garden.hdr --out run --workers 0 --listen 10.0.0.7:4100 --access cluster.json
+  lookalike fit ball.exr --env garden.hdr --out run --workers 0 \\
+    --listen 10.0.0.7:4100 --access cluster.json
   lookalike worker --access cluster.json";

@@ -4,7 +4,7 @@ use super::{
     cluster::ClusterArgs,
     fit::{DiagnosticsArgs, score},
     method::MethodArgs,
-    scene::{EnvironmentArgs, PhotoArgs, SphereArgs, ViewArgs},
+    scene::CaptureArgs,
 };
 use crate::settings::{BatchFit, BatchSettings, JobSettings, OnFailure, Preset, StageTwo};
 use clap::{Args, Parser};
@@ -16,7 +16,7 @@ pub(crate) struct BatchArgs {
     /// TOML file that lists the fits
     #[arg(value_name = "MANIFEST.toml")]
     pub(crate) manifest: PathBuf,
-    /// They win over what the manifest says.
+    /// These override the manifest.
     #[command(flatten)]
     method: MethodArgs,
     /// Flags of the method that were given, as they were typed.
@@ -25,17 +25,17 @@ pub(crate) struct BatchArgs {
     /// The whole command line, the command first.
     #[arg(skip)]
     pub(crate) typed: Vec<OsString>,
-    /// Folder of results, one subfolder per fit; must not hold a run, unless --resume or --force is given
+    /// Folder for the results, one subfolder per fit; it must not already hold a run, unless --resume or --force is given
     #[arg(long, short, value_name = "DIR", help_heading = "Output")]
     out: PathBuf,
-    /// Go on with the other fits when one fails [default]
+    /// Continue with the other fits when one fails [default]
     #[arg(long, overrides_with = "fail_fast", help_heading = "Output")]
     keep_going: bool,
-    /// End the run when one fit fails
+    /// Stop the run when one fit fails
     #[arg(long, overrides_with = "keep_going", help_heading = "Output")]
     fail_fast: bool,
-    /// Go on with the run that is in the folder: fits that are complete stay, what was acknowledged of the others is not computed
-    /// again, those that failed are tried again. Begins one if there is none
+    /// Resume the run in the folder: complete fits are kept, acknowledged results are not computed again, failed fits are
+    /// retried. Starts a run if there is none
     #[arg(long, help_heading = "Output")]
     resume: bool,
     /// Replace files with our names in the folder, never an input and never through a symbolic link
@@ -46,10 +46,10 @@ pub(crate) struct BatchArgs {
     /// Where candidates are rendered, judged and polished; the results are the same
     #[arg(long, value_name = "WHERE", value_enum, default_value_t, help_heading = "Workers")]
     stage_two: StageTwo,
-    /// Submit the run to Slurm, which starts coordinator and workers where there is room, and return
+    /// Submit the run to Slurm as a job that starts the coordinator and the workers, and return
     #[arg(long, conflicts_with_all = ["workers", "listen", "advertise", "access"], help_heading = "Workers")]
     slurm: bool,
-    /// With --slurm: options of sbatch, such as --nodes=4 --cpus-per-task=16 --time=2:00:00
+    /// Options of sbatch, with --slurm, for example --nodes=4 --cpus-per-task=16 --time=2:00:00
     #[arg(last = true, requires = "slurm", value_name = "SBATCH_OPTION")]
     sbatch: Vec<String>,
     #[command(flatten)]
@@ -85,16 +85,10 @@ impl BatchArgs {
 #[command(name = "fit", no_binary_name = true, args_override_self = true, disable_help_flag = true)]
 pub(crate) struct EntryArgs {
     #[command(flatten)]
-    photo: PhotoArgs,
-    #[command(flatten)]
-    environment: EnvironmentArgs,
-    #[command(flatten)]
-    view: ViewArgs,
-    #[command(flatten)]
-    sphere: SphereArgs,
+    capture: CaptureArgs,
     #[command(flatten)]
     method: MethodArgs,
-    /// Count the fit as missed if the final CSSIM lies above this
+    /// Count the fit as missed if its final CSSIM is above X
     #[arg(long, value_name = "X", value_parser = score, allow_negative_numbers = true)]
     max_cssim: Option<f64>,
 }
@@ -106,18 +100,12 @@ impl EntryArgs {
 
     /// The settings of the fit `name`, which a line of the manifest asks for.
     pub(crate) fn into_settings(self, name: String, line: usize) -> anyhow::Result<BatchFit> {
-        self.photo.check_gain()?;
-        self.sphere.check(&self.view)?;
         Ok(BatchFit {
             name,
             line,
-            photo: self.photo.photo,
-            mask: self.photo.mask,
-            environment: self.environment.into_settings(),
-            view: self.view.into_settings(),
-            sphere: self.sphere.sphere,
+            capture: self.capture.into_settings()?,
             display_exposure: self.method.display_exposure.clone(),
-            method: self.method.into_settings(),
+            method: self.method.into_method()?,
             max_cssim: self.max_cssim,
         })
     }
@@ -128,7 +116,8 @@ Examples:
   lookalike batch balls.toml --out runs
   lookalike batch balls.toml --out runs --seed 3 --fail-fast
   lookalike batch balls.toml --out runs --resume
-  lookalike batch balls.toml --out runs --workers 0 --listen 10.0.0.1:4100 --stage-two workers --metrics 9100
+  lookalike batch balls.toml --out runs --workers 0 --listen 10.0.0.1:4100 --stage-two workers
+  lookalike batch balls.toml --out runs --metrics 9100
   lookalike batch balls.toml --out runs --slurm -- --nodes=4 --cpus-per-task=16 --time=2:00:00
 
 where balls.toml is, for instance (its relative paths are relative to the file):
@@ -147,4 +136,5 @@ where balls.toml is, for instance (its relative paths are relative to the file):
   sphere = [128, 128, 100]
   max-cssim = 0.05
 
-docs/batch.md has the whole grammar, docs/cluster.md more on Slurm. The exit code is 4 if a fit failed, else 1 if one missed its max-cssim, else 0.";
+docs/batch.md has the whole grammar, docs/cluster.md more on Slurm. The exit code is 4 if a fit failed, \
+else 1 if one missed its max-cssim, else 0.";

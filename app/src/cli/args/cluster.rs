@@ -1,4 +1,4 @@
-//! Flags of the coordinator: where workers come from and how long it waits for them.
+//! Flags of the coordinator: where its workers come from.
 
 use super::policy::PolicyArgs;
 use crate::settings::{Advertise, ClusterSettings, Workers};
@@ -9,16 +9,20 @@ use std::{net::SocketAddr, path::PathBuf};
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Workers")]
 pub(crate) struct ClusterArgs {
-    /// Local worker processes to start: auto is one per core, 0 waits for remote ones
+    /// Worker processes to start on this machine: auto starts one per core. 0 starts none, so that only workers on other
+    /// machines compute; they join through --listen
     #[arg(long, value_name = "N", default_value_t, allow_negative_numbers = true)]
     workers: Workers,
-    /// IP address and port to listen on for workers; port 0 lets the system choose [default: 127.0.0.1:0]
+    /// IP address and port where workers on other machines join, for example 10.0.0.1:4100; port 0 lets the system choose
+    /// [default: 127.0.0.1:0]
     #[arg(long, value_name = "ADDR")]
     listen: Option<SocketAddr>,
-    /// What the access file tells workers to connect to: HOST or HOST:PORT [default: the address listened on]
+    /// HOST or HOST:PORT that workers connect to, if it is not the address of --listen; it is written to the access file
+    /// [default: the address listened on]
     #[arg(long, value_name = "A")]
     advertise: Option<Advertise>,
-    /// Access file made beforehand with lookalike access new, its key beside it [default: a new one, OUT/access.json]
+    /// Access file from lookalike access new, with its key beside it: workers can then be started before the run
+    /// [default: a new one, OUT/access.json]
     #[arg(long, value_name = "FILE", conflicts_with = "advertise")]
     access: Option<PathBuf>,
     #[command(flatten)]
@@ -30,8 +34,8 @@ impl ClusterArgs {
         let everywhere = self.listen.filter(|listen| listen.ip().is_unspecified());
         if let (Some(listen), None, None) = (everywhere, &self.advertise, &self.access) {
             bail!(
-                "--listen {listen} accepts connections on every interface but is no address to connect to; say under which \
-                 name workers reach this machine with --advertise HOST"
+                "--listen {listen} accepts connections on every interface, but workers need one address to connect to; give \
+                 the name or address of this machine with --advertise HOST"
             );
         }
         Ok(ClusterSettings {

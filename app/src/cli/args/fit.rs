@@ -1,10 +1,6 @@
 //! `lookalike fit`.
 
-use super::{
-    cluster::ClusterArgs,
-    method::MethodArgs,
-    scene::{EnvironmentArgs, PhotoArgs, SphereArgs, ViewArgs},
-};
+use super::{cluster::ClusterArgs, method::MethodArgs, scene::CaptureArgs};
 use crate::settings::{FitSettings, MetricsAddress, ProgressKind};
 use anyhow::bail;
 use clap::Args;
@@ -14,13 +10,7 @@ use std::path::PathBuf;
 #[command(args_override_self = true, after_long_help = EXAMPLES)]
 pub(crate) struct FitArgs {
     #[command(flatten)]
-    photo: PhotoArgs,
-    #[command(flatten)]
-    environment: EnvironmentArgs,
-    #[command(flatten)]
-    view: ViewArgs,
-    #[command(flatten)]
-    sphere: SphereArgs,
+    capture: CaptureArgs,
     #[command(flatten)]
     pub(crate) method: MethodArgs,
     #[command(flatten)]
@@ -34,14 +24,14 @@ pub(crate) struct FitArgs {
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Output")]
 struct OutputArgs {
-    /// Folder of results; must not hold a run, unless --resume or --force is given
+    /// Folder for the results; it must not already hold a run, unless --resume or --force is given
     #[arg(long, short, value_name = "DIR")]
     out: PathBuf,
-    /// Exit with code 1 if the final CSSIM lies above this
+    /// Exit with code 1 if the final CSSIM is above X, for example 0.05; 0 is a perfect match
     #[arg(long, value_name = "X", value_parser = score, allow_negative_numbers = true)]
     max_cssim: Option<f64>,
-    /// Go on with the run that is in the folder: what was acknowledged is not computed again. Begins one if there is none, and is
-    /// done at once if it is finished
+    /// Resume the run in the folder without computing its acknowledged results again. Starts a run if there is none; only
+    /// checks the results of a finished one
     #[arg(long)]
     resume: bool,
     /// Replace files with our names in the folder, never an input and never through a symbolic link
@@ -55,23 +45,17 @@ pub(crate) struct DiagnosticsArgs {
     /// How progress is shown on stderr
     #[arg(long, value_name = "PROGRESS", value_enum, default_value_t)]
     pub(super) progress: ProgressKind,
-    /// Serve metrics for Prometheus: IP:PORT, or PORT for the loopback interface
+    /// Serve metrics for Prometheus at IP:PORT, or at PORT of the loopback interface, for example 9100
     #[arg(long, value_name = "ADDR")]
     pub(super) metrics: Option<MetricsAddress>,
 }
 
 impl FitArgs {
     pub(crate) fn into_settings(self) -> anyhow::Result<FitSettings> {
-        self.photo.check_gain()?;
-        self.sphere.check(&self.view)?;
         Ok(FitSettings {
-            photo: self.photo.photo,
-            mask: self.photo.mask,
-            environment: self.environment.into_settings(),
-            view: self.view.into_settings(),
-            sphere: self.sphere.sphere,
+            capture: self.capture.into_settings()?,
             display_exposure: self.method.display_exposure.clone(),
-            method: self.method.into_settings(),
+            method: self.method.into_method()?,
             max_cssim: self.output.max_cssim,
             out: self.output.out,
             resume: self.output.resume,

@@ -1,48 +1,51 @@
 //! Flags of the method.
 
-use super::super::preset;
-use crate::settings::{
-    DisplayExposure, Gammas, Integrator, Judge, MethodSettings, ModelName, Preset, Samples, Sampling, SearchKind,
-};
+use super::{super::preset, choice::choice};
+use crate::settings::{DisplayExposure, ModelName, Preset};
 use clap::{Args, ValueEnum};
-use std::num::NonZeroUsize;
+use lookalike::{
+    brdf,
+    fit::{Gammas, Integration, JudgedBy, Method, SearchKind},
+    render::subset::{SampleCount, Sampling},
+};
+use std::num::NonZeroU32;
 
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Method")]
 pub(crate) struct MethodArgs {
-    /// A bundle of settings; flags given as well win over it. paper: cook-torrance, 256 samples, pattern search from the
-    /// paper's one start, 21 gammas, no polish
+    /// Bundle of settings; flags that are given as well override it
     #[arg(long, value_name = "PRESET", value_enum)]
     pub(crate) preset: Option<Preset>,
     /// BRDF model: ggx, ggx-f90, cook-torrance, ward, blinn-phong, ashikhmin-shirley, disney
     #[arg(long, value_name = "NAME", default_value_t)]
     model: ModelName,
-    /// Exponents of the cost that are tried: START:STOP:STEP, or one number
+    /// Gammas of the cost to try, one search each: START:STOP:STEP, or one number
     #[arg(long, value_name = "A:B:STEP", default_value_t, allow_negative_numbers = true)]
     gammas: Gammas,
-    /// Pixels that the searches look at: a number of draws, or full
+    /// Pixels that the searches compare: a number of random draws, or full for all usable pixels
     #[arg(long, value_name = "N|full", default_value_t, allow_negative_numbers = true)]
-    samples: Samples,
+    samples: SampleCount,
     /// How these pixels are drawn
-    #[arg(long, value_name = "SAMPLING", value_enum, default_value_t)]
+    #[arg(long, value_name = "SAMPLING", value_parser = choice::<Sampling>(), default_value_t)]
     sampling: Sampling,
-    /// Independent subsets of pixels to search; more candidates for proportionally more time
+    /// Number of independent pixel subsets to search; candidates and time grow in proportion
     #[arg(long, value_name = "K", default_value = "1", allow_negative_numbers = true)]
-    subsets: NonZeroUsize,
+    subsets: NonZeroU32,
     /// How the cost is minimised
-    #[arg(long, value_name = "SEARCH", value_enum, default_value_t)]
+    #[arg(long, value_name = "SEARCH", value_parser = choice::<SearchKind>(), default_value_t)]
     search: SearchKind,
-    /// How the searches render their pixels: by transport tables, or direct[:SAMPLES], by Monte Carlo integration in every
-    /// evaluation as in the paper, which takes thousands of times longer and needs --search pattern
+    /// How the searches render their pixels: tables, or direct[:SAMPLES] to integrate every evaluation as in the paper (256
+    /// samples per pixel if not given), which takes thousands of times longer and needs --search pattern
     #[arg(long, value_name = "INTEGRATOR", default_value_t)]
-    integrator: Integrator,
-    /// Whether the winner is refined on the metric itself; its result is reported apart
+    integrator: Integration,
+    /// Whether to refine the winner on CSSIM itself; the result before that is reported too
     #[arg(long, value_name = "on|off", value_enum, default_value_t = Switch::On)]
     polish: Switch,
-    /// Which CSSIM selects and polishes
-    #[arg(long, value_name = "JUDGE", value_enum, default_value_t)]
-    judge: Judge,
-    /// Exposure before the metric: auto (97th percentile of the object's largest channel to 0.9), a factor, or from:FILE
+    /// Which CSSIM selects the winner and guides the polish
+    #[arg(long, value_name = "JUDGE", value_parser = choice::<JudgedBy>(), default_value_t)]
+    judge: JudgedBy,
+    /// Exposure of both images before the metric: auto (the 97th percentile of the object's largest channel becomes 0.9), a
+    /// factor, or from:FILE with the fit.json or an image of an earlier run
     #[arg(long, value_name = "E", default_value = "auto", allow_negative_numbers = true)]
     pub(crate) display_exposure: DisplayExposure,
     /// Seed of every random choice; the same inputs and seed give the same bits
@@ -51,22 +54,21 @@ pub(crate) struct MethodArgs {
 }
 
 impl MethodArgs {
-    pub(crate) fn into_settings(self) -> MethodSettings {
-        MethodSettings {
-            preset: self.preset,
-            model: self.model,
-            gammas: self.gammas,
+    pub(crate) fn into_method(self) -> anyhow::Result<Method> {
+        Ok(Method {
+            model: brdf::model(self.model.as_str())?,
+            gammas: self.gammas.values(),
             samples: self.samples,
             sampling: self.sampling,
-            subsets: self.subsets,
+            subsets: self.subsets.get(),
             search: self.search,
-            integrator: self.integrator,
+            integration: self.integrator,
             start: preset::start(self.preset),
-            compress_at_zero: preset::compress_at_zero(self.preset),
+            compress: preset::compress(self.preset),
             polish: matches!(self.polish, Switch::On),
             judge: self.judge,
             seed: self.seed,
-        }
+        })
     }
 }
 

@@ -1,14 +1,13 @@
 //! The grammar of the command line, as clap definitions. Each command turns itself into its settings.
 //!
-//! Help texts are part of the contract: one sentence of purpose, units, defaults, and an example in `--help`. What a
-//! version does not have yet stays in the grammar and answers with [`NotThereYet`](crate::exit::NotThereYet), so that nothing is ignored silently.
+//! Help texts are part of the contract: one sentence of purpose, units, defaults, and an example in `--help`.
 
 mod access;
 mod batch;
+mod choice;
 mod cluster;
 mod compare;
 mod fit;
-mod later;
 mod method;
 mod policy;
 mod render;
@@ -39,29 +38,23 @@ pub(crate) struct Cli {
 
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
-    /// Fit a bundled scene with local workers, to see everything at work
+    /// Fit a bundled scene with local workers, as a first try
     Demo(DemoArgs),
     /// Fit a BRDF model to a photo of an object under known light
     Fit(Box<FitArgs>),
     /// Fit many photos as one run
     Batch(Box<BatchArgs>),
-    /// Show the state of a run: going on, stopped or finished
+    /// Show the state of a run: running, stopped or finished
     Status(status::StatusArgs),
     /// Render a sphere, or a map of normals, of one material under one light
     Render(render::RenderArgs),
     /// Measure how different two images look
     Compare(compare::CompareArgs),
-    /// Tell what is wrong with the inputs before a fit (not there yet)
-    Check(Box<later::CheckArgs>),
-    /// Write the fitted material in another program's format (not there yet)
-    Export(later::ExportArgs),
-    /// Rebuild the paper's tables and figures on measured materials, beside rival methods
+    /// Reproduce the paper's tables and figures on measured materials, beside rival methods
     Study(Box<study::StudyArgs>),
-    /// Rebuild the report page of a run (not there yet)
-    Report(later::ReportArgs),
-    /// Make an access file before the run it is for
+    /// Create an access file, so that workers can be started before their run
     Access(access::AccessArgs),
-    /// Compute for a coordinator: the same as lookalike-worker
+    /// Compute for a coordinator, like the program lookalike-worker
     #[command(after_long_help = "Example:\n  lookalike worker --access run/access.json --threads 8")]
     Worker(lookalike_worker::Arguments),
 }
@@ -79,13 +72,13 @@ impl Command {
 #[derive(Debug, Args)]
 #[command(args_override_self = true, after_long_help = "Example:\n  lookalike demo --out /tmp/demo")]
 pub(crate) struct DemoArgs {
-    /// Folder of results; replaces an earlier demo, and nothing else
+    /// Folder for the results; files of an earlier demo there are replaced, no others
     #[arg(long, short, value_name = "DIR", default_value = "lookalike-demo", help_heading = "Output")]
     out: PathBuf,
     /// Replace files with our names in the folder, also those of no demo
     #[arg(long, help_heading = "Output")]
     force: bool,
-    /// Local worker processes; auto is one per core
+    /// Worker processes to start: auto starts one per core
     #[arg(long, value_name = "N", default_value_t, help_heading = "Workers")]
     workers: Workers,
     /// How progress is shown on stderr
@@ -105,14 +98,6 @@ impl DemoArgs {
 /// Accepts what the log filter's own grammar accepts.
 fn log_filter(text: &str) -> Result<String, tracing_subscriber::filter::ParseError> {
     tracing_subscriber::EnvFilter::try_new(text).map(|_| text.to_owned())
-}
-
-/// Accepts a finite number.
-fn finite(text: &str) -> anyhow::Result<f64> {
-    match text.parse::<f64>() {
-        Ok(number) if number.is_finite() => Ok(number),
-        _ => bail!("expected a finite number"),
-    }
 }
 
 const VERSION: &str = concat!(

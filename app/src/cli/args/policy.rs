@@ -3,27 +3,27 @@
 use anyhow::bail;
 use clap::Args;
 use lookalike_coordinator::policy::{Policy, Speculation};
-use std::{str::FromStr, time::Duration};
+use std::{fmt, str::FromStr, time::Duration};
 
 #[derive(Debug, Args)]
 pub(crate) struct PolicyArgs {
     /// How long to wait for the first worker, such as 10min or 90s
-    #[arg(long, value_name = "T", default_value = "10min", value_parser = humantime::parse_duration)]
+    #[arg(long, value_name = "T", default_value_t = Time(Policy::default().wait_for_workers))]
     #[arg(help_heading = "Workers")]
-    wait_for_workers: Duration,
+    wait_for_workers: Time,
     /// How long to wait for another worker after losing the last
-    #[arg(long, value_name = "T", default_value = "60s", value_parser = humantime::parse_duration)]
+    #[arg(long, value_name = "T", default_value_t = Time(Policy::default().grace))]
     #[arg(help_heading = "Workers")]
-    grace: Duration,
+    grace: Time,
     /// How often a worker tells that it lives
-    #[arg(long, value_name = "T", default_value = "1s", value_parser = humantime::parse_duration)]
+    #[arg(long, value_name = "T", default_value_t = Time(Policy::default().heartbeat))]
     #[arg(help_heading = "Policy", hide_short_help = true)]
-    heartbeat: Duration,
+    heartbeat: Time,
     /// A worker that was not heard of for this long is lost, and so is one that reads nothing for this long; at least two
     /// heartbeats
-    #[arg(long, value_name = "T", default_value = "5s", value_parser = humantime::parse_duration)]
+    #[arg(long, value_name = "T", default_value_t = Time(Policy::default().lost_after))]
     #[arg(help_heading = "Policy", hide_short_help = true)]
-    lost_after: Duration,
+    lost_after: Time,
     /// How many nodes a worker is given beyond its threads, so that it never waits for the next one
     #[arg(long, value_name = "N", default_value_t = Policy::default().spare_leases)]
     #[arg(help_heading = "Policy", hide_short_help = true)]
@@ -42,17 +42,39 @@ pub(crate) struct PolicyArgs {
     #[arg(help_heading = "Policy", hide_short_help = true)]
     speculate: Speculate,
     /// A node that has not run for this long is not slow
-    #[arg(long, value_name = "T", default_value = "5s", value_parser = humantime::parse_duration)]
+    #[arg(long, value_name = "T", default_value_t = Time(Policy::default().speculation.after))]
     #[arg(help_heading = "Policy", hide_short_help = true)]
-    speculate_after: Duration,
+    speculate_after: Time,
     /// The share of transport nodes, from 0 to 1, that is run again on another worker, to compare the outputs bit for bit
-    #[arg(long, value_name = "F", default_value_t = 0.0, allow_negative_numbers = true)]
+    #[arg(long, value_name = "F", default_value_t = Policy::default().verify_fraction, allow_negative_numbers = true)]
     #[arg(help_heading = "Policy", hide_short_help = true)]
     verify_fraction: f64,
     /// How long a worker that is asked to end may take to finish what it executes, unless it was told otherwise
-    #[arg(long, value_name = "T", default_value = "30s", value_parser = humantime::parse_duration)]
+    #[arg(long, value_name = "T", default_value_t = Time(Policy::default().drain_time))]
     #[arg(help_heading = "Policy", hide_short_help = true)]
-    drain_time: Duration,
+    drain_time: Time,
+}
+
+/// A duration, written as in the help text: `60s`, `10min`.
+#[derive(Clone, Copy, Debug)]
+struct Time(Duration);
+
+impl fmt::Display for Time {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.0.as_secs() {
+            _ if self.0.subsec_nanos() > 0 => humantime::format_duration(self.0).fmt(formatter),
+            seconds if seconds >= 120 && seconds % 60 == 0 => write!(formatter, "{}min", seconds / 60),
+            seconds => write!(formatter, "{seconds}s"),
+        }
+    }
+}
+
+impl FromStr for Time {
+    type Err = humantime::DurationError;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        humantime::parse_duration(text).map(Self)
+    }
 }
 
 /// How much slower than usual a slow node is; none: no node is slow.
@@ -77,16 +99,16 @@ impl FromStr for Speculate {
 impl PolicyArgs {
     pub(crate) fn into_policy(self) -> anyhow::Result<Policy> {
         let policy = Policy {
-            heartbeat: self.heartbeat,
-            lost_after: self.lost_after,
+            heartbeat: self.heartbeat.0,
+            lost_after: self.lost_after.0,
             spare_leases: self.spare_leases,
             suspect_after: self.suspect_after,
             node_crashes: self.node_crashes,
-            speculation: Speculation { factor: self.speculate.0, after: self.speculate_after },
+            speculation: Speculation { factor: self.speculate.0, after: self.speculate_after.0 },
             verify_fraction: self.verify_fraction,
-            drain_time: self.drain_time,
-            wait_for_workers: self.wait_for_workers,
-            grace: self.grace,
+            drain_time: self.drain_time.0,
+            wait_for_workers: self.wait_for_workers.0,
+            grace: self.grace.0,
             ..Policy::default()
         };
         policy.check()?;

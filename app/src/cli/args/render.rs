@@ -24,7 +24,7 @@ pub(crate) struct RenderArgs {
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Input")]
 struct MaterialArgs {
-    /// Measured material, in the file format of the MERL database; instead of --model
+    /// Measured material in the file format of the MERL database, instead of --model
     #[arg(long, value_name = "FILE.binary")]
     brdf: Option<PathBuf>,
     /// BRDF model: ggx, ggx-f90, cook-torrance, ward, blinn-phong, ashikhmin-shirley or disney; needs --params
@@ -38,13 +38,13 @@ struct MaterialArgs {
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Method")]
 struct QualityArgs {
-    /// Width and height of the image in pixels; a map of normals brings its own
+    /// Width and height of the image in pixels; with --normals, the image has the size of that map
     #[arg(long, value_name = "N", default_value = "256", allow_negative_numbers = true)]
     size: NonZeroUsize,
-    /// Directions per pixel
+    /// Light directions per pixel; noise falls with their square root
     #[arg(long, value_name = "N", default_value = "1024", allow_negative_numbers = true)]
     samples: NonZeroUsize,
-    /// Seed of the directions
+    /// Seed of the directions; the same inputs and seed give the same bits
     #[arg(long, value_name = "N", default_value_t = 0, allow_negative_numbers = true)]
     seed: u64,
 }

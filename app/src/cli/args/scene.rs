@@ -1,58 +1,65 @@
 //! Flags of the scene: light, camera and shape, the object in the photo.
 
-use super::finite;
-use crate::exit::NotThereYet;
-use crate::settings::{Anchor, CameraSpec, Circle, EnvMapping, EnvironmentSettings, GainKind, ViewSettings};
+use super::choice::choice;
+use crate::settings::{CaptureSettings, EnvironmentSettings, ViewSettings};
 use anyhow::bail;
 use clap::Args;
+use lookalike::{
+    light::Mapping,
+    scene::{Camera, Circle},
+};
 use std::path::PathBuf;
 
+/// A photo with its scene.
 #[derive(Debug, Args)]
-#[command(next_help_heading = "Input")]
-pub(crate) struct PhotoArgs {
-    /// Photo of the object (.exr, .hdr, .png, .jpg), or a TOML file of settings
-    #[arg(value_name = "PHOTO", help_heading = None)]
-    pub(crate) photo: PathBuf,
-    /// Image that is white where the photo shows the object [default: what the silhouette covers]
-    #[arg(long, value_name = "FILE")]
-    pub(crate) mask: Option<PathBuf>,
-    /// Fit a gain between photo and map: scalar and rgb need an anchor (not there yet)
-    #[arg(long, value_name = "GAIN", value_enum, default_value_t)]
-    exposure_gain: GainKind,
-    /// What pins the gain down: f0=VALUE, albedo<=1 or a photo of a grey ball (not there yet)
-    #[arg(long, value_name = "ANCHOR")]
-    anchor: Option<Anchor>,
+pub(crate) struct CaptureArgs {
+    #[command(flatten)]
+    photo: PhotoArgs,
+    #[command(flatten)]
+    environment: EnvironmentArgs,
+    #[command(flatten)]
+    view: ViewArgs,
+    #[command(flatten)]
+    sphere: SphereArgs,
 }
 
-impl PhotoArgs {
-    /// Refuses the gains that this version does not fit.
-    pub(crate) fn check_gain(&self) -> anyhow::Result<()> {
-        match (self.exposure_gain, &self.anchor) {
-            (GainKind::None, None) => Ok(()),
-            (GainKind::None, Some(_)) => bail!("--anchor pins a gain down; give --exposure-gain scalar or rgb with it"),
-            (_, None) => bail!(
-                "a gain between photo and map is degenerate with the colours of the material, which can be scaled by \
-                 its inverse; say what is known with --anchor f0=VALUE, --anchor 'albedo<=1' or --anchor FILE"
-            ),
-            (_, Some(_)) => Err(NotThereYet {
-                what: "--exposure-gain with --anchor",
-                instead: "bring photo and map to one exposure beforehand and use --exposure-gain none",
-            }
-            .into()),
+impl CaptureArgs {
+    pub(crate) fn into_settings(self) -> anyhow::Result<CaptureSettings> {
+        let sphere = self.sphere.sphere;
+        if sphere.is_some() && self.view.normals.is_some() {
+            bail!("--sphere places the built-in sphere, --normals replaces it; give one of them");
         }
+        Ok(CaptureSettings {
+            photo: self.photo.photo,
+            mask: self.photo.mask,
+            environment: self.environment.into_settings(),
+            view: self.view.into_settings(),
+            sphere,
+        })
     }
 }
 
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Input")]
+struct PhotoArgs {
+    /// Photo of the object (.exr, .hdr, .png, .jpg), or a TOML file of settings
+    #[arg(value_name = "PHOTO", help_heading = None)]
+    photo: PathBuf,
+    /// Image that is white where the photo shows the object [default: all of the silhouette]
+    #[arg(long, value_name = "FILE")]
+    mask: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Input")]
 pub(crate) struct EnvironmentArgs {
-    /// Environment map of the light (.exr, .hdr), linear Rec. 709
+    /// Environment map of the light, linear Rec. 709 (.exr, .hdr, .pfm)
     #[arg(long, value_name = "MAP")]
     env: PathBuf,
-    /// Layout of the map [default: latlong if it is 2:1, cross if it is 3:4]
-    #[arg(long, value_name = "MAPPING", value_enum)]
-    env_mapping: Option<EnvMapping>,
-    /// Turn the map about +Y, in degrees
+    /// Layout of the map; needed unless it is 2:1 or 3:4 [default: latlong if it is 2:1, cross if it is 3:4]
+    #[arg(long, value_name = "MAPPING", value_parser = choice::<Mapping>())]
+    env_mapping: Option<Mapping>,
+    /// Turn the map about +Y, in degrees; 90 brings the light at +Z to +X
     #[arg(long, value_name = "DEG", default_value = "0", value_parser = finite, allow_negative_numbers = true)]
     env_rotation: f64,
 }
@@ -66,10 +73,11 @@ impl EnvironmentArgs {
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Geometry")]
 pub(crate) struct ViewArgs {
-    /// Projection: orthographic, or perspective:FOV_DEG with the vertical field of view in degrees
+    /// Projection: orthographic, or perspective:FOV_DEG with the vertical field of view of the whole photo in degrees, for
+    /// example perspective:30
     #[arg(long, value_name = "CAMERA", default_value_t)]
-    camera: CameraSpec,
-    /// World-space unit normals (.exr) of a shape other than the built-in sphere; length 0 is background
+    camera: Camera,
+    /// World-space unit normals (.exr) of a shape other than the built-in sphere; length 0 marks the background
     #[arg(long, value_name = "FILE")]
     normals: Option<PathBuf>,
 }
@@ -82,19 +90,17 @@ impl ViewArgs {
 
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Geometry")]
-pub(crate) struct SphereArgs {
-    /// Centre and radius of the sphere in the photo, in pixels from its top left corner [default: fitted to the mask,
-    /// else the inscribed circle]
+struct SphereArgs {
+    /// Centre and radius of the sphere in the photo, in pixels from the top left corner, for example 128,128,100
+    /// [default: fitted to the mask, else the largest circle in the photo]
     #[arg(long, value_name = "CX,CY,R", allow_hyphen_values = true)]
-    pub(crate) sphere: Option<Circle>,
+    sphere: Option<Circle>,
 }
 
-impl SphereArgs {
-    /// Refuses a sphere beside a map of normals.
-    pub(crate) fn check(&self, view: &ViewArgs) -> anyhow::Result<()> {
-        if self.sphere.is_some() && view.normals.is_some() {
-            bail!("--sphere places the built-in sphere, --normals replaces it; give one of them");
-        }
-        Ok(())
+/// Accepts a finite number.
+fn finite(text: &str) -> anyhow::Result<f64> {
+    match text.parse::<f64>() {
+        Ok(number) if number.is_finite() => Ok(number),
+        _ => bail!("expected a finite number"),
     }
 }

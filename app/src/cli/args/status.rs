@@ -7,10 +7,10 @@ use std::path::PathBuf;
 #[derive(Debug, Args)]
 #[command(args_override_self = true, after_long_help = EXAMPLES)]
 pub(crate) struct StatusArgs {
-    /// Folder of the run: what was given to it with --out
+    /// Folder of the run: its --out
     #[arg(value_name = "DIR")]
     run: PathBuf,
-    /// Print JSON, as docs/journal.md describes it
+    /// Print JSON; docs/journal.md describes it
     #[arg(long, help_heading = "Output")]
     json: bool,
 }

@@ -11,10 +11,10 @@ pub(crate) struct StudyArgs {
     /// TOML file that names materials, lights and experiments
     #[arg(value_name = "STUDY.toml")]
     study: PathBuf,
-    /// Folder of results; must not hold a run, unless --resume or --force is given
+    /// Folder for the results; it must not already hold a run, unless --resume or --force is given
     #[arg(long, short, value_name = "DIR", help_heading = "Output")]
     out: PathBuf,
-    /// Go on with the study that is in the folder: what is complete is not computed again. Of a complete one, write the report again
+    /// Resume the study in the folder without computing complete results again. Of a finished study, write the report again
     #[arg(long, help_heading = "Output")]
     resume: bool,
     /// Replace files with our names in the folder, never an input and never through a symbolic link
@@ -22,10 +22,10 @@ pub(crate) struct StudyArgs {
     force: bool,
     #[command(flatten)]
     cluster: ClusterArgs,
-    /// Submit the run to Slurm, which starts coordinator and workers where there is room, and return
+    /// Submit the run to Slurm as a job that starts the coordinator and the workers, and return
     #[arg(long, conflicts_with_all = ["workers", "listen", "advertise", "access"], help_heading = "Workers")]
     slurm: bool,
-    /// With --slurm: options of sbatch, such as --nodes=4 --cpus-per-task=16 --time=2:00:00
+    /// Options of sbatch, with --slurm, for example --nodes=4 --cpus-per-task=16 --time=2:00:00
     #[arg(last = true, requires = "slurm", value_name = "SBATCH_OPTION")]
     sbatch: Vec<String>,
     /// The whole command line, the command first.

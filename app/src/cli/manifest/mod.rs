@@ -14,7 +14,7 @@
 //! env = "garden.hdr"
 //! ```
 //! Every table is rewritten into flags, as a settings file is: defaults, then set or fit, then the command line, and the last one
-//! wins. All that is wrong is told at once, each with its line.
+//! wins. All problems are reported together, each with its line.
 
 mod names;
 mod patterns;
@@ -32,7 +32,7 @@ use serde::Deserialize;
 use std::{ffi::OsString, fs, ops::Range, path::Path};
 use toml::{Spanned, Value};
 
-/// More fits than any batch has: a mistake in a pattern.
+/// More fits than any batch has: most likely a mistake in a pattern.
 const MOST_FITS: usize = 100_000;
 
 /// The fits of a manifest in their order, at least one, with flags of the command line that win over all of it.
@@ -87,7 +87,7 @@ struct Reader<'a> {
     file: TomlFile<'a>,
     given: &'a [OsString],
     grammar: Command,
-    /// Keys of the whole batch: flags of `lookalike batch` that are none of a fit.
+    /// Keys of the whole batch: flags of `lookalike batch` that a fit does not have.
     of_the_batch: Vec<String>,
     defaults: Vec<OsString>,
     fits: Vec<BatchFit>,
@@ -117,10 +117,8 @@ impl<'a> Reader<'a> {
     }
 
     fn read(&mut self, content: Content) {
-        let defaults = self.settings(
-            content.defaults,
-            "[defaults] holds settings of all fits, a photo is one fit's: give it in [[fit]]",
-        );
+        let defaults =
+            self.settings(content.defaults, "a photo belongs to one fit: move it from [defaults] into a [[fit]]");
         self.defaults = defaults.flags;
         self.top([content.photos, content.environments, content.models]);
         for table in content.set {
@@ -141,15 +139,15 @@ impl<'a> Reader<'a> {
         for (list, name, setting) in [(environments, "environments", "env"), (models, "models", "model")] {
             if let Some(list) = list {
                 let error = anyhow!(
-                    "\"{name}\" at the top is for photos at the top, and there are no photos there; give them, or move it into \
-                     each [[set]], or one of it into [defaults] as \"{setting}\""
+                    "\"{name}\" at the top needs \"photos\" at the top; add them, move \"{name}\" into each [[set]], or give one \
+                     of them in [defaults] as \"{setting}\""
                 );
                 self.problem(list.span(), &error);
             }
         }
     }
 
-    /// The flags of a table; what is wrong with it is noted.
+    /// The flags of a table; its problems are noted.
     fn settings(&mut self, table: Table, photo_is_wrong: &str) -> Config {
         let (theirs, ours): (Table, Table) =
             table.into_iter().partition(|(key, _)| self.of_the_batch.contains(&key.get_ref().replace('_', "-")));
@@ -221,7 +219,7 @@ impl<'a> Reader<'a> {
         let photos = self.files("photos", Some(photos));
         let environments = self.files("environments", environments);
         let models = models.map(|list| self.models(list));
-        // Without a list, the setting has the say.
+        // Without a list, the setting decides.
         let flags_of = |flag: &str, list: Option<Vec<OsString>>| {
             list.map_or_else(|| vec![None], |list| list.into_iter().map(|value| Some(joined(flag, value))).collect())
         };
@@ -294,7 +292,8 @@ impl<'a> Reader<'a> {
         fit.name = match draft.name {
             Some(name) => name,
             None => {
-                names::of_inputs(draft.prefix.as_deref(), &fit.photo, &fit.environment.path, fit.method.model.as_str())
+                let (photo, light) = (&fit.capture.photo, &fit.capture.environment.path);
+                names::of_inputs(draft.prefix.as_deref(), photo, light, fit.method.model.name())
             }
         };
         names::check(&fit.name, names::MADE)?;

@@ -24,7 +24,7 @@ impl Names {
     }
 }
 
-/// Files that a batch writes beside the folders of its fits. What SQLite and unfinished writes put after these names is theirs as well.
+/// Files that a batch writes beside the folders of its fits. Names that SQLite and unfinished writes derive from them are reserved as well.
 const FILES: [&str; 9] = [
     "access.json",
     "access.key.pem",
@@ -40,9 +40,9 @@ const FILES: [&str; 9] = [
 /// Names that are devices on Windows, whatever follows a dot after them; COM and LPT with a digit are as well.
 const DEVICES: [&str; 4] = ["con", "prn", "aux", "nul"];
 
-/// What to do about a name that somebody gave.
+/// Advice about a name that was given.
 pub(super) const GIVEN: &str = "use another one";
-/// What to do about a name that was made of the inputs.
+/// Advice about a name that was made of the inputs.
 pub(super) const MADE: &str = "give the fit a name in a [[fit]], or rename the photo";
 
 /// Accepts what is one part of a path everywhere and one word in a log. `advice` says what else to do.
@@ -53,7 +53,7 @@ pub(super) fn check(name: &str, advice: &str) -> anyhow::Result<()> {
     if !name.chars().all(is_plain) || name.starts_with(['.', '-']) || name.ends_with('.') {
         let instead = plain(name);
         bail!(
-            "the name {name:?} would not do for a folder everywhere; use letters, digits and . _ - + only, such as {instead:?}"
+            "the name {name:?} is not a valid folder name on every system; use only letters, digits and . _ - +, such as {instead:?}"
         );
     }
     let lower = name.to_lowercase();

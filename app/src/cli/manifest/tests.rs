@@ -1,7 +1,7 @@
 //! Manifests and what they ask for; every kind of mistake, with its line.
 
 use super::*;
-use crate::settings::SearchKind;
+use lookalike::fit::SearchKind;
 use std::path::PathBuf;
 use tempfile::TempDir;
 
@@ -46,9 +46,9 @@ fn product_is_every_photo_under_every_light_with_every_model() {
         "b-n-cook-torrance",
     ];
     assert_eq!(names(&fits), expected);
-    assert_eq!(fits[7].photo, folder.path().join("in/b.exr"));
-    assert_eq!(fits[7].environment.path, folder.path().join("n.hdr"));
-    assert_eq!((fits[7].method.model.as_str(), fits[7].line), ("cook-torrance", 1));
+    assert_eq!(fits[7].capture.photo, folder.path().join("in/b.exr"));
+    assert_eq!(fits[7].capture.environment.path, folder.path().join("n.hdr"));
+    assert_eq!((fits[7].method.model.name(), fits[7].line), ("cook-torrance", 1));
 }
 
 #[test]
@@ -70,10 +70,10 @@ fn later_settings_win_defaults_then_set_or_fit_then_the_command_line() {
     assert_eq!(names(&fits), ["a-m-ggx", "other"]);
     assert_eq!((fits[0].method.seed, fits[1].method.seed), (2, 3));
     assert_eq!((fits[0].method.samples, fits[1].method.samples), (fits[0].method.samples, "64".parse().unwrap()));
-    assert_eq!((fits[0].environment.rotation_deg, fits[1].environment.rotation_deg), (10.0, 10.0));
-    assert_eq!((fits[0].mask.clone(), fits[1].mask.clone()), (Some(folder.path().join("mask.png")), None));
+    assert_eq!([0, 1].map(|i: usize| fits[i].capture.environment.rotation_deg), [10.0, 10.0]);
+    assert_eq!([0, 1].map(|i: usize| fits[i].capture.mask.clone()), [Some(folder.path().join("mask.png")), None]);
     assert_eq!((fits[0].max_cssim, fits[1].max_cssim), (None, Some(0.1)));
-    assert_eq!(fits[1].sphere.unwrap().to_string(), "1,2,3");
+    assert_eq!(fits[1].capture.sphere.unwrap().to_string(), "1,2,3");
     assert_eq!((fits[0].line, fits[1].line), (6, 10));
     let fits = of(&["--seed=9", "--model=cook-torrance"]);
     assert_eq!(names(&fits), ["a-m-cook-torrance", "other"]);
@@ -108,11 +108,11 @@ fn mistakes_are_told_by_line_and_key() {
         ("", "batch.toml: it lists no fit"),
         ("photos = ", "batch.toml:1: "),
         ("\nfotos = 'a.exr'", "batch.toml:2: unknown field `fotos`, expected one of `photos`"),
-        ("environments = 'm.hdr'", "batch.toml:1: \"environments\" at the top is for photos at the top"),
+        ("environments = 'm.hdr'", "batch.toml:1: \"environments\" at the top needs \"photos\" at the top"),
         (
             "models = ['ggx']\n[[set]]\nphotos = 'a.exr'\nenv = 'm.hdr'",
-            "batch.toml:1: \"models\" at the top is for photos at the top, and there are no photos there; give them, or move it into \
-             each [[set]], or one of it into [defaults] as \"model\"",
+            "batch.toml:1: \"models\" at the top needs \"photos\" at the top; add them, move \"models\" into each [[set]], or give one \
+             of them in [defaults] as \"model\"",
         ),
         ("[[set]]\nmodels = 'ggx'", "batch.toml:1: there are no photos"),
         ("photos = []\nenvironments = 'm.hdr'", "batch.toml:1: \"photos\" is an empty list"),
@@ -131,7 +131,7 @@ fn mistakes_are_told_by_line_and_key() {
             "[defaults]\nsampels = 3\n[[fit]]\nphoto = 'a.exr'\nenv = 'm.hdr'",
             "batch.toml:2: unknown key \"sampels\"; the nearest one is \"samples\"",
         ),
-        ("[defaults]\nphoto = 'a.exr'", "batch.toml:2: [defaults] holds settings of all fits"),
+        ("[defaults]\nphoto = 'a.exr'", "batch.toml:2: a photo belongs to one fit: move it from [defaults]"),
         ("[defaults]\nworkers = 3", "batch.toml:2: \"workers\" is a setting of the whole batch: give it as --workers"),
         ("[[fit]]\nphoto = 'a.exr'\nenv = 'm.hdr'\nout = 'x'", "batch.toml:4: \"out\" is a setting of the whole batch"),
         ("[[fit]]\nenv = 'm.hdr'", "batch.toml:1: this fit has no photo"),
@@ -142,7 +142,7 @@ fn mistakes_are_told_by_line_and_key() {
         ),
         (
             "[[fit]]\nphoto = 'a.exr'\nenv = 'm.hdr'\nname = 'a/b'",
-            "batch.toml:4: the name \"a/b\" would not do for a folder",
+            "batch.toml:4: the name \"a/b\" is not a valid folder name on every system",
         ),
         ("[[fit]]\nphoto = 'a.exr'\nenv = 'm.hdr'\nname = 3", "batch.toml:4: \"name\" must be text"),
         (

@@ -13,7 +13,7 @@ use std::{cell::RefCell, sync::Arc};
 const GGX: [f64; 7] = [0.3, 0.2, 0.1, 0.05, 0.05, 0.05, 0.2];
 
 #[test]
-fn direct_cost_is_that_of_the_table() {
+fn the_direct_cost_agrees_with_that_of_the_table() {
     let scene = StageOne::new("ggx", &GGX);
     let capture = capture("ggx", &GGX, 0.0);
     let light = LightDistribution::new(Arc::new(room()));
@@ -28,14 +28,14 @@ fn direct_cost_is_that_of_the_table() {
         let (by_table, rendered) = (objective().cost(&elsewhere), objective().rendered_by(direct).cost(&elsewhere));
         assert!((by_table - rendered).abs() < 0.02 * by_table, "gamma {gamma}: {by_table}, {rendered}");
         assert_ne!(by_table.to_bits(), rendered.to_bits());
-        // The same samples every time; nowhere a cost that is none, but of parameters that are none.
+        // The same samples every time; the cost is finite everywhere except at parameters that are not numbers.
         assert_eq!(objective().rendered_by(direct).cost(&elsewhere).to_bits(), rendered.to_bits());
         assert!(objective().rendered_by(direct).cost(&[f64::NAN; 7]).is_nan());
     }
 }
 
 #[test]
-fn evaluations_that_would_keep_the_coordinator_busy_are_refused() {
+fn evaluations_that_would_block_the_coordinator_are_refused() {
     let fit = |draws, samples| {
         let mut method = method("ggx");
         method.search = SearchKind::Pattern;
@@ -48,7 +48,7 @@ fn evaluations_that_would_keep_the_coordinator_busy_are_refused() {
 }
 
 #[test]
-fn claims_of_direct_searches_are_checked_by_the_direct_integrator() {
+fn results_of_direct_searches_are_checked_by_the_direct_integrator() {
     let mut method = method("ggx");
     method.integration = Integration::Direct { samples: 8 };
     assert_eq!(method.check(), Err(MethodError::NoDerivatives));

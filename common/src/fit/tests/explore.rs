@@ -1,4 +1,4 @@
-//! Where stage three starts: on coarse pictures, and without one where it would show nothing.
+//! The start of stage three: on a coarse picture, or from the winner if a coarse picture would not show the object.
 
 use super::scene::{Bench, capture_of, method};
 use crate::{
@@ -39,7 +39,7 @@ fn a_large_object_is_explored_on_every_second_pixel_and_polish_ends_no_worse_tha
 }
 
 #[test]
-fn an_object_that_a_coarse_picture_would_not_show_is_polished_from_the_winner() {
+fn polish_starts_from_the_winner_if_a_coarse_picture_would_not_show_the_object() {
     // Too few pixels; and at the edge, where no window of the metric is centred on it.
     for circle in [Circle { x: 30.0, y: 30.0, radius: 6.0 }, Circle { x: 3.0, y: 40.0, radius: 15.0 }] {
         let (outcome, kinds) = fit((60, 60), circle, |_, output| output);
@@ -54,10 +54,10 @@ fn an_object_that_a_coarse_picture_would_not_show_is_polished_from_the_winner() 
 }
 
 #[test]
-fn a_find_that_leads_nowhere_sends_polish_back_to_the_winner() {
+fn polish_returns_to_the_winner_if_the_explored_lobe_ends_worse() {
     let model = method("ggx").model;
     let rounds = RefCell::new(Vec::new());
-    // What exploration finds is a lobe far from the winner's, and polish there ends worse than the winner.
+    // The output of `explore` is a lobe far from the winner's, and polish from there ends worse than the winner.
     let astray = |spec: &NodeSpec, output: Blob| {
         let changed = |change: &dyn Fn(&mut crate::fit::Polished)| {
             let mut polished = read::<PolishedWire>("polish", &output).unwrap().polished(model).unwrap();

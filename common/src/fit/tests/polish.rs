@@ -29,7 +29,7 @@ fn polish_starts_from_the_best_and_never_ends_worse_on_its_table() {
     let pyramid = LightPyramid::new((**capture.environment()).clone());
     let table = plan.integrate(capture.geometry(), &pyramid, &pixels);
     let view = FullView { model, table: &table, pixels: &pixels, coverage: &coverage, stride: 1, width, height };
-    // A photo over black holds its coverage already.
+    // The pixels of a photo over black contain the coverage already.
     let scored: Vec<f32> = coverage.iter().map(|&c| if c > 0.0 { 1.0 } else { 0.0 }).collect();
     let judge = Judge::new(photo, &scored, 1.0, &JudgeOptions::default()).unwrap();
     let score = |point: &[f64]| judge.score(&view.render(point)).unwrap().cssim;
@@ -46,7 +46,7 @@ fn polish_starts_from_the_best_and_never_ends_worse_on_its_table() {
     }
 }
 
-/// The exponent of Blinn-Phong grows as the lobe gets narrower: the span of its table and the edges of that are turned round.
+/// The exponent of Blinn-Phong grows as the lobe gets narrower, so the lower edge of the table's span is the upper bound of the exponent.
 #[test]
 fn a_fit_and_its_polish_find_an_exponent_inside_the_span_of_their_table() {
     let material = [0.3, 0.2, 0.1, 0.5, 0.4, 0.3, 60.0];
@@ -63,7 +63,7 @@ fn a_fit_and_its_polish_find_an_exponent_inside_the_span_of_their_table() {
 fn a_round_of_polish_that_ends_worse_than_the_winner_is_not_the_result() {
     let planner = FitPlanner::new(capture("ggx", &MATERIAL, 0.05), method("ggx"), 1.0).unwrap();
     let rounds = Cell::new(0);
-    // The first round ends at the edge of its table, and as a round on another table may: worse than where it started.
+    // The first round ends at the edge of its table with a worse score than its start, as a round on another table may.
     let astray = |spec: &NodeSpec, output: Blob| {
         if spec.kind != "polish" {
             return output;
@@ -80,6 +80,6 @@ fn a_round_of_polish_that_ends_worse_than_the_winner_is_not_the_result() {
     let outcome = Bench::default().run(planner, |_| 0, astray).unwrap().into_outcome().unwrap();
     assert!(rounds.get() > 1);
     let (winner, polished) = (outcome.judged[outcome.winner].cssim, outcome.polished.unwrap());
-    // Another table moves a score by less than this; from where the first round went, 40 evaluations do not lead back.
+    // Another table changes a score by less than this; from the end of the first round, 40 evaluations would not lead back.
     assert!(polished.cssim < winner + 1e-3, "{winner} {polished:?}");
 }

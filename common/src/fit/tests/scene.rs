@@ -104,7 +104,7 @@ pub(crate) fn method(name: &str) -> Method {
     Method { model: model(name).unwrap(), gammas, samples: SampleCount::Draws(48), ..Method::default() }
 }
 
-/// Runs graphs one node at a time. Outputs are remembered: a node is a pure function, so a second run costs nothing.
+/// Runs graphs one node at a time. Outputs are cached: a node is a pure function, so a second run takes no time.
 pub(crate) struct Bench {
     known: BTreeMap<(String, Vec<u8>, Vec<BlobHash>), Blob>,
     context: RunContext,
@@ -117,8 +117,8 @@ impl Default for Bench {
 }
 
 impl Bench {
-    /// Runs a planner to its end. `pick` chooses among so many ready nodes; `change` may alter an output before the planner
-    /// sees it.
+    /// Runs a planner to its end. `pick` chooses among the given number of ready nodes; `change` may alter an output before the planner
+    /// receives it.
     pub(crate) fn run(
         &mut self,
         mut planner: FitPlanner,

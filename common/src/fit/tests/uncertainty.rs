@@ -1,4 +1,4 @@
-//! What the photo does not determine is said.
+//! Parameters that the photo does not determine are reported as such.
 
 use super::scene::{Bench, capture, method};
 use crate::{

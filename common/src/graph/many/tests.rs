@@ -7,13 +7,13 @@ use crate::graph::{
 };
 use std::sync::{Arc, Mutex};
 
-/// Two leaves and their join. The first leaf is that of every fit with the same `shared`, the second is its own.
+/// Two leaves and their join. The first leaf is shared with every fit of the same `shared`; the second is its own.
 struct Fit {
     shared: u8,
     own: u8,
     leaves: Vec<NodeId>,
     open: usize,
-    /// It holds its leaves as long as it may.
+    /// Whether it holds its leaves until it ends.
     keeps: bool,
     result: Option<Vec<u8>>,
 }
@@ -56,7 +56,7 @@ impl Planner for Fit {
     }
 }
 
-/// A leaf of 200 fails; one of 201 is empty; all else are their parameters and inputs.
+/// A leaf of 200 fails; one of 201 is empty; every other output is the parameters and inputs.
 #[derive(Clone, Default)]
 struct Leaf(Arc<Mutex<Vec<Vec<u8>>>>);
 
@@ -75,7 +75,7 @@ impl NodeType for Leaf {
     }
 }
 
-/// The fits of a test, and what became of them, in order.
+/// The fits of a test, and their results in order.
 #[derive(Default)]
 struct Bench {
     coming: Vec<Fit>,
@@ -85,7 +85,7 @@ struct Bench {
     is_fail_fast: bool,
     /// The number of a part that stays.
     stays: Option<u32>,
-    /// How many may begin until the test says otherwise, but for one that is waited for.
+    /// How many may start until the test raises it; does not apply to a part that is waited for.
     there: Option<u32>,
     safe: Vec<u32>,
     ended: Vec<(String, Result<Vec<u8>, String>)>,
@@ -165,13 +165,13 @@ fn every_part_gets_what_it_gets_alone_and_equal_nodes_run_once() {
 }
 
 #[test]
-fn earlier_parts_end_earlier_and_parts_begin_only_when_they_are_needed() {
+fn earlier_parts_end_earlier_and_parts_start_only_when_needed() {
     let fits = (0..20).map(|i| Fit::new(2 * i, 2 * i + 1)).collect();
     let (bench, _) = run(Bench::new(fits), Execution::Sequential);
     let names: Vec<String> = bench.ended.into_iter().map(|(name, _)| name).collect();
     assert_eq!(names, (0..20).map(|i| format!("fit-{i}")).collect::<Vec<_>>());
 
-    // Two at a time: the nodes of the third come when the first has ended.
+    // Two at a time: the third adds its nodes when the first has ended.
     let fits = (0..3).map(|i| Fit::new(2 * i, 2 * i + 1)).collect();
     let mut graph = Graph::new();
     Many::new(Bench::new(fits)).start(&mut GraphEdit::new(&mut graph)).unwrap();
@@ -180,19 +180,19 @@ fn earlier_parts_end_earlier_and_parts_begin_only_when_they_are_needed() {
 }
 
 #[test]
-fn part_that_was_not_there_in_time_begins_when_it_is_and_no_node_has_to_end_for_it() {
+fn part_that_is_ready_late_starts_without_waiting_for_the_end_of_a_node() {
     let mut graph = Graph::new();
     let mut planner = Many::new(Bench { there: Some(1), ..Bench::new(vec![Fit::new(1, 2), Fit::new(3, 4)]) });
     planner.start(&mut GraphEdit::new(&mut graph)).unwrap();
     planner.look_again(&mut GraphEdit::new(&mut graph)).unwrap();
-    assert_eq!(graph.len(), 2, "the second one is not there yet");
+    assert_eq!(graph.len(), 2, "the second one is not ready yet");
     planner.parts.there = None;
     planner.look_again(&mut GraphEdit::new(&mut graph)).unwrap();
     assert_eq!(graph.len(), 4);
 }
 
 #[test]
-fn part_that_stays_holds_its_nodes_for_all_that_follow_and_does_not_keep_the_run_from_its_end() {
+fn part_that_stays_holds_its_nodes_for_later_parts_and_lets_the_run_end() {
     for stays in [None, Some(0)] {
         let fits = [(1, 2), (3, 4), (5, 6), (1, 2)].map(|(shared, own)| Fit { keeps: true, ..Fit::new(shared, own) });
         let bench = Bench { stays, most_active: 2, ..Bench::new(fits.into()) };
@@ -203,7 +203,7 @@ fn part_that_stays_holds_its_nodes_for_all_that_follow_and_does_not_keep_the_run
         if stays.is_some() {
             assert_eq!((names, ran.len()), (vec!["fit-1", "fit-2", "fit-3"], 9));
         } else {
-            assert_eq!((names.len(), ran.len()), (4, 12), "what nobody holds runs again");
+            assert_eq!((names.len(), ran.len()), (4, 12), "nodes that are not held run again");
         }
     }
 }
@@ -229,7 +229,7 @@ fn parts_may_end_the_run_at_the_first_failure() {
     assert_eq!(error.to_string(), "one has failed");
 }
 
-/// Runs a graph node by node and returns the most bytes that it kept at a time, and at its end. Every node is forgotten once.
+/// Runs a graph node by node and returns its largest number of stored bytes, and the number at its end. Every node is forgotten once.
 fn kept_bytes(fits: u8) -> (usize, usize) {
     let registry = Registry::default().with(Leaf::default());
     let mut planner = Many::new(Bench::new((0..fits).map(|i| Fit::new(i, i + 100)).collect()));
@@ -258,13 +258,13 @@ fn kept_bytes(fits: u8) -> (usize, usize) {
 }
 
 #[test]
-fn what_ended_parts_held_is_let_go() {
+fn everything_that_ended_parts_held_is_dropped() {
     let (most, left) = kept_bytes(50);
     assert!(most < 3000 && left == 0, "{most} {left}");
 }
 
 #[test]
-fn shared_nodes_are_forgotten_with_the_last_part_that_asked_for_them() {
+fn shared_nodes_are_forgotten_with_the_last_part_that_added_them() {
     let mut graph = Graph::new();
     let mut planner = Many::new(Bench::new(vec![Fit::new(1, 2), Fit::new(1, 200)]));
     planner.start(&mut GraphEdit::new(&mut graph)).unwrap();
@@ -291,7 +291,7 @@ fn shared_nodes_are_forgotten_with_the_last_part_that_asked_for_them() {
 }
 
 #[test]
-fn cancelled_nodes_of_a_failed_part_are_no_failures_of_others() {
+fn cancelled_nodes_of_a_failed_part_do_not_fail_other_parts() {
     let mut graph = Graph::new();
     let mut planner = Many::new(Bench::new(vec![Fit::new(1, 2), Fit::new(1, 3)]));
     planner.start(&mut GraphEdit::new(&mut graph)).unwrap();
@@ -300,9 +300,9 @@ fn cancelled_nodes_of_a_failed_part_are_no_failures_of_others() {
     graph.fail(NodeId(1), FailureReason::Crashed { crashes: 3 });
     assert_eq!(graph.next_change(), Some(Change::Failed(NodeId(1))));
     planner.failed(NodeId(1), &FailureReason::Crashed { crashes: 3 }, &mut GraphEdit::new(&mut graph)).unwrap();
-    assert!(graph.is_open(NodeId(0)) && graph.is_open(NodeId(2)), "the second part wants them");
+    assert!(graph.is_open(NodeId(0)) && graph.is_open(NodeId(2)), "the second part needs them");
     assert!(graph.next_change().is_none());
-    // Now nobody wants the shared one.
+    // Now no part needs the shared node.
     graph.fail(NodeId(2), FailureReason::Crashed { crashes: 3 });
     graph.next_change();
     planner.failed(NodeId(2), &FailureReason::Crashed { crashes: 3 }, &mut GraphEdit::new(&mut graph)).unwrap();

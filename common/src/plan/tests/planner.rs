@@ -1,4 +1,4 @@
-//! What the planner makes of outputs: the same in any order, and nothing of wrong ones.
+//! The outcome of a fit does not depend on the order of outputs, and wrong outputs are refused.
 
 use crate::{
     fit::{
@@ -74,7 +74,7 @@ fn a_search_result_with_other_parameters_and_the_old_cost_is_refused() {
     assert_eq!(refusal(|_| {}), None);
 }
 
-/// What the planner says when the first shard of the subset's table is changed.
+/// The planner's error when the first shard of the subset's table is changed.
 fn refused_shard(change: impl Fn(&mut TransportTable)) -> String {
     let changed = |spec: &NodeSpec, output: Blob| {
         if spec.kind != nodes::TRANSPORT {
@@ -91,7 +91,7 @@ fn refused_shard(change: impl Fn(&mut TransportTable)) -> String {
 }
 
 #[test]
-fn a_table_that_was_not_asked_for_is_refused() {
+fn a_table_other_than_the_requested_one_is_refused() {
     let said = refused_shard(|table| {
         table.pixels -= 1;
         for lobe in &mut table.lobes {

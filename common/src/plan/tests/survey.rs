@@ -1,4 +1,4 @@
-//! Surveys and photos of studies: what they compute, and what they refuse of workers.
+//! Surveys and photos of studies: their outcomes, and the outputs of workers that they refuse.
 
 use crate::{
     brdf::Material,
@@ -45,7 +45,7 @@ fn brute_force_comes_near_the_material_and_its_score_is_that_of_its_point() {
 }
 
 #[test]
-fn without_tables_brute_force_goes_the_same_way() {
+fn without_tables_brute_force_reaches_the_same_score() {
     let starts = vec![MATERIAL.to_vec()];
     let by = |direct| SurveyRequest { starts: starts.clone(), max_evaluations: Some(20), direct, ..Default::default() };
     let (tables, direct) = (survey(by(None)), survey(by(Some(64))));
@@ -57,12 +57,12 @@ fn without_tables_brute_force_goes_the_same_way() {
 fn points_outside_the_model_are_refused_before_any_work() {
     let outside = vec![0.3, 0.3, 0.3, 0.3, 0.3, 1.3, 0.3];
     let request = SurveyRequest { points: vec![outside], ..Default::default() };
-    assert!(planner(request).unwrap_err().to_string().contains("none of ggx"));
+    assert!(planner(request).unwrap_err().to_string().contains("do not fit ggx"));
     let short = SurveyRequest { starts: vec![vec![0.3; 3]], ..Default::default() };
     assert!(planner(short).is_err());
 }
 
-/// What a planner makes of outputs that `change` has altered.
+/// The planner's error when `change` has altered the outputs; `None` if it accepts them.
 fn told_wrong(mut planner: impl Planner, change: impl Fn(&NodeSpec, Vec<u8>) -> Vec<u8>) -> Option<PlanError> {
     let context = crate::graph::RunContext::new(Arc::new(crate::graph::DecodedCache::new(1 << 26)));
     let mut graph = Graph::new();

@@ -75,7 +75,7 @@ fn error(size: f64, width: f64, second_order: bool, kinked: bool) -> f64 {
     worst
 }
 
-/// What is left is of fourth order where the distribution alone varies over the node.
+/// The remaining error is of fourth order where only the distribution varies over the node.
 #[test]
 fn second_order_terms_take_most_of_the_error_of_a_sharp_lobe() {
     const WIDTH: f64 = 0.01;
@@ -92,9 +92,9 @@ fn second_order_terms_help_a_wide_lobe_too() {
     assert!(corrected < 0.5 * plain, "{corrected:.2e} of {plain:.2e}");
 }
 
-/// The error of the kink is of first order; it is within the plane of incidence alone, and a share of the width.
+/// The error of the kink is of first order, occurs within the plane of incidence only, and is a share of the width.
 #[test]
-fn second_order_terms_leave_the_kink_of_some_lobes() {
+fn second_order_terms_do_not_remove_the_error_of_a_kink() {
     for width in [0.01, 0.1, 0.3] {
         let (plain, corrected) = (error(0.3, width, false, true), error(0.3, width, true, true));
         println!("{width}: {plain:.2e} {corrected:.2e}");
@@ -103,7 +103,7 @@ fn second_order_terms_leave_the_kink_of_some_lobes() {
 }
 
 #[test]
-fn light_that_the_horizon_cuts_counts_as_far_as_it_is_above() {
+fn light_that_the_horizon_cuts_counts_only_above_it() {
     for cos_i in [-0.05, -0.02, 0.0, 0.03, 0.049, 0.2] {
         let n = 1000;
         let spread = |k: i32| cos_i + 0.1 * ((f64::from(k) + 0.5) / f64::from(n) - 0.5);
@@ -114,7 +114,7 @@ fn light_that_the_horizon_cuts_counts_as_far_as_it_is_above() {
 }
 
 #[test]
-fn light_on_a_line_or_from_straight_behind_is_still_a_number() {
+fn light_on_a_line_or_opposite_to_the_view_gives_finite_numbers() {
     let point = points()[2];
     let frame = Frame::from_normal(-point.view);
     for (covariance, radius) in [([1e-4, 0.0, -1e-12], 0.03), ([-1e-12, 0.0, 1e-4], 0.03), ([0.0; 3], 0.0)] {

@@ -172,7 +172,7 @@ fn while_workers_die_that_executed_nothing_a_suspect_is_excused_but_not_for_ever
         deaths += 1;
         assert!(deaths < 99, "it fails in the end");
     }
-    // Three count, and ten times as many were excused.
+    // Three count, and ten times as many were not counted.
     assert_eq!(deaths, 33);
 }
 

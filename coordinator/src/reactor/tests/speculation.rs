@@ -29,7 +29,7 @@ fn slow_node_is_given_to_an_idle_worker_when_its_time_has_come() {
     assert_eq!(bench.finish(A, 0, 1, 7), ["worker 1 is thanked for 0.1"]);
     assert_eq!(bench.core.summary().duplicate_results, 1);
     let error = bench.try_handle(finished(Site::Worker(A), 0, 1, 8)).unwrap_err();
-    assert!(matches!(error, RunError::ResultsDiffer { .. }), "{error}");
+    assert!(matches!(error, Stop::ResultsDiffer { .. }), "{error}");
 }
 
 #[test]

@@ -13,7 +13,7 @@ pub(crate) enum Place {
     Nowhere,
     /// For any worker, with this priority.
     Queue(u32),
-    /// Until this time, after it has lost its worker time and again.
+    /// Until this time, because it has lost its worker repeatedly.
     Delayed(Duration),
     /// For a worker of its own, since then.
     Suspects(Duration),

@@ -1,12 +1,12 @@
-//! What earlier coordinators of a run have left for this one: asked for by key, because node numbers may differ.
+//! The outputs of earlier coordinators of a run, by key, because node numbers may differ.
 
 use std::fmt;
 
 use lookalike::graph::{Blob, NodeKey};
 
-use crate::core::Deaths;
+use super::deaths::Deaths;
 
-/// What is known of a node from earlier.
+/// What is known of a node from earlier coordinators.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Memory {
     /// Its output, if it has one: the node need not run again.
@@ -15,8 +15,8 @@ pub struct Memory {
     pub deaths: Deaths,
 }
 
-/// Remembers the nodes of earlier coordinators of a run: the journal, or a test.
-pub trait Recall: fmt::Debug + Send {
+/// Knows the nodes of earlier coordinators of a run: the journal, or a test.
+pub trait PastOutputs: fmt::Debug + Send {
     /// What is known of the nodes with this key.
-    fn recall(&mut self, key: NodeKey) -> Memory;
+    fn of(&mut self, key: NodeKey) -> Memory;
 }

@@ -1,10 +1,10 @@
-//! The coordinator's state: the graph, who holds which node, who is a member. Data and questions; what changes it is in
-//! [`reactor`](crate::reactor).
+//! The coordinator's state: the graph, the leases, the members. Data and queries; [`reactor`](crate::reactor) changes it.
 
+mod deaths;
 mod departed;
 mod members;
 mod pace;
-pub mod recall;
+pub mod past_outputs;
 mod waiting;
 
 use std::collections::VecDeque;
@@ -13,16 +13,17 @@ use std::time::Duration;
 use lookalike::graph::{Blob, Graph, NodeId, NodeKey, WorkerId};
 use lookalike::protocol::ProcessName;
 
+pub use self::deaths::Deaths;
 pub(crate) use self::departed::{Death, Departed, Lost};
 pub(crate) use self::members::{Held, Member, Members};
 use self::members::{Size, weight};
 use self::pace::Pace;
+use self::past_outputs::PastOutputs;
 pub(crate) use self::waiting::{Place, Waiting};
-use crate::comm::{NodeName, Site};
-use crate::core::recall::Recall;
+use crate::events::{NodeName, Site};
 pub use crate::policy::Policy;
 
-/// What a run has cost, for people: nothing of it may reach a result.
+/// Counts of a run, for people: none of them may reach a result.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct RunSummary {
     /// How many nodes were completed.
@@ -31,7 +32,7 @@ pub struct RunSummary {
     pub recalled_nodes: usize,
     /// How many nodes failed.
     pub failed_nodes: usize,
-    /// How many nodes were given up because nobody wanted their output any more.
+    /// How many nodes were cancelled because their output was not needed any more.
     pub cancelled_nodes: usize,
     /// How many leases were given out, and how often a node was run by the coordinator.
     pub attempts: u64,
@@ -73,7 +74,7 @@ pub struct Core {
     pub(crate) pace: Pace,
     /// When a node will be slow for which a worker has nothing else to do.
     pub(crate) next_slow: Option<Duration>,
-    /// When a worker whose short nodes were left to it has not got on with them for too long.
+    /// When a worker that was left its short nodes counts as stalled.
     pub(crate) next_move: Option<Duration>,
     /// When a suspect's patience ends.
     pub(crate) next_patience: Option<Duration>,
@@ -88,10 +89,8 @@ pub struct Core {
     /// How the last local worker ended, once none will be started again and no other can join.
     pub(crate) given_up: Option<String>,
     pub(crate) summary: RunSummary,
-    /// Which workers that are about to join execute which nodes for an earlier coordinator of this run.
-    pub(crate) continued: Vec<(WorkerId, NodeId)>,
     /// What earlier coordinators of this run have left.
-    pub(crate) recall: Option<Box<dyn Recall>>,
+    pub(crate) past_outputs: Option<Box<dyn PastOutputs>>,
 }
 
 /// What the coordinator knows of a node beside the graph.
@@ -117,23 +116,6 @@ pub(crate) struct Record {
     pub(crate) deaths: Deaths,
     /// What it computes: known once it is ready, where the run is remembered.
     pub(crate) key: Option<NodeKey>,
-}
-
-/// The deaths of workers that executed a node.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Deaths {
-    /// While they executed it, perhaps with others, or before it was a suspect.
-    pub in_company: u32,
-    /// While it had its worker for itself.
-    pub alone: u32,
-    /// While it had its worker for itself, when other workers died of something else.
-    pub excused: u32,
-}
-
-impl Deaths {
-    pub(crate) fn total(self) -> u32 {
-        self.in_company + self.alone + self.excused
-    }
 }
 
 /// An output that waits for its verification.
@@ -183,15 +165,14 @@ impl Core {
             starving: None,
             given_up: None,
             summary: RunSummary::default(),
-            continued: Vec::new(),
-            recall: None,
+            past_outputs: None,
         }
     }
 
     /// Complete nodes from what earlier coordinators of this run have left, wherever there is something.
     #[must_use]
-    pub fn with_recall(self, recall: Box<dyn Recall>) -> Self {
-        Self { recall: Some(recall), ..self }
+    pub fn with_past_outputs(self, past_outputs: Box<dyn PastOutputs>) -> Self {
+        Self { past_outputs: Some(past_outputs), ..self }
     }
 
     /// The graph of the run.
@@ -227,8 +208,8 @@ impl Core {
         delays.into_iter().flatten().chain(starvation).min()
     }
 
-    /// Whether an answer to this attempt may come: it was given out. Any worker may bring it, because one that has lost its
-    /// connection comes back under another number.
+    /// Whether this attempt was given out. Any worker may answer for it, because a worker that has lost its connection comes back under
+    /// another number.
     pub(crate) fn was_given_out(&self, node: NodeId, attempt: u32) -> bool {
         self.look(node).is_some_and(|record| (1..=record.attempts).contains(&attempt))
     }
@@ -250,7 +231,7 @@ impl Core {
         self.records.get_mut(usize::try_from(node.0).ok()?)
     }
 
-    /// The same, to look at.
+    /// The same, read-only.
     pub(crate) fn look(&self, node: NodeId) -> Option<&Record> {
         self.records.get(usize::try_from(node.0).ok()?)
     }

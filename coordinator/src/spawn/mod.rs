@@ -1,14 +1,11 @@
-//! Local worker processes: started with the run, started again when they die, gone when the run ends.
+//! Local worker processes: started with the run, restarted when they die, ended with the run.
 //!
-//! Each one is on a leash: a pipe to its stdin. One byte in it means that the run is over, its end without that byte that the
-//! coordinator was killed, by whatever means. In both cases the worker ends itself, but where a run can be gone on with it
-//! survives a killed coordinator for a while, and the next one takes it over. Each one is in a process group of its own, so that
-//! a Ctrl-C at the terminal reaches the coordinator alone, which ends its workers in order.
+//! Each one has a leash: a pipe to its stdin. A byte in it means that the run is over; its end without that byte means that the
+//! coordinator was killed. In both cases the worker ends at once. Each one is in a process group of its
+//! own, so that a Ctrl-C at the terminal reaches the coordinator alone, which ends its workers in order.
 
-mod orphan;
 mod worked;
 
-use std::collections::BTreeSet;
 use std::ffi::OsString;
 use std::io;
 use std::num::NonZeroUsize;
@@ -16,25 +13,22 @@ use std::path::PathBuf;
 use std::process::{ExitStatus, Stdio};
 use std::time::Duration;
 
+use thiserror::Error;
 use tokio::io::AsyncWriteExt;
 use tokio::process::{Child, ChildStdin, Command};
 use tokio::sync::mpsc::Sender;
-use tokio::sync::watch;
 use tokio::task::JoinSet;
 use tokio::time::{Instant, sleep, timeout};
 use tokio_util::sync::CancellationToken;
 use tracing::{debug, warn};
 
-use self::orphan::Orphan;
-pub(crate) use self::orphan::is_worker_alive;
 pub(crate) use self::worked::Worked;
-use crate::comm::RunEvent;
+use crate::events::RunEvent;
 use crate::reactor::Event;
 use crate::rpc::Inbound;
-use crate::runner::RunError;
 
-/// A worker that lived for this long was well; its death starts the count again, and so does that of one that has executed
-/// something: it may have died of a node, and then the node fails in the end.
+/// A death after this long, or of a worker that has executed a node, resets the count of quick deaths: if a node kills workers, that node
+/// fails in the end.
 const HEALTHY_LIFE: Duration = Duration::from_secs(10);
 /// After this many deaths in a row, each soon after the start, a worker is not started again.
 const MAX_QUICK_DEATHS: u32 = 8;
@@ -70,6 +64,16 @@ impl WorkerCommand {
     }
 }
 
+/// A local worker process that cannot be started at all.
+#[derive(Debug, Error)]
+#[error("cannot start a worker process of {}", program.display())]
+pub struct SpawnError {
+    /// The program.
+    pub program: PathBuf,
+    /// What the system says.
+    pub source: io::Error,
+}
+
 /// How many local workers there are, and how they are started.
 #[derive(Clone, Debug)]
 pub(crate) struct LocalWorkers {
@@ -84,8 +88,6 @@ pub(crate) struct LocalWorkers {
     /// Whether other workers may come when all local ones are given up.
     pub(crate) others_may_come: bool,
     pub(crate) worked: Worked,
-    /// Whether they live on for a while when the coordinator is killed.
-    pub(crate) may_survive: bool,
 }
 
 /// The threads of each of `workers` workers, so that together they use the cores once.
@@ -95,29 +97,16 @@ pub(crate) fn threads_per_worker(workers: usize) -> NonZeroUsize {
 }
 
 impl LocalWorkers {
-    /// Start the workers but for those that are there already, each of which keeps the place of one. A program that cannot be
-    /// started at all is an error at once.
-    pub(crate) fn start(
-        &self,
-        inbound: &Sender<Inbound>,
-        stop: &CancellationToken,
-        orphans: &[u32],
-        present: &watch::Sender<BTreeSet<u32>>,
-    ) -> Result<JoinSet<()>, RunError> {
-        let mut first: Vec<_> = orphans
-            .iter()
-            .map(|process| {
-                Place::Orphan(Orphan { process: *process, access: self.access.clone(), present: present.subscribe() })
-            })
-            .collect();
-        for _ in orphans.len()..self.count {
-            let process =
-                self.spawn().map_err(|source| RunError::Spawn { program: self.command.program.clone(), source })?;
-            first.push(Place::Child(Box::new(process)));
+    /// Start the workers. A program that cannot be started at all is an error at once.
+    pub(crate) fn start(&self, inbound: &Sender<Inbound>, stop: &CancellationToken) -> Result<JoinSet<()>, SpawnError> {
+        let mut first = Vec::new();
+        for _ in 0..self.count {
+            let process = self.spawn();
+            first.push(process.map_err(|source| SpawnError { program: self.command.program.clone(), source })?);
         }
         let mut given_up = JoinSet::new();
-        for place in first {
-            given_up.spawn(self.clone().keep_alive(place, inbound.clone(), stop.clone()));
+        for process in first {
+            given_up.spawn(self.clone().keep_alive(process, inbound.clone(), stop.clone()));
         }
         let mut keeping = JoinSet::new();
         let (inbound, others_may_come) = (inbound.clone(), self.others_may_come);
@@ -128,21 +117,15 @@ impl LocalWorkers {
     }
 
     /// Keep one worker alive until `stop`. When it is given up, how it ended last.
-    async fn keep_alive(self, first: Place, inbound: Sender<Inbound>, stop: CancellationToken) -> Option<String> {
+    async fn keep_alive(self, first: Process, inbound: Sender<Inbound>, stop: CancellationToken) -> Option<String> {
         let mut quick_deaths = 0;
-        let mut next = match first {
-            Place::Child(process) => Ok(*process),
-            Place::Orphan(orphan) => match self.keep_orphan(orphan, &inbound, &stop).await {
-                true => self.spawn(),
-                false => return None,
-            },
-        };
+        let mut next = Ok(first);
         loop {
             let begin = Instant::now();
             let (process, status, is_hopeless) = match next {
                 Ok(mut process) => {
                     let started = RunEvent::LocalWorkerStarted { process: process.id };
-                    // When nobody listens any more the run is over, and `stop` will say so.
+                    // An error means that the run is over; then `stop` is cancelled.
                     let _ = inbound.send(Inbound::Tell(started)).await;
                     tokio::select! {
                         ended = process.child.wait() => (process.id, describe(&ended), is_hopeless(&ended)),
@@ -155,7 +138,7 @@ impl LocalWorkers {
                 Err(error) => (0, format!("an error at its start: {error}"), false),
             };
             if !is_hopeless {
-                // Its last words may still be on their way.
+                // Its last messages may still be on their way.
                 tokio::select! {
                     () = sleep(FIRST_PAUSE) => {}
                     () = stop.cancelled() => return None,
@@ -181,35 +164,11 @@ impl LocalWorkers {
         }
     }
 
-    /// Let a worker of an earlier coordinator work for us, as long as it does. Whether another one has to take its place.
-    async fn keep_orphan(&self, mut orphan: Orphan, inbound: &Sender<Inbound>, stop: &CancellationToken) -> bool {
-        let process = orphan.process;
-        let was_here = tokio::select! {
-            was_here = orphan.replaced() => was_here,
-            () = stop.cancelled() => {
-                orphan.end().await;
-                return false;
-            }
-        };
-        if was_here {
-            let status = "an unknown status: an earlier coordinator had started it".to_owned();
-            let event = RunEvent::LocalWorkerEnded { process, status, restart_after: Some(Duration::ZERO) };
-            // When nobody listens any more the run is over, and `stop` will say so.
-            let _ = inbound.send(Inbound::Tell(event)).await;
-        } else {
-            debug!(process, "a local worker of an earlier coordinator has not come");
-        }
-        true
-    }
-
     fn spawn(&self) -> io::Result<Process> {
         let mut command = Command::new(&self.command.program);
         command.args(&self.command.arguments).arg("--access").arg(&self.access);
         command.args(["--address", &self.address, "--threads", &self.threads.to_string()]);
         command.args(["--reconnect-for", RECONNECT_FOR, "--leash"]);
-        if self.may_survive {
-            command.arg("--survive");
-        }
         if let Some(log) = &self.log {
             command.arg("--log").arg(log);
         }
@@ -232,26 +191,18 @@ async fn watch(mut keepers: JoinSet<Option<String>>, inbound: Sender<Inbound>, o
     while let Some(ended) = keepers.join_next().await {
         match ended {
             Ok(Some(status)) => last_status = Some(status),
-            // Stopped: nobody waits for workers any more.
+            // Stopped: the run is over.
             Ok(None) | Err(_) => return drain(keepers).await,
         }
     }
     if let Some(last_status) = last_status.filter(|_| !others_may_come) {
-        // When nobody listens any more the run is over.
+        // An error means that the run is over.
         let _ = inbound.send(Inbound::Event(Event::LocalWorkersGivenUp { last_status })).await;
     }
 }
 
 async fn drain(mut keepers: JoinSet<Option<String>>) {
     while keepers.join_next().await.is_some() {}
-}
-
-/// A worker in its place.
-enum Place {
-    /// A process of ours.
-    Child(Box<Process>),
-    /// A process of an earlier coordinator.
-    Orphan(Orphan),
 }
 
 struct Process {

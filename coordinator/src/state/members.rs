@@ -1,5 +1,5 @@
-//! The workers that have joined, and who of them is next: every question that is asked of all of them at once has an index,
-//! so that no event costs more for a thousand workers than for ten.
+//! The workers that have joined, and which of them is next. Every query over all of them has an index, so that no event costs more for a
+//! thousand workers than for ten.
 
 use std::cmp::Ordering;
 use std::collections::{BTreeMap, BTreeSet};
@@ -8,8 +8,8 @@ use std::time::Duration;
 use lookalike::graph::{BlobHash, NodeId, WorkerId};
 use lookalike::protocol::ProcessName;
 
-use super::Lost;
-use crate::comm::WorkerProcess;
+use super::departed::Lost;
+use crate::actions::WorkerProcess;
 
 /// How many bytes of assignments a worker may have been given that it has not begun with. What waits in its queue stays as
 /// small as this, and one assignment.
@@ -19,7 +19,7 @@ const UNBEGUN_BYTES: usize = 8 << 20;
 /// there and back take.
 const ENOUGH: Duration = Duration::from_millis(10);
 
-/// A worker that has not moved for this long does not get on: a busy machine lets a process wait for a few hundredths of a second.
+/// A worker without progress for this long is stalled; on a busy machine a process may wait for some 10 ms.
 const STANDSTILL: Duration = Duration::from_millis(50);
 
 /// A node that takes less than this is short: a worker is given many of them at a time.
@@ -28,10 +28,10 @@ const SHORT: Duration = Duration::from_millis(1);
 /// No node is thought to take less.
 const SHORTEST: Duration = Duration::from_micros(20);
 
-/// What a node counts for that is not short, or of which nobody knows how long it takes.
+/// The weight of a node that is not short, or whose kind has no known duration.
 const LONG: Duration = Duration::from_hours(1);
 
-/// What a node counts for in a worker's queue whose like have usually taken so long.
+/// The weight, in a worker's queue, of a node whose kind usually takes this long.
 pub(crate) fn weight(usual: Option<Duration>) -> Duration {
     usual.filter(|usual| *usual < SHORT).map_or(LONG, |usual| usual.max(SHORTEST))
 }
@@ -57,7 +57,7 @@ pub(crate) struct Member {
     pub(crate) is_clearing: bool,
     /// The suspect that has it for itself.
     pub(crate) alone_with: Option<NodeId>,
-    /// The attempts of its process on connections that were lost: it may still be at them.
+    /// The attempts of its process on earlier connections, which it may still execute.
     pub(crate) earlier: BTreeMap<NodeId, u32>,
     /// Its process has executed nothing yet.
     is_fresh: bool,
@@ -71,7 +71,7 @@ pub(crate) struct Held {
     pub(crate) attempt: u32,
     /// Since when the worker executes it.
     pub(crate) started_at: Option<Duration>,
-    /// How far it said to be.
+    /// The progress that it reported.
     pub(crate) permille: u16,
     assignment: Size,
 }
@@ -162,8 +162,8 @@ impl Member {
         ENOUGH * u32::try_from(self.threads).unwrap_or(u32::MAX).min(1024)
     }
 
-    /// When what it has not begun with may be moved to another worker. Short nodes stay as long as it gets on with them: they
-    /// would be begun with here before anybody there hears of it.
+    /// When leases that it has not begun may be moved to another worker. Short nodes stay while it makes progress: it would begin them
+    /// before the other worker received them.
     pub(crate) fn movable_at(&self) -> Duration {
         if self.waiting_time > self.enough() + SHORT { Duration::ZERO } else { self.last_move + STANDSTILL }
     }

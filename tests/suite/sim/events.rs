@@ -11,7 +11,7 @@ use super::wire::Fate;
 
 /// Something that is done at its time.
 #[derive(Clone, Debug)]
-pub(super) enum Deed {
+pub(super) enum Event {
     /// A new fault, whichever it will be.
     Fault,
     /// The link to a worker works again.
@@ -59,12 +59,14 @@ pub(super) enum Fault {
     Stick,
     /// A worker computes slowly.
     SlowDown,
-    /// The coordinator's process is killed; another one goes on.
+    /// The coordinator's process is killed; another one resumes the run.
     KillCoordinator,
+    /// The same, and some workers are killed with it: the next coordinator begins with fewer of them, and more join later.
+    KillAll,
 }
 
 impl Fault {
-    const ALL: [Self; 12] = [
+    const ALL: [Self; 13] = [
         Self::Link(Link::Held),
         Self::Link(Link::Cut),
         Self::Link(Link::CutDown),
@@ -77,6 +79,7 @@ impl Fault {
         Self::Stick,
         Self::SlowDown,
         Self::KillCoordinator,
+        Self::KillAll,
     ];
 
     /// One of them.
@@ -98,13 +101,14 @@ impl Fault {
             Self::Stick => "worker stuck",
             Self::SlowDown => "worker slow",
             Self::KillCoordinator => "coordinator killed",
+            Self::KillAll => "coordinator and workers killed",
         }
     }
 
     /// How long it lasts.
     pub(super) fn time(self, chance: &mut Chance) -> Duration {
         match self {
-            Self::KillCoordinator | Self::KillWorker => chance.time(10, 4000),
+            Self::KillCoordinator | Self::KillAll | Self::KillWorker => chance.time(10, 4000),
             _ => chance.time(50, 9000),
         }
     }

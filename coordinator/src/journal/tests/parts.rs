@@ -1,10 +1,14 @@
-//! What a journal says of the fits of a batch.
+//! What a journal says of the parts of a run, here the fits of a batch.
 
 use super::*;
 
-fn fit(name: &str, state: &str, outputs: &[(&str, &str)]) -> FitRow {
-    let status = FitStatus { name: name.into(), state: state.into(), ..FitStatus::default() };
-    FitRow { number: 0, status, outputs: outputs.iter().map(|(name, hash)| ((*name).into(), (*hash).into())).collect() }
+fn fit(name: &str, state: &str, outputs: &[(&str, &str)]) -> PartRow {
+    let status = PartStatus { name: name.into(), state: state.into(), ..PartStatus::default() };
+    PartRow {
+        number: 0,
+        status,
+        outputs: outputs.iter().map(|(name, hash)| ((*name).into(), (*hash).into())).collect(),
+    }
 }
 
 #[test]
@@ -12,9 +16,9 @@ fn what_fits_have_written_is_there_no_later_than_the_next_transaction() {
     let folder = tempfile::tempdir().unwrap();
     let options = options(&folder);
     let mut journal = Journal::open(&options, NAME, None).unwrap();
-    options.fits.tell(fit("gold", "running", &[]));
-    options.fits.tell(fit("gold", "done", &[("fit.json", "12ab")]));
-    options.fits.tell(fit("chrome", "running", &[]));
+    options.parts.tell(fit("gold", "running", &[]));
+    options.parts.tell(fit("gold", "done", &[("fit.json", "12ab")]));
+    options.parts.tell(fit("chrome", "running", &[]));
     write(&mut journal, [completed(1)]);
     // Killed.
     let copy = copied(&folder);
@@ -24,9 +28,20 @@ fn what_fits_have_written_is_there_no_later_than_the_next_transaction() {
     let gold = ("gold".to_owned(), vec![("fit.json".to_owned(), "12ab".to_owned())]);
     assert_eq!((found.is_finished, found.outputs.into_iter().collect::<Vec<_>>()), (false, vec![gold]));
     assert!(matches!(written(&path, &identity().with("--gammas", "1")), Err(JournalError::AnotherRun { .. })));
+    let view = Connection::open(&path).unwrap();
+    let names = |sql: &str| -> Vec<(String, String)> {
+        let mut statement = view.prepare(sql).unwrap();
+        let rows = statement.query_map([], |row| Ok((row.get(0)?, row.get(1)?))).unwrap();
+        rows.collect::<Result<_, _>>().unwrap()
+    };
+    // The columns that fits had before they were parts.
+    let fits =
+        "SELECT name, state FROM (SELECT name, number, state, cssim, seconds, error, outputs FROM fits) ORDER BY name";
+    assert_eq!(names(fits), names("SELECT name, state FROM parts ORDER BY name"));
+    drop(view);
     let states = || {
-        let fits = Status::of(copy.path()).unwrap().fits;
-        fits.into_iter().map(|fit| (fit.name, fit.state)).collect::<Vec<_>>()
+        let parts = Status::of(copy.path()).unwrap().parts;
+        parts.into_iter().map(|fit| (fit.name, fit.state)).collect::<Vec<_>>()
     };
     assert_eq!(states(), [("chrome".to_owned(), "running".to_owned()), ("gold".to_owned(), "done".to_owned())]);
     // Another process has had the lock, and is gone.
@@ -35,18 +50,18 @@ fn what_fits_have_written_is_there_no_later_than_the_next_transaction() {
 }
 
 #[test]
-fn run_in_which_fits_failed_has_ended_and_can_be_gone_on_with() {
+fn run_in_which_fits_failed_has_ended_and_can_be_resumed() {
     let folder = tempfile::tempdir().unwrap();
     let options = options(&folder);
     let mut journal = Journal::open(&options, NAME, None).unwrap();
     write(&mut journal, [completed(1)]);
     journal.close(None).unwrap();
-    options.fits.tell(fit("gold", "failed", &[]));
+    options.parts.tell(fit("gold", "failed", &[]));
     let path = folder.path().join(JOURNAL_FILE);
-    settle(&path, &options.fits, Some("1 of 12 fits failed")).unwrap();
+    settle(&path, &options.parts, Some("1 of 12 fits failed")).unwrap();
     let status = Status::of(folder.path()).unwrap();
     assert_eq!((status.state, status.error.as_deref()), (RunState::Ended, Some("1 of 12 fits failed")));
-    assert_eq!((status.fits[0].state.as_str(), status.finished_at.is_some()), ("failed", true));
+    assert_eq!((status.parts[0].state.as_str(), status.finished_at.is_some()), ("failed", true));
     assert_eq!(finished(&path, &identity()).unwrap(), None);
     let again = Journal::open(&options, NAME, None).unwrap();
     assert_eq!((again.epoch, again.past.results), (2, 1));

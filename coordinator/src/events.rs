@@ -1,100 +1,9 @@
-//! What the reactor says: to workers, to its own process, to people. It says it into an [`Outbox`]; who empties the outbox
-//! (the runner with its sockets, or a test) decides what that means.
+//! What a run tells people while it goes on: [`RunEvent`]s, and the names in them.
 
 use std::fmt;
 use std::time::Duration;
 
-use lookalike::graph::{Blob, FailureReason, NodeId, WorkerId};
-use lookalike::protocol::ProcessName;
-
-/// A worker's permission, and duty, to execute a node. It ends with an answer, when it is cancelled, or with its worker's
-/// membership, which lasts as long as the worker is heard of.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Lease {
-    /// The node.
-    pub node: NodeId,
-    /// Counts the assignments of this node, from 1.
-    pub attempt: u32,
-    /// Counts the coordinator processes of this run, from 1.
-    pub epoch: u64,
-}
-
-/// A worker's process, as its hello describes it. It has one number per connection, and one name for all of them.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct WorkerProcess {
-    /// Its process id on its own machine, for people: in containers every worker may have the same.
-    pub id: u32,
-    /// Its name, which no other process has.
-    pub name: ProcessName,
-    /// Whether a coordinator has started it, on its own machine.
-    pub is_local: bool,
-}
-
-/// One thing to do.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Action {
-    /// Send the node of this lease to the worker.
-    Assign {
-        /// The worker.
-        worker: WorkerId,
-        /// What it gets.
-        lease: Lease,
-    },
-    /// Tell the worker that the output of this lease is not wanted any more.
-    Cancel {
-        /// The worker.
-        worker: WorkerId,
-        /// The lease that has ended.
-        lease: Lease,
-    },
-    /// Send a blob that the worker asked for.
-    SendBlob {
-        /// The worker.
-        worker: WorkerId,
-        /// The blob.
-        blob: Blob,
-    },
-    /// A worker asked for a blob that is needed no more: nothing is sent.
-    ForgoBlob {
-        /// The worker.
-        worker: WorkerId,
-    },
-    /// Tell the worker that its answer has arrived.
-    Acknowledge {
-        /// The worker.
-        worker: WorkerId,
-        /// The node it answered for.
-        node: NodeId,
-        /// The attempt it answered for.
-        attempt: u32,
-    },
-    /// Close the connection of this worker at once; it is no member any more.
-    Drop {
-        /// The worker.
-        worker: WorkerId,
-    },
-    /// Keep the output of a node that has just been completed: its run is remembered.
-    Keep {
-        /// The node.
-        node: NodeId,
-        /// Its output.
-        output: Blob,
-    },
-    /// Stop a node that runs in the coordinator's own process: its output is not wanted any more.
-    CancelHere {
-        /// The node.
-        node: NodeId,
-    },
-    /// Run this node in the coordinator's own process.
-    RunHere {
-        /// The node.
-        node: NodeId,
-        /// The attempt to answer for.
-        attempt: u32,
-    },
-    /// Tell the user.
-    Tell(RunEvent),
-}
+use lookalike::graph::{FailureReason, NodeId, WorkerId};
 
 /// Why a worker is no member any more.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -105,7 +14,7 @@ pub enum Departure {
     Silent,
     /// It did not read what was sent to it.
     TooSlow,
-    /// Its process is back on another connection, before anybody noticed that this one is broken.
+    /// Its process is back on another connection, before this one was noticed to be broken.
     Replaced,
     /// It said goodbye: somebody asked it to end.
     Goodbye,
@@ -114,8 +23,8 @@ pub enum Departure {
 }
 
 impl Departure {
-    /// Whether the nodes that the worker executed may have caused it. How a local process ended would not tell more: a node
-    /// that takes all memory and somebody with `kill -9` leave the same status behind.
+    /// Whether the nodes that the worker executed may have caused it. The exit status of a local process would not tell more: a node that
+    /// takes all memory and a `kill -9` from outside leave the same status.
     #[must_use]
     pub fn is_suspicious(&self) -> bool {
         match self {
@@ -126,7 +35,7 @@ impl Departure {
 }
 
 impl Departure {
-    /// It in one word of a closed list, for programs.
+    /// The departure as one word of a closed list, for programs.
     #[must_use]
     pub fn word(&self) -> &'static str {
         match self {
@@ -196,8 +105,10 @@ pub enum RunEvent {
     Listening {
         /// What the access file tells the workers.
         address: String,
+        /// How many local workers the coordinator starts.
+        local_workers: usize,
     },
-    /// An earlier coordinator of this run is gone on with.
+    /// The run of an earlier coordinator is resumed.
     Resumed {
         /// Counts the coordinator processes of the run, from 1.
         epoch: u64,
@@ -251,7 +162,7 @@ pub enum RunEvent {
         /// The node.
         name: NodeName,
     },
-    /// The inputs of a node are there. Told of runs that are remembered only.
+    /// The inputs of a node are there. Only reported for runs with a journal.
     NodeReady {
         /// The node.
         node: NodeId,
@@ -270,7 +181,7 @@ pub enum RunEvent {
         /// The size of the output in bytes.
         bytes: usize,
     },
-    /// Nobody needs the output of a node any more, not even a coordinator that goes on with this run: only its hash is kept.
+    /// The output of a node is not needed any more, not even to resume the run: only its hash is kept.
     NodeReleased {
         /// The node.
         name: NodeName,
@@ -323,7 +234,7 @@ pub enum RunEvent {
         /// How many workers have died while they executed it.
         crashes: u32,
     },
-    /// A worker has died while it executed this node; or one that was thought to have died of it is back, and its death is taken back.
+    /// A worker has died while it executed this node; or its process is back, and the death is not counted any more.
     DeathsCounted {
         /// The node.
         name: NodeName,
@@ -363,27 +274,4 @@ pub enum RunEvent {
         /// Its size in bytes.
         bytes: usize,
     },
-}
-
-/// What the reactor has said and nobody has done yet, in order.
-#[derive(Debug, Default)]
-pub struct Outbox {
-    actions: Vec<Action>,
-}
-
-impl Outbox {
-    /// Add something to do.
-    pub fn push(&mut self, action: Action) {
-        self.actions.push(action);
-    }
-
-    /// Add something to tell the user.
-    pub fn tell(&mut self, event: RunEvent) {
-        self.push(Action::Tell(event));
-    }
-
-    /// Take all there is to do, in order.
-    pub fn take(&mut self) -> Vec<Action> {
-        std::mem::take(&mut self.actions)
-    }
 }

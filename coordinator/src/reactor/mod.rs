@@ -1,142 +1,37 @@
-//! What happens when something happens: plain functions from state and event to state and actions. No sockets, no clock,
-//! no waiting: time comes in as an argument, and everything the coordinator does goes out through the [`Outbox`].
+//! The state machine: plain functions from state and event to state and actions. No sockets, no clock, no waiting: time is an
+//! argument, and every action goes out through the [`Outbox`].
 //!
-//! Scheduling reacts to events: whenever a node is ready and a worker has a place, the lease is given at once. A lease may
-//! end without a result (its worker left) or be overtaken by the result of another attempt; any attempt's result is as
-//! good as another's, because nodes are pure functions. Results that differ show that one was not, and end the run.
+//! Scheduling reacts to events: when a node is ready and a worker has a place, the lease is given out at once. A lease may end without a
+//! result (its worker left), or another attempt's result may come first. The result of any attempt counts, because nodes are pure
+//! functions; results that differ end the run.
 //!
-//! No event looks at all nodes or all workers: what has to be found among them is indexed in [`core`](crate::core).
+//! No event scans all nodes or all workers: [`state`](crate::state) has indices.
 
 mod answers;
+mod error;
+mod event;
+mod leases;
 mod membership;
 mod quarantine;
+mod results;
 mod schedule;
 mod speculation;
 
 use std::time::Duration;
 
-use lookalike::graph::{
-    Blob, BlobHash, Change, Completion, GraphEdit, NodeFailure, NodeId, NodeState, Placement, PlanError, Planner,
-    WorkerId,
-};
+use lookalike::graph::{Change, Completion, GraphEdit, NodeId, NodeState, Placement, PlanError, Planner};
 
-use crate::comm::{Action, Departure, Outbox, RunEvent, Site, WorkerProcess};
-use crate::core::{Core, Record, Starving};
-use crate::runner::RunError;
-
-/// Something that happened.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Event {
-    /// A worker has said hello and was welcomed.
-    WorkerJoined {
-        /// Its number, never used before.
-        worker: WorkerId,
-        /// How many nodes it executes at a time.
-        threads: usize,
-        /// Its process, which may have been here before under another number.
-        process: WorkerProcess,
-    },
-    /// A worker's connection is gone.
-    WorkerLeft {
-        /// The worker.
-        worker: WorkerId,
-        /// Why.
-        departure: Departure,
-    },
-    /// A worker was asked to end: it finishes what it executes, and what it has not begun with it will not begin with.
-    WorkerDrains {
-        /// The worker.
-        worker: WorkerId,
-    },
-    /// A worker was heard of; it executes these nodes.
-    Heartbeat {
-        /// The worker.
-        worker: WorkerId,
-        /// The nodes it executes.
-        executing: Vec<Executing>,
-    },
-    /// A worker begins to execute a node.
-    Started {
-        /// The worker.
-        worker: WorkerId,
-        /// The node.
-        node: NodeId,
-        /// The attempt under which it was assigned.
-        attempt: u32,
-    },
-    /// A node has an output; its hash was verified.
-    Finished {
-        /// Where it ran.
-        site: Site,
-        /// The node.
-        node: NodeId,
-        /// The attempt under which it was assigned.
-        attempt: u32,
-        /// The output.
-        output: Blob,
-    },
-    /// A worker executes a node already: an earlier coordinator of this run gave it. Unless it has joined already, this has to be
-    /// followed by its [`WorkerJoined`](Self::WorkerJoined).
-    Continues {
-        /// The worker.
-        worker: WorkerId,
-        /// The node, by its number of today.
-        node: NodeId,
-    },
-    /// A worker has the output of a node that an earlier coordinator of this run gave it; its hash was verified.
-    Recovered {
-        /// The worker.
-        worker: WorkerId,
-        /// The node, by its number of today.
-        node: NodeId,
-        /// The output.
-        output: Blob,
-    },
-    /// A node has no output and never will: its own error.
-    Failed {
-        /// Where it ran.
-        site: Site,
-        /// The node.
-        node: NodeId,
-        /// The attempt under which it was assigned.
-        attempt: u32,
-        /// The error.
-        failure: NodeFailure,
-    },
-    /// A worker wants a blob.
-    BlobRequested {
-        /// The worker.
-        worker: WorkerId,
-        /// The name of the blob.
-        hash: BlobHash,
-    },
-    /// The last local worker was given up, and no other can join.
-    LocalWorkersGivenUp {
-        /// How the last one ended.
-        last_status: String,
-    },
-    /// The time of [`Core::next_deadline`] has come.
-    DeadlinePassed,
-    /// The planner may have more to add, though no node has ended.
-    LookAgain,
-}
-
-/// A node that a worker says to execute.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Executing {
-    /// The node.
-    pub node: NodeId,
-    /// The attempt under which it was assigned, perhaps on an earlier connection.
-    pub attempt: u32,
-    /// How much of it is done, in thousandths.
-    pub permille: u16,
-}
+pub use self::error::{NodeAnswer, Stop};
+pub use self::event::{Event, Executing};
+use crate::actions::{Action, Outbox};
+use crate::events::{Departure, RunEvent, Site};
+use crate::state::{Core, Record, Starving};
 
 /// Begin a run: let the planner add the first nodes and act upon them.
 ///
 /// # Errors
 /// Those of the planner.
-pub fn start(core: &mut Core, planner: &mut impl Planner, now: Duration, outbox: &mut Outbox) -> Result<(), RunError> {
+pub fn start(core: &mut Core, planner: &mut impl Planner, now: Duration, outbox: &mut Outbox) -> Result<(), Stop> {
     planner.start(&mut GraphEdit::new(&mut core.graph))?;
     settle(core, planner, now, outbox)
 }
@@ -151,12 +46,12 @@ pub fn handle(
     event: Event,
     now: Duration,
     outbox: &mut Outbox,
-) -> Result<(), RunError> {
+) -> Result<(), Stop> {
     handle_arrived(core, planner, event, (now, now), outbox)
 }
 
-/// Act upon an event that came some time ago: `arrived`, not after `now`, says how long nodes have taken, and nothing else. Nobody
-/// is late because we are.
+/// Act upon an event that arrived earlier, at `arrived`, which is not after `now`. `arrived` measures how long nodes took; deadlines use
+/// `now`, so a late coordinator makes no worker late.
 ///
 /// # Errors
 /// What ends the run: an error of the planner, which by default is any failed node; results that differ; no worker for
@@ -167,7 +62,7 @@ pub fn handle_arrived(
     event: Event,
     (arrived, now): (Duration, Duration),
     outbox: &mut Outbox,
-) -> Result<(), RunError> {
+) -> Result<(), Stop> {
     match event {
         Event::WorkerJoined { worker, threads, process } => {
             membership::join(core, worker, threads, process, now, outbox);
@@ -175,7 +70,7 @@ pub fn handle_arrived(
         Event::WorkerLeft { worker, departure } => membership::leave(core, worker, &departure, now, outbox),
         Event::WorkerDrains { worker } => membership::drain(core, worker, now, outbox),
         Event::Heartbeat { worker, executing } => {
-            membership::renew(core, worker, now);
+            leases::renew(core, worker, now);
             for Executing { node, attempt, permille } in executing {
                 match core.members.progress(worker, node, permille) {
                     Some(true) => outbox.tell(RunEvent::NodeProgress { node, permille }),
@@ -185,13 +80,11 @@ pub fn handle_arrived(
             }
         }
         Event::Started { worker, node, attempt } => {
-            answers::started(core, worker, (node, attempt), (arrived, now), outbox);
+            leases::started(core, worker, (node, attempt), (arrived, now), outbox);
         }
         Event::Finished { site, node, attempt, output } => {
             answers::finished(core, (site, node, attempt), output, (arrived, now), outbox)?;
         }
-        Event::Continues { worker, node } => membership::go_on(core, worker, node, now, outbox),
-        Event::Recovered { worker, node, output } => answers::recovered(core, worker, node, output, now, outbox)?,
         Event::Failed { site, node, attempt, failure } => {
             answers::failed(core, (site, node, attempt), failure, now, outbox)?;
         }
@@ -207,8 +100,8 @@ pub fn handle_arrived(
     settle(core, planner, now, outbox)
 }
 
-/// Let everything follow that follows: tell the planner what happened, queue what became ready, give out leases.
-fn settle(core: &mut Core, planner: &mut impl Planner, now: Duration, outbox: &mut Outbox) -> Result<(), RunError> {
+/// Process the consequences: tell the planner, queue the nodes that became ready, give out leases.
+fn settle(core: &mut Core, planner: &mut impl Planner, now: Duration, outbox: &mut Outbox) -> Result<(), Stop> {
     while let Some(change) = core.graph.next_change() {
         match change {
             Change::Added(node) => {
@@ -225,7 +118,7 @@ fn settle(core: &mut Core, planner: &mut impl Planner, now: Duration, outbox: &m
             }
             Change::Forgotten(node) => outbox.tell(RunEvent::NodeReleased { name: core.name(node) }),
             Change::Failed(node) => {
-                answers::retract(core, node, now, outbox);
+                results::retract(core, node, now, outbox);
                 if let Some(NodeState::Failed(reason)) = core.graph.state(node).cloned() {
                     outbox.tell(RunEvent::NodeFailed { name: core.name(node), reason: reason.clone() });
                     if reason.is_cancellation() {
@@ -243,19 +136,19 @@ fn settle(core: &mut Core, planner: &mut impl Planner, now: Duration, outbox: &m
     watch_starvation(core, now, outbox)
 }
 
-/// What the planner says of an output, with the name of whom it came from where that one did wrong.
-fn refused(core: &Core, node: NodeId, error: PlanError) -> RunError {
+/// The planner's error about an output; where the output is wrong, with the worker that it came from.
+fn refused(core: &Core, node: NodeId, error: PlanError) -> Stop {
     if !matches!(error, PlanError::NotVerified { .. } | PlanError::WrongOutput { .. }) {
-        return RunError::Plan(error);
+        return Stop::Plan(error);
     }
     let site = core.look(node).and_then(|record| record.finished_by).unwrap_or(Site::Coordinator);
-    RunError::WrongResult { name: Box::new(core.name(node)), site, error }
+    Stop::WrongResult { name: Box::new(core.name(node)), site, error }
 }
 
-/// Complete a node from what an earlier coordinator of this run has left. Whether there was something.
-fn recall(core: &mut Core, node: NodeId, outbox: &mut Outbox) -> bool {
+/// Complete a node from the output of an earlier coordinator of this run. Returns whether there was one.
+fn complete_from_past(core: &mut Core, node: NodeId, outbox: &mut Outbox) -> bool {
     let Some(key) = core.graph.key(node) else { return false };
-    let Some(memory) = core.recall.as_mut().map(|recall| recall.recall(key)) else { return false };
+    let Some(memory) = core.past_outputs.as_mut().map(|past| past.of(key)) else { return false };
     if let Some(record) = core.record(node) {
         record.key = Some(key);
         record.deaths = memory.deaths;
@@ -275,8 +168,8 @@ fn make_ready(core: &mut Core, planner: &impl Planner, node: NodeId, now: Durati
     if !core.graph.is_open(node) {
         return;
     }
-    if core.recall.is_some() {
-        if recall(core, node, outbox) {
+    if core.past_outputs.is_some() {
+        if complete_from_past(core, node, outbox) {
             return;
         }
         outbox.tell(RunEvent::NodeReady { node });
@@ -285,7 +178,7 @@ fn make_ready(core: &mut Core, planner: &impl Planner, node: NodeId, now: Durati
     if spec.placement == Placement::Worker {
         let is_verified = answers::is_chosen(core, spec, node) && planner.is_verified_by_repetition(spec);
         core.record(node).into_iter().for_each(|record| record.is_verified = is_verified);
-        schedule::await_now(core, node, now);
+        leases::await_now(core, node, now);
         return;
     }
     core.summary.attempts += 1;
@@ -298,14 +191,14 @@ fn make_ready(core: &mut Core, planner: &impl Planner, node: NodeId, now: Durati
     }
 }
 
-/// Work without a worker: remind the user, and give up after a while.
-fn watch_starvation(core: &mut Core, now: Duration, outbox: &mut Outbox) -> Result<(), RunError> {
+/// Work but no worker: remind the user, and end the run after the limit.
+fn watch_starvation(core: &mut Core, now: Duration, outbox: &mut Outbox) -> Result<(), Stop> {
     if core.waiting.is_empty() || !core.members.is_empty() {
         core.starving = None;
         return Ok(());
     }
     if let Some(last_status) = core.given_up.clone() {
-        return Err(RunError::LocalWorkersKeepDying { last_status });
+        return Err(Stop::LocalWorkersKeepDying { last_status });
     }
     let limit = core.starvation_limit();
     // Never zero: the next deadline has to lie ahead.
@@ -314,7 +207,7 @@ fn watch_starvation(core: &mut Core, now: Duration, outbox: &mut Outbox) -> Resu
     let waited = now.saturating_sub(starving.since);
     if waited >= limit {
         let had_workers = core.summary.workers_joined > 0;
-        return Err(if had_workers { RunError::LostAllWorkers { waited } } else { RunError::NoWorkerCame { waited } });
+        return Err(if had_workers { Stop::LostAllWorkers { waited } } else { Stop::NoWorkerCame { waited } });
     }
     if now >= starving.next_reminder {
         starving.next_reminder = now + remind_every;
@@ -324,9 +217,9 @@ fn watch_starvation(core: &mut Core, now: Duration, outbox: &mut Outbox) -> Resu
 }
 
 #[cfg(test)]
-mod property_tests;
+mod past_outputs_tests;
 #[cfg(test)]
-mod recall_tests;
+mod property_tests;
 #[cfg(test)]
 mod storm_tests;
 #[cfg(test)]

@@ -1,4 +1,4 @@
-//! Worker processes that have lost their connection: many come back, for a connection may break without anybody having died.
+//! Worker processes that have lost their connection. Many come back, because a connection may break without a death.
 
 use std::collections::BTreeMap;
 
@@ -13,7 +13,7 @@ const REMEMBERED: usize = 4096;
 pub(crate) struct Lost {
     /// It had executed nothing.
     pub(crate) was_fresh: bool,
-    /// What it was given and has not answered for: it may go on with it.
+    /// The attempts that it has not answered: it may continue them.
     pub(crate) attempts: BTreeMap<NodeId, u32>,
     /// The deaths that were counted against nodes for its loss.
     pub(crate) deaths: Vec<(NodeId, Death)>,
@@ -24,7 +24,7 @@ pub(crate) struct Lost {
 pub(crate) enum Death {
     InCompany,
     Alone,
-    Excused,
+    NotCounted,
 }
 
 /// All of them, as far as they are remembered.

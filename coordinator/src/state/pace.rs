@@ -10,10 +10,10 @@ use crate::policy::Speculation;
 /// How many of the latest nodes of a kind say what is usual.
 const RECENT: usize = 63;
 
-/// A node of a kind of which nobody knows how long it takes is slow after this many times what makes any other slow at the earliest.
+/// A node of a kind without known duration is slow after this many times [`Speculation::after`].
 const UNKNOWN_IS_SLOW_AFTER: u32 = 12;
 
-/// Of how many nodes of a kind it has to be known how long they took before it is known of the kind.
+/// How many nodes of a kind have to end before the duration of the kind is known.
 pub(crate) const ESTABLISHED: usize = 8;
 
 /// The pace of every kind.
@@ -50,8 +50,8 @@ impl Pace {
         pace.sorted.insert(place, took);
     }
 
-    /// How long nodes of a kind have usually taken lately, once it is known of so many that one cannot be meant for all: a busy coordinator may hear of the begin and the end of
-    /// a node at the same time.
+    /// The recent median duration of a kind, once enough nodes have ended. One would not do: a busy coordinator may read the begin and
+    /// the end of a node at the same time.
     pub(crate) fn established(&self, kind: &str) -> Option<Duration> {
         self.kinds.get(kind).filter(|pace| pace.sorted.len() >= ESTABLISHED)?.usual()
     }
@@ -87,7 +87,7 @@ impl Pace {
     pub(crate) fn next_slow(&self, speculation: Speculation, now: Duration) -> Option<Duration> {
         let next_of = |pace: &KindPace| {
             let limit = pace.limit(speculation, self.longest)?;
-            // Who began at this time or before is slow already. With less time than the limit behind us nobody is.
+            // Nodes that began at this time or before are slow already; before the limit has passed no node is.
             let first = match now.checked_sub(limit) {
                 Some(begin) => pace.running.range((begin, NodeId(u64::MAX))..).next(),
                 None => pace.running.first(),
@@ -112,7 +112,7 @@ impl KindPace {
         let factor = speculation.factor?;
         let (known, least) = match self.usual() {
             Some(median) => (median, speculation.after),
-            // The only one of its kind may hang as well as any other.
+            // A node that is the only one of its kind may hang, too.
             None => (longest, speculation.after.saturating_mul(UNKNOWN_IS_SLOW_AFTER)),
         };
         // A policy's factor is finite; a time beyond all bounds is never reached.

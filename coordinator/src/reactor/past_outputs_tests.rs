@@ -1,25 +1,24 @@
-//! A run that is gone on with: what is remembered does not run, and what survivors hold is not run twice.
+//! A resumed run: a node whose output the journal has does not run again.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, VecDeque};
 use std::time::Duration;
 
 use lookalike::graph::{Blob, Graph, Input, NodeId, NodeKey, NodeSpec, Placement, WorkerId};
 
 use super::tests::{Script, node, process};
-use super::{Event, handle, start};
-use crate::comm::{Action, Departure, Outbox, RunEvent, Site};
-use crate::core::recall::{Memory, Recall};
-use crate::core::{Core, Deaths, Policy};
-use crate::runner::RunError;
+use super::{Event, Stop, handle, start};
+use crate::actions::{Action, Outbox};
+use crate::events::{Departure, RunEvent, Site};
+use crate::state::past_outputs::{Memory, PastOutputs};
+use crate::state::{Core, Deaths, Policy};
 
 const A: WorkerId = WorkerId(1);
-const B: WorkerId = WorkerId(2);
 
 #[derive(Debug, Default)]
 struct Notebook(BTreeMap<NodeKey, Memory>);
 
-impl Recall for Notebook {
-    fn recall(&mut self, key: NodeKey) -> Memory {
+impl PastOutputs for Notebook {
+    fn of(&mut self, key: NodeKey) -> Memory {
         self.0.get(&key).cloned().unwrap_or_default()
     }
 }
@@ -55,13 +54,13 @@ impl Bench {
             node("join", all, Placement::Worker),
         ];
         let planner = Script { nodes, blob: vec![1], ..Script::default() };
-        let core = Core::new(Policy::default(), 2).with_recall(Box::new(notebook));
+        let core = Core::new(Policy::default(), 2).with_past_outputs(Box::new(notebook));
         let mut bench = Self { core, planner, outbox: Outbox::default() };
         start(&mut bench.core, &mut bench.planner, Duration::ZERO, &mut bench.outbox).unwrap();
         bench
     }
 
-    fn handle(&mut self, event: Event) -> Result<Vec<String>, RunError> {
+    fn handle(&mut self, event: Event) -> Result<Vec<String>, Stop> {
         handle(&mut self.core, &mut self.planner, event, Duration::ZERO, &mut self.outbox)?;
         Ok(self.said())
     }
@@ -73,7 +72,6 @@ impl Bench {
     fn said(&mut self) -> Vec<String> {
         let line = |action: &Action| match action {
             Action::Assign { worker, lease } => Some(format!("{worker} gets {}.{}", lease.node.0, lease.attempt)),
-            Action::Cancel { worker, lease } => Some(format!("{worker} drops {}.{}", lease.node.0, lease.attempt)),
             Action::RunHere { node, .. } => Some(format!("run {} here", node.0)),
             Action::Tell(RunEvent::NodeRecalled { name, .. }) => Some(format!("{} recalled", name.label)),
             Action::Tell(RunEvent::NodeRequeued { name, crashes, .. }) => {
@@ -109,6 +107,45 @@ fn run_whose_nodes_are_all_remembered_is_finished_at_once() {
 }
 
 #[test]
+fn run_resumed_from_any_past_outputs_by_any_number_of_workers_ends() {
+    let leaves = [("x", Placement::Worker), ("y", Placement::Worker), ("z", Placement::Coordinator)];
+    for (mask, workers) in (0..8_u8).flat_map(|mask| (1..=3).map(move |workers| (mask, workers))) {
+        let has_output = |bit: &u8| mask >> bit & 1 == 1;
+        let past = (0..3).filter(has_output).map(|bit| {
+            let (name, placement) = leaves[usize::from(bit)];
+            (name, placement, output(bit))
+        });
+        let mut bench = Bench::new(&past.collect::<Vec<_>>());
+        let joined = |number| Event::WorkerJoined { worker: WorkerId(number), threads: 1, process: process(number) };
+        let mut events: VecDeque<Event> = (1..=workers).map(joined).collect();
+        let answer = |site, node: NodeId, attempt| {
+            let output = Blob::new(vec![node.0.to_le_bytes()[0]]);
+            Event::Finished { site, node, attempt, output }
+        };
+        loop {
+            for action in bench.outbox.take() {
+                match action {
+                    Action::Assign { worker, lease } => {
+                        let (node, attempt) = (lease.node, lease.attempt);
+                        events.push_back(Event::Started { worker, node, attempt });
+                        events.push_back(answer(Site::Worker(worker), node, attempt));
+                    }
+                    Action::RunHere { node, attempt } => events.push_back(answer(Site::Coordinator, node, attempt)),
+                    _ => {}
+                }
+            }
+            let Some(event) = events.pop_front() else { break };
+            handle(&mut bench.core, &mut bench.planner, event, Duration::ZERO, &mut bench.outbox).unwrap();
+        }
+        let mut completed = bench.planner.completed.clone();
+        completed.sort_unstable();
+        assert!(bench.core.is_finished(), "outputs {mask:03b}, {workers} workers");
+        assert_eq!(completed, [0, 1, 2, 3].map(NodeId), "outputs {mask:03b}, {workers} workers");
+        assert_eq!(bench.core.summary().recalled_nodes, mask.count_ones() as usize);
+    }
+}
+
+#[test]
 fn deaths_are_remembered() {
     let mut bench = Bench::new(&[(
         "x",
@@ -122,48 +159,10 @@ fn deaths_are_remembered() {
 }
 
 #[test]
-fn what_a_survivor_had_finished_is_taken_from_it_and_nobody_else_runs_it() {
-    let mut bench = Bench::new(&[]);
-    assert_eq!(bench.said(), ["run 2 here"]);
-    // The one that has the output is not even a member yet.
-    let recovered = |byte| Event::Recovered { worker: B, node: NodeId(0), output: Blob::new(vec![byte]) };
-    assert_eq!(bench.handle(recovered(7)).unwrap(), [""; 0]);
-    assert_eq!(bench.planner.completed, [NodeId(0)]);
-    assert_eq!(bench.join(A), ["worker 1 gets 1.1"]);
-    // Once more is fine, another output is not.
-    assert_eq!(bench.handle(recovered(7)).unwrap(), [""; 0]);
-    assert!(matches!(bench.handle(recovered(8)), Err(RunError::ResultsDiffer { .. })));
-}
-
-#[test]
-fn output_of_a_survivor_ends_the_lease_of_another_worker() {
-    let mut bench = Bench::new(&[]);
-    bench.join(A);
-    let recovered = Event::Recovered { worker: B, node: NodeId(1), output: Blob::new(vec![7]) };
-    let said = bench.handle(recovered).unwrap();
-    assert!(said.contains(&"worker 1 drops 1.1".to_owned()), "{said:?}");
-}
-
-#[test]
-fn survivor_gets_what_it_has_in_hand_before_others_get_anything() {
-    let mut bench = Bench::new(&[]);
-    bench.said();
-    bench.handle(Event::Continues { worker: B, node: NodeId(0) }).unwrap();
-    // A node that is done, or of another time, is nobody's.
-    bench.handle(Event::Continues { worker: B, node: NodeId(77) }).unwrap();
-    // Whoever joins first.
-    assert_eq!(bench.join(A), ["worker 1 gets 1.1"]);
-    assert_eq!(bench.join(B), ["worker 2 gets 0.1"]);
-    // An idle worker is given what merely waits somewhere, and not what was begun.
-    let third = bench.join(WorkerId(3));
-    assert!(third.iter().all(|said| !said.contains(" gets 0.")), "{third:?}");
-}
-
-#[test]
 fn output_that_deaths_make_the_last_word_is_kept() {
     let nodes = vec![leaf("x", Placement::Worker)];
     let policy = Policy { verify_fraction: 1.0, ..Policy::default() };
-    let core = Core::new(policy, 1).with_recall(Box::new(Notebook::default()));
+    let core = Core::new(policy, 1).with_past_outputs(Box::new(Notebook::default()));
     let mut bench = Bench { core, planner: Script { nodes, ..Script::default() }, outbox: Outbox::default() };
     start(&mut bench.core, &mut bench.planner, Duration::ZERO, &mut bench.outbox).unwrap();
     bench.join(A);

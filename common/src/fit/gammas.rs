@@ -1,7 +1,7 @@
-//! `--gammas`: the exponents of stage one (\[BP20b\] section 3 tries 1.0, 1.1, ..., 3.0).
+//! The exponents of stage one (\[BP20b\] section 3 tries 1.0, 1.1, ..., 3.0).
 
-use anyhow::{Context, bail};
 use std::{fmt, str::FromStr};
+use thiserror::Error;
 
 /// An arithmetic sequence of gammas, both ends included where the step reaches them.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -11,26 +11,78 @@ pub struct Gammas {
     step: f64,
 }
 
+/// What is wrong with a sequence of gammas.
+#[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
+pub enum GammasError {
+    /// Not a sequence.
+    #[error("expected START:STOP:STEP, such as 1:3:0.1, or one number")]
+    Form,
+    /// The first gamma is out of range.
+    #[error("a gamma must lie between {SMALLEST_STEP} and {LARGEST}, found {found}")]
+    Start {
+        /// The first gamma.
+        found: f64,
+    },
+    /// The last gamma is out of range.
+    #[error("the last gamma must lie between the first ({start}) and {LARGEST}, found {found}")]
+    Stop {
+        /// The first gamma.
+        start: f64,
+        /// The last gamma.
+        found: f64,
+    },
+    /// The step is too small or not finite.
+    #[error("the step must be at least {SMALLEST_STEP}, found {found}")]
+    Step {
+        /// The step.
+        found: f64,
+    },
+    /// More gammas than anyone searches.
+    #[error("at most {MOST} gammas, found a step of {step} from {start} to {stop}")]
+    TooMany {
+        /// The first gamma.
+        start: f64,
+        /// The last gamma.
+        stop: f64,
+        /// The step.
+        step: f64,
+    },
+}
+
 impl Gammas {
+    /// The 21 gammas of the paper.
+    pub const DEFAULT: Self = Self { start: 1.0, stop: 3.0, step: 0.1 };
+
     /// The sequence from `start` to `stop` by `step`.
     ///
     /// # Errors
     /// If `start` is below 1e-6, `stop` lies below `start` or above 100, `step` is below 1e-6, or there would be more
     /// than 1000 of them.
-    pub fn new(start: f64, stop: f64, step: f64) -> anyhow::Result<Self> {
+    pub fn new(start: f64, stop: f64, step: f64) -> Result<Self, GammasError> {
         if !(SMALLEST_STEP..=LARGEST).contains(&start) {
-            bail!("a gamma must lie between {SMALLEST_STEP} and {LARGEST}, found {start}");
+            return Err(GammasError::Start { found: start });
         }
         if !(start..=LARGEST).contains(&stop) {
-            bail!("the last gamma must lie between the first ({start}) and {LARGEST}, found {stop}");
+            return Err(GammasError::Stop { start, found: stop });
         }
         if !(step >= SMALLEST_STEP && step.is_finite()) {
-            bail!("the step must be at least {SMALLEST_STEP}, found {step}");
+            return Err(GammasError::Step { found: step });
         }
         if (stop - start) / step > (MOST - 1) as f64 {
-            bail!("at most {MOST} gammas, found a step of {step} from {start} to {stop}");
+            return Err(GammasError::TooMany { start, stop, step });
         }
         Ok(Self { start, stop, step })
+    }
+
+    /// The sequence of values that [`Self::values`] gave, up to the part of the range that its last step did not reach.
+    ///
+    /// Returns `None` for an empty list.
+    #[must_use]
+    pub fn of_values(values: &[f64]) -> Option<Self> {
+        let (&start, &stop) = (values.first()?, values.last()?);
+        let step = values.get(1).map_or(1.0, |second| ((second - start) * PER_UNIT).round() / PER_UNIT);
+        Some(Self { start, stop, step })
     }
 
     /// The gammas, ascending: `start + i * step` rounded to the nearest multiple of 1e-9, so that each is the double
@@ -43,26 +95,24 @@ impl Gammas {
 }
 
 impl Default for Gammas {
-    /// The 21 gammas of the paper.
     fn default() -> Self {
-        Self { start: 1.0, stop: 3.0, step: 0.1 }
+        Self::DEFAULT
     }
 }
 
 impl FromStr for Gammas {
-    type Err = anyhow::Error;
+    type Err = GammasError;
 
     /// `START:STOP:STEP`, or one number for a single gamma.
-    fn from_str(text: &str) -> anyhow::Result<Self> {
+    fn from_str(text: &str) -> Result<Self, GammasError> {
         let numbers: Option<Vec<f64>> = text.split(':').map(|part| part.trim().parse().ok()).collect();
-        match numbers.context("expected START:STOP:STEP, such as 1:3:0.1, or one number")?[..] {
+        match numbers.ok_or(GammasError::Form)?[..] {
             [gamma] => Self::new(gamma, gamma, 1.0),
             [start, stop, step] => Self::new(start, stop, step),
-            _ => bail!("expected START:STOP:STEP, such as 1:3:0.1, or one number"),
+            _ => Err(GammasError::Form),
         }
     }
 }
-
 impl fmt::Display for Gammas {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}:{}:{}", self.start, self.stop, self.step)
@@ -91,6 +141,8 @@ mod tests {
         assert_eq!(Gammas::default().values(), decimals);
         assert_eq!("1:3:0.1".parse::<Gammas>().unwrap(), Gammas::default());
         assert_eq!(Gammas::default().to_string(), "1:3:0.1");
+        assert_eq!(Gammas::of_values(&decimals), Some(Gammas::default()));
+        assert_eq!(Gammas::of_values(&[]), None);
     }
 
     #[test]

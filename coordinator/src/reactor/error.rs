@@ -1,0 +1,96 @@
+//! Why the reactor ends a run.
+
+use std::fmt;
+use std::time::Duration;
+
+use lookalike::graph::{BlobHash, FailureReason, NodeFailure, PlanError};
+use thiserror::Error;
+
+use crate::events::{NodeName, Site};
+
+/// Why the reactor ends a run without its result.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum Stop {
+    /// No worker has connected.
+    #[error("no worker connected in {} s; check that workers can reach the address in the access file, or wait longer with --wait-for-workers", waited.as_secs())]
+    NoWorkerCame {
+        /// How long there was work but no worker.
+        waited: Duration,
+    },
+    /// All workers are lost, and no other has connected.
+    #[error("all workers were lost, and no other connected in {} s; see why they ended, or wait longer with --grace", waited.as_secs())]
+    LostAllWorkers {
+        /// How long there was work but no worker.
+        waited: Duration,
+    },
+    /// The local workers die whenever they are started.
+    #[error("the local worker processes keep dying, the last one with {last_status}; see their lines on stderr")]
+    LocalWorkersKeepDying {
+        /// How the last one ended.
+        last_status: String,
+    },
+    /// Two computations of one node gave different outputs.
+    #[error(
+        "two results of {name} differ ({first} from {first_site}, {second} from {second_site}), so neither can be trusted; use the same build everywhere, check the memory of these machines, and report this"
+    )]
+    ResultsDiffer {
+        /// The node.
+        name: Box<NodeName>,
+        /// Where the first result came from.
+        first_site: Site,
+        /// The first result.
+        first: NodeAnswer,
+        /// Where the second result came from.
+        second_site: Site,
+        /// The second result.
+        second: NodeAnswer,
+    },
+    /// A result is not what its node or its recomputation gives.
+    #[error(
+        "the result of {name} from {site} is wrong: {error}; use the same build everywhere, check the memory of that machine, and report this"
+    )]
+    WrongResult {
+        /// The node.
+        name: Box<NodeName>,
+        /// Where the result came from.
+        site: Site,
+        /// What is wrong with it.
+        error: PlanError,
+    },
+    /// The planner cannot go on, by default because a node failed.
+    #[error(transparent)]
+    Plan(#[from] PlanError),
+}
+
+impl Stop {
+    /// The exit code of the program: 2 when a node's own error is about the user's input, else 3.
+    #[must_use]
+    pub fn exit_code(&self) -> u8 {
+        match self {
+            // A panic or an unknown kind is an error of this program.
+            Self::Plan(PlanError::NodeFailed {
+                reason: FailureReason::Node(NodeFailure::Application { .. }), ..
+            }) => 2,
+            _ => 3,
+        }
+    }
+}
+
+/// What a computation of a node came to.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum NodeAnswer {
+    /// An output of this name.
+    Output(BlobHash),
+    /// An error.
+    Failure(Box<NodeFailure>),
+}
+
+impl fmt::Display for NodeAnswer {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Output(hash) => write!(formatter, "output {hash:?}"),
+            Self::Failure(failure) => write!(formatter, "the error {:?}", failure.to_string()),
+        }
+    }
+}
