@@ -1,5 +1,5 @@
 #!/bin/sh
-# Fills corpus/ with files to start from.
+# Fills corpus/ with seed files.
 set -eu
 cd "$(dirname "$0")"
 mkdir -p corpus/exr corpus/hdr corpus/pfm corpus/png_jpeg corpus/codec corpus/journal corpus/manifest
@@ -9,10 +9,10 @@ printf '#?RGBE\n\n+X 1 -Y 4\n\200\100\040\201\001\001\001\003' > corpus/hdr/old
 printf 'PF\n1 1\n-1.0\n\000\000\200\077\000\000\200\077\000\000\200\077' > corpus/pfm/colour
 printf 'Pf\r\n1 2\r\n2\r\n\077\200\000\000\077\200\000\000' > corpus/pfm/grey
 cp seeds/png_jpeg/* corpus/png_jpeg/
-# The first byte chooses the decoder: a frame of a goodbye, an access file.
+# The first byte selects the reader: a frame with a goodbye message, an access file.
 printf '\001\003\002\000\000\000\000\006' > corpus/codec/frame
 printf '\006{ "address": "127.0.0.1:45123", "certificate": "blake3:%064d", "secret": "%064d" }' 0 0 > corpus/codec/access
-# The third table, its fourth column, a number: a state that there is not.
+# Third table, fourth column, an integer: a node state that does not exist.
 printf '\002\003\001\000\377\000\000\000\000\000\000\000' > corpus/journal/state
 printf '\006\004\004\001abcdefgh' > corpus/journal/output
 printf 'photos = ["*.exr"]\nenvironments = "sky.hdr"\nmodels = ["ggx"]\n[defaults]\nsamples = 32\n[[set]]\nname = "a"\nphotos = "gold.exr"\nenvironments = "sky.hdr"\nenv-rotation = 90\n[[fit]]\nname = "b"\nphoto = "tin.exr"\nenv = "sky.hdr"\nsphere = [1, 2, 3]\nmax-cssim = 0.05\n' > corpus/manifest/all

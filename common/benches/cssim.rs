@@ -1,6 +1,6 @@
-//! One CSSIM score of a 256 x 256 image of a sphere: against a prepared reference, and on the plain path.
+//! One CSSIM score of a 256 x 256 image of a sphere: against a prepared reference, and by the plain path `cid`.
 //!
-//! `RAYON_NUM_THREADS=1 cargo bench -p lookalike --bench cssim` for the time on one core.
+//! For the time on one core: `RAYON_NUM_THREADS=1 cargo bench -p lookalike --bench cssim`.
 
 use std::hint::black_box;
 

@@ -1,10 +1,10 @@
 //! Eq. 1 by transport tables against the direct integrator, on one sphere of 256 x 256 pixels in a synthetic room.
 //!
-//! `cargo bench -p lookalike --bench transport` times the kernels and ends with two ratios from the same run:
+//! `cargo bench -p lookalike --bench transport` times the kernels, then prints two ratios from the same run:
 //! - one evaluation of Eq. 1 over 256 pixels by tables, against the direct integrator at 256 samples per pixel and at the
-//!   sample count where its own noise falls to 0.2 % of mean radiance, the tables' accuracy;
-//! - stage one with the building of its table, 21 searches, against as many direct renderings of the full image as the
-//!   searches made evaluations.
+//!   sample count where its noise falls to 0.2 % of mean radiance, which is the accuracy of the tables;
+//! - stage one (21 searches and the table they need), against one direct rendering of the full image for every evaluation
+//!   that the searches made.
 
 use std::{hint::black_box, sync::Arc, time::Instant};
 
@@ -87,7 +87,7 @@ impl Study {
         Integrator { geometry: &self.geometry, light: &self.light, samples, seed }
     }
 
-    /// Renders pixels directly, on all cores as the tables are.
+    /// Renders pixels with the direct integrator, on all cores like the tables.
     fn direct(&self, pixels: &[Pixel], samples: u32, seed: u64) -> Vec<Rgb> {
         pixels.par_iter().map(|&p| self.integrator(samples, seed).pixel(p, &self.material)).collect()
     }
@@ -147,7 +147,7 @@ fn kernels(criterion: &mut Criterion) {
     ratios(&study);
 }
 
-#[allow(clippy::print_stdout, reason = "a bench reports to whoever runs it")]
+#[allow(clippy::print_stdout, reason = "a bench reports on stdout")]
 fn ratios(study: &Study) {
     let pixels = &study.subset.pixels;
     let table = study.table();
@@ -155,7 +155,7 @@ fn ratios(study: &Study) {
     let by_table = seconds(200, || {
         black_box(objective.cost(black_box(&TRUTH)));
     });
-    // On one core, as one evaluation by tables is.
+    // On one core, because one evaluation by tables runs on one core.
     let one_core = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a pool of one thread starts");
     let direct = |samples: u32| seconds(2, || drop(black_box(one_core.install(|| study.direct(pixels, samples, 1)))));
     let reached = (8..=17).map(|log| 1u32 << log).find(|&samples| study.noise(samples) < 2e-3);

@@ -3,8 +3,8 @@
 //!
 //! `render_sphere MAP OUT.exr MAP_OUT.exr SIZE SAMPLES diffuse ALBEDO | correlated ALPHA | separable ALPHA`
 //!
-//! `correlated` is this project's `ggx` at F = 1. `separable` differs from it in masking only, `G1(l) G1(v)`, which is
-//! what Mitsuba's `roughconductor` has. `MAP_OUT.exr` is the map as it is seen here, lat-long.
+//! `correlated` is this project's `ggx` at F = 1. `separable` differs from it only in the masking term, `G1(l) G1(v)`, as
+//! in Mitsuba's `roughconductor`. `MAP_OUT.exr` receives the map that the rendering uses, converted to lat-long.
 
 use lookalike::{
     brdf::{Angles, Ggx, Material, Reflectance},

@@ -1,5 +1,5 @@
-//! Everything that reads bytes of a peer: the preamble, frames, messages, blobs in parts, the payloads of every kind of node, and
-//! the access file. The first byte says which.
+//! The readers of what a peer sends: the preamble, frames, messages, blobs in parts, the payloads of every kind of node; and of the
+//! access file. The first byte selects the reader.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
@@ -19,8 +19,8 @@ fuzz_target!(|bytes: &[u8]| {
     }
 });
 
-/// The messages of the handshake; what is accepted is written and read again. (Their two reserved bytes are not looked at: another
-/// version may use them.)
+/// The messages of the handshake. An accepted message is written and read back. Their two reserved bytes are ignored, because
+/// another version may use them.
 fn preamble(bytes: &[u8]) {
     if let Some(Ok(challenge)) = bytes.first_chunk().map(Challenge::from_bytes) {
         assert_eq!(Challenge::from_bytes(&challenge.to_bytes()), Ok(challenge));
@@ -33,7 +33,7 @@ fn preamble(bytes: &[u8]) {
     }
 }
 
-/// A stream cut into frames: the same ones however it comes in pieces.
+/// A stream gives the same frames, whatever the size of the pieces in which it arrives.
 fn frames(bytes: &[u8]) {
     let Some((&size, stream)) = bytes.split_first() else { return };
     let read = |size: usize| {
@@ -70,7 +70,7 @@ fn frames(bytes: &[u8]) {
     assert!(stream.starts_with(&again));
 }
 
-/// A message; what is read is written and read again.
+/// A message. A message that was read is written and read back.
 fn message<T: serde::de::DeserializeOwned + serde::Serialize + PartialEq + Debug>(bytes: &[u8]) {
     if let Ok(message) = decode_message::<T>(bytes) {
         let again = encode_message(&message).expect("a message that was read");
@@ -78,7 +78,7 @@ fn message<T: serde::de::DeserializeOwned + serde::Serialize + PartialEq + Debug
     }
 }
 
-/// An announced blob that comes in parts.
+/// An announced blob that arrives in parts.
 fn blob(bytes: &[u8]) {
     let Some((length, rest)) = bytes.split_first_chunk() else { return };
     let Some((&size, rest)) = rest.split_first() else { return };
@@ -91,8 +91,8 @@ fn blob(bytes: &[u8]) {
     assert_eq!(incoming.finish().is_ok(), complete);
 }
 
-/// A node of any kind whose parameters and inputs are these bytes: an error, never a panic. (libFuzzer ends the process at any
-/// panic, even one that the registry would catch.)
+/// A node of any kind with these bytes as parameters and inputs. It must not panic: libFuzzer ends the process at every panic, also
+/// at one that the registry would catch.
 fn node(bytes: &[u8]) {
     let registry = nodes::registry();
     let kinds: Vec<_> = registry.kinds().collect();
@@ -109,7 +109,7 @@ fn node(bytes: &[u8]) {
     let _ = registry.run(kinds[usize::from(kind) % kinds.len()], parameters, &inputs, &context);
 }
 
-/// The access file, and a geometry as it travels.
+/// The access file, and a geometry in its wire encoding.
 fn text(bytes: &[u8]) {
     let _ = lookalike::protocol::decode::<GeometrySpec>(bytes);
     let Ok(text) = std::str::from_utf8(bytes) else { return };

@@ -6,11 +6,11 @@ use lookalike::image::{Limits, Source};
 
 fuzz_target!(
     init: {
-        // The reader catches panics of the `exr` crate's decompressors; libFuzzer's hook would end the process before.
+        // The reader catches panics of the `exr` crate's decompressors. libFuzzer's hook would end the process before that.
         let stop = std::panic::take_hook();
         std::panic::set_hook(Box::new(move |panic| {
-            let caught = panic.location().is_some_and(|at| at.file().contains("/exr-") && at.file().contains("/src/compression/"));
-            if !caught {
+            let is_caught = panic.location().is_some_and(|at| at.file().contains("/exr-") && at.file().contains("/src/compression/"));
+            if !is_caught {
                 stop(panic);
             }
         }));

@@ -1,5 +1,5 @@
-//! The journal of a run, any value of any row replaced by another: `lookalike status` and a coordinator that resumes the run say
-//! what is wrong, or go on to the right result.
+//! The journal of a run with any values replaced. `lookalike status` and a coordinator that resumes the run must report an error or
+//! reach the expected result.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
@@ -19,7 +19,7 @@ use std::{
 };
 use tempfile::TempDir;
 
-/// Doubles its parameters.
+/// Outputs its parameters twice.
 struct Double;
 
 impl NodeType for Double {
@@ -32,7 +32,7 @@ impl NodeType for Double {
     }
 }
 
-/// Three nodes in the coordinator's own process.
+/// Three nodes that run in the coordinator's process.
 #[derive(Default)]
 struct Three(Vec<(NodeId, Vec<u8>)>);
 
@@ -57,7 +57,7 @@ impl Planner for Three {
     }
 }
 
-/// The outputs of a run in this folder.
+/// The outputs of a run in `folder`.
 fn outputs(folder: &Path, resume: bool) -> Result<Vec<Vec<u8>>, RunError> {
     let mut options = RunnerOptions { handle_signals: false, ..RunnerOptions::new(0, folder.join("access.json")) };
     options.listen = Some((Ipv4Addr::LOCALHOST, 0).into());
@@ -70,38 +70,38 @@ fn outputs(folder: &Path, resume: bool) -> Result<Vec<Vec<u8>>, RunError> {
     Ok(planner.0.into_iter().map(|(_, output)| output).collect())
 }
 
-/// A finished journal, copied before every change.
-static WHOLE: LazyLock<TempDir> = LazyLock::new(|| {
+/// The journal of a finished run. Each input changes a copy of it.
+static FINISHED: LazyLock<TempDir> = LazyLock::new(|| {
     let folder = tempfile::tempdir().expect("a temporary folder");
-    assert_eq!(outputs(folder.path(), false).expect("a run"), RIGHT.map(Vec::from));
+    assert_eq!(outputs(folder.path(), false).expect("a run"), EXPECTED.map(Vec::from));
     let journal = Connection::open(folder.path().join("run.sqlite")).expect("a journal");
     journal.pragma_update(None, "journal_mode", "delete").expect("a journal in one file");
     folder
 });
 
-const RIGHT: [[u8; 2]; 3] = [[0, 0], [1, 1], [2, 2]];
+const EXPECTED: [[u8; 2]; 3] = [[0, 0], [1, 1], [2, 2]];
 
 const TABLES: [&str; 6] = ["run", "epochs", "nodes", "attempts", "workers", "results"];
 
 fuzz_target!(|bytes: &[u8]| {
     let folder = tempfile::tempdir().expect("a temporary folder");
-    for file in fs::read_dir(WHOLE.path()).expect("a folder of ours").flatten() {
-        fs::copy(file.path(), folder.path().join(file.file_name())).expect("a file of ours");
+    for file in fs::read_dir(FINISHED.path()).expect("the finished run's folder").flatten() {
+        fs::copy(file.path(), folder.path().join(file.file_name())).expect("a copy of its file");
     }
     {
         let journal = Connection::open(folder.path().join("run.sqlite")).expect("a journal");
         for change in bytes.chunks(12) {
-            spoil(&journal, change);
+            corrupt(&journal, change);
         }
     }
     let _ = Status::of(folder.path());
     if let Ok(found) = outputs(folder.path(), true) {
-        assert_eq!(found, RIGHT.map(Vec::from));
+        assert_eq!(found, EXPECTED.map(Vec::from));
     }
 });
 
-/// Replace a column of all rows of a table, or of one.
-fn spoil(journal: &Connection, change: &[u8]) {
+/// Replaces the value of one column, in one row or in all rows of a table.
+fn corrupt(journal: &Connection, change: &[u8]) {
     let [table, column, kind, row, rest @ ..] = change else { return };
     let table = TABLES[usize::from(*table) % TABLES.len()];
     let columns: Vec<String> = {
@@ -120,7 +120,7 @@ fn spoil(journal: &Connection, change: &[u8]) {
         3 => Value::Text(String::from_utf8_lossy(rest).into_owned()),
         _ => Value::Blob(rest.to_vec()),
     };
-    // What the table refuses stays.
+    // A value that violates a constraint of the table is not written.
     let _ = match row % 4 {
         3 => journal.execute(&format!("UPDATE {table} SET {column} = ?1"), params![value]),
         row => {

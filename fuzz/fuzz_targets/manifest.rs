@@ -1,4 +1,4 @@
-//! The manifest of a batch: any text is a list of fits, or an error.
+//! The manifest of a batch: any text gives a list of fits or an error.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
@@ -9,20 +9,20 @@ thread_local! {
     static FOLDER: LazyCell<TempDir> = LazyCell::new(|| {
         let folder = tempfile::tempdir().expect("a temporary folder");
         for name in ["gold.exr", "tin.exr", "sky.hdr"] {
-            fs::write(folder.path().join(name), "").expect("a file of ours");
+            fs::write(folder.path().join(name), "").expect("an input file");
         }
         folder
     });
 }
 
 fuzz_target!(|text: &str| {
-    // Patterns are looked for in this folder alone: elsewhere they take as long as the disk is large.
+    // Only patterns inside this folder: others may search the whole disk, which takes too long.
     if text.contains(['/', '\\']) || text.contains("..") || text.contains("**") {
         return;
     }
     FOLDER.with(|folder| {
         let path = folder.path().join("manifest.toml");
-        fs::write(&path, text).expect("a file of ours");
+        fs::write(&path, text).expect("an input file");
         match lookalike_app::fuzzing::manifest(&path) {
             Ok(fits) => assert!(fits > 0),
             Err(error) => assert!(error.contains("manifest.toml"), "does not name its file: {error}"),

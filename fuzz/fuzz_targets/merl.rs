@@ -1,4 +1,4 @@
-//! MERL tables. A valid one has 35 MB, so the fuzzer's bytes are laid over one that is made once.
+//! MERL tables. A valid table has 35 MB, so the fuzzer's bytes replace a part of one that is built once.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
@@ -12,9 +12,9 @@ static WHOLE: LazyLock<Vec<u8>> = LazyLock::new(|| {
 });
 
 fuzz_target!(|bytes: &[u8]| {
-    // As they are: header and length.
+    // As a whole file, for the header and the length.
     let _ = MerlTable::read("fuzz", bytes);
-    // As the last values of every plane.
+    // As the last values of each plane.
     let mut whole = WHOLE.clone();
     let plane = (whole.len() - 12) / 3;
     for channel in 1..=3 {

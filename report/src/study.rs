@@ -1,6 +1,7 @@
 //! Selects the rows of a section from the flat table.
 
 use crate::measured::{Method, Row, StudyData};
+use lookalike::brdf::{DEFAULT_MODEL, PAPER_MODEL};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// The name of the metric whose scores are CSSIM.
@@ -70,7 +71,7 @@ impl<'a> Study<'a> {
             return Self { data, pictures, model: about.model.clone(), samples, seed: about.seed };
         }
         let drawn = || grid.iter().filter(|row| row.samples == samples);
-        let model = commonest(drawn().map(|row| row.model.clone()), |model| model == "ggx");
+        let model = commonest(drawn().map(|row| row.model.clone()), |model| model == DEFAULT_MODEL.name());
         let seed = commonest(drawn().map(|row| row.seed), |_| false);
         Self { data, pictures, model: model.unwrap_or_default(), samples, seed: seed.unwrap_or(0) }
     }
@@ -135,7 +136,7 @@ impl<'a> Study<'a> {
     pub(super) fn rows(&self, pick: &Pick<'_>) -> Vec<&'a Row> {
         let rows: Vec<&Row> = self.data.rows.iter().filter(|row| pick.admits(row)).collect();
         let models: BTreeSet<&str> = rows.iter().map(|row| row.model.as_str()).collect();
-        let usual = if pick.method == Method::Paper { "cook-torrance" } else { &self.model };
+        let usual = if pick.method == Method::Paper { PAPER_MODEL.name() } else { &self.model };
         let model = pick.model.or_else(|| models.get(usual).copied()).or_else(|| models.first().copied());
         rows.into_iter().filter(|row| Some(row.model.as_str()) == model).collect()
     }

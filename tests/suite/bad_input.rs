@@ -46,7 +46,7 @@ fn environment_maps() {
     for (file, phrases) in [
         ("missing.exr", &["there is no such file; check the path"][..]),
         ("folder.exr", &["expected a file, found a folder"]),
-        ("half.exr", &["not a complete OpenEXR file", "copy or export it again"]),
+        ("half.exr", &["not a valid OpenEXR file", "copy or export it again"]),
         ("empty.exr", &["found an empty file"]),
         ("notes.txt", &["expected OpenEXR, Radiance HDR, PFM, PNG or JPEG"]),
         ("map.png", &["found display values (PNG)", "clipped", "use the HDR file"]),
@@ -105,7 +105,7 @@ fn normal_maps() {
         ("packed.exr", "decode them by 2 c - 1"),
         ("nan.exr", "(NaN, NaN, NaN) at column 0, row 0"),
         ("tiny.exr", "1 x 1"),
-        ("half.exr", "not a complete OpenEXR file"),
+        ("half.exr", "not a valid OpenEXR file"),
     ] {
         let answer = lookalike(folder.path(), &format!("{PAINT} --env map.exr --normals {file}"));
         answer.refused(&[&format!("cannot use {file} as the normal map"), phrase]);
@@ -119,7 +119,7 @@ fn images_to_compare() {
         ("missing.exr photo.exr", &["cannot use missing.exr as the reference", "no such file"][..]),
         ("photo.exr missing.exr", &["cannot use missing.exr as the image", "no such file"]),
         ("photo.exr folder.exr", &["cannot use folder.exr as the image", "found a folder"]),
-        ("photo.exr half.exr", &["cannot use half.exr as the image", "not a complete OpenEXR file"]),
+        ("photo.exr half.exr", &["cannot use half.exr as the image", "not a valid OpenEXR file"]),
         ("photo.exr map.exr", &["cannot compare photo.exr and map.exr", "expected 24 x 24 pixels, found 16 x 8"]),
         ("tiny.exr tiny.exr", &["1 x 1 pixels is too small", "at least 11 x 11"]),
         ("nan24.exr nan24.exr", &["found NaN", "column 5, row 4"]),
@@ -171,7 +171,7 @@ fn photos_of_a_fit() {
     write_exr(&at("wide.exr"), &image(20, 8, |_, _| [0.0, 0.0, 1.0]));
     for (photo, mask, normals, phrases) in [
         ("missing.exr", None, None, &["missing.exr as the photo", "there is no such file"][..]),
-        ("half.exr", None, None, &["half.exr as the photo", "not a complete OpenEXR file"]),
+        ("half.exr", None, None, &["half.exr as the photo", "not a valid OpenEXR file"]),
         ("tiny.exr", None, None, &["at least 2 x 2"]),
         ("dark.exr", None, None, &["dark.exr as the photo", "black over the whole object"]),
         ("half_nan.exr", None, None, &["are not finite, the first at column"]),
@@ -197,6 +197,6 @@ fn a_photo_with_a_few_faults_is_used_without_them() {
     assert_eq!(loaded.capture.status()[12 * 24 + 12], PixelStatus::NotFinite);
     assert_eq!((loaded.circle_source, loaded.mask.is_none()), (Some(CircleSource::Inscribed), true));
     let said = |phrase: &str| loaded.warnings.iter().filter(|text| text.contains(phrase)).count();
-    assert_eq!((said("1 pixels of the object are not finite"), said("not black around the object")), (1, 1));
+    assert_eq!((said("1 pixel of the object is not finite"), said("not black around the object")), (1, 1));
     assert_eq!(loaded.photo.blake3, lookalike::image::content_hash(&photo).to_hex().to_string());
 }

@@ -1,5 +1,6 @@
 //! The command line as scripts see it: the real binary, exact exit codes, what goes to stdout and what to stderr.
 
+use lookalike::brdf::DEFAULT_MODEL;
 use std::{
     fs,
     path::Path,
@@ -64,7 +65,7 @@ fn without_arguments_the_short_help_is_an_error() {
 fn every_default_of_a_fit_is_in_its_help() {
     let help = lookalike("fit -h").stdout.split_whitespace().collect::<Vec<_>>().join(" ");
     for default in [
-        "[default: ggx]",
+        &format!("[default: {}]", DEFAULT_MODEL.name()),
         "[default: 1:3:0.1]",
         "[default: 256]",
         "[default: importance]",

@@ -1,20 +1,20 @@
-//! How a process learns that it shall end: signals, and the leash on which a coordinator keeps its local workers.
+//! Requests to end a process: signals, and, for local workers, the leash: a pipe on stdin that closes when the coordinator ends.
 
 use std::io::{self, Read};
 
 use tokio_util::sync::CancellationToken;
 
-/// The wishes that this process shall end.
+/// Requests to end this process.
 #[derive(Clone, Debug, Default)]
 pub struct Wishes {
-    /// Cancelled by the first SIGTERM or Ctrl-C: finish what is begun, then end.
+    /// Cancelled by the first SIGTERM or Ctrl-C: finish running nodes, then end.
     pub drain: CancellationToken,
-    /// Cancelled by the second, and by the end of the leash: end at once.
+    /// Cancelled by the second one, and by the end of the leash: end at once.
     pub end: CancellationToken,
 }
 
-/// From now on, what asks this process to end is a wish: signals and, if it is leashed, the end of stdin, which means that its
-/// coordinator has ended or was killed.
+/// Watch for requests to end: signals and, if the process is leashed, the end of stdin, which means that its coordinator has ended or
+/// was killed.
 pub(crate) fn watch_for_the_end(is_leashed: bool) -> io::Result<Wishes> {
     let wishes = Wishes::default();
     let Wishes { drain, end } = wishes.clone();
@@ -28,7 +28,7 @@ pub(crate) fn watch_for_the_end(is_leashed: bool) -> io::Result<Wishes> {
     if is_leashed {
         let end = wishes.end.clone();
         let watch = move || {
-            // A byte, the end of the stream and an error all mean the same.
+            // A byte, the end of the stream and an error all have the same meaning.
             let _ = io::stdin().lock().read(&mut [0]);
             end.cancel();
         };
@@ -45,10 +45,10 @@ pub struct EndSignals {
 }
 
 impl EndSignals {
-    /// From now on the signals do not end the process by themselves any more. Needs a tokio runtime with I/O.
+    /// Replace the default handling, which ends the process. Needs a tokio runtime with I/O.
     ///
     /// # Errors
-    /// When the system does not let us.
+    /// If the system refuses.
     pub fn listen() -> io::Result<Self> {
         #[cfg(unix)]
         {
@@ -68,7 +68,7 @@ impl EndSignals {
         }
         #[cfg(not(unix))]
         if tokio::signal::ctrl_c().await.is_err() {
-            // There is no Ctrl-C here, so nobody can ask.
+            // There is no Ctrl-C on this system, so no signal will ever arrive.
             std::future::pending::<()>().await;
         }
     }

@@ -1,10 +1,10 @@
 //! The worker: connects to a coordinator over TCP and TLS, runs nodes of the job graph on its rayon pool, returns results.
 //!
-//! Threads: the main thread talks to the coordinator and never computes; the pool computes and never talks; one thread
-//! sends heartbeats; with `--leash` one more watches stdin, whose end ends the process. A worker keeps computing while its
-//! connection is broken, and sends again what was not acknowledged.
+//! Threads: the main thread communicates with the coordinator and never computes; the pool computes and never communicates; one thread
+//! triggers heartbeats; with `--leash` one more watches stdin, whose end ends the process. A worker continues to compute while its
+//! connection is broken, and sends unacknowledged results again.
 //!
-//! Which nodes it can run is the [`Registry`] that it is given: this crate knows nothing of rendering.
+//! The [`Registry`] given to the worker determines which nodes it can run: this crate has no rendering.
 
 mod cache;
 pub mod ending;
@@ -35,13 +35,13 @@ use crate::ending::{Wishes, watch_for_the_end};
 use crate::world::{Real, World};
 
 /// Work for one coordinator until it ends the run, or the worker is asked to end (SIGTERM, Ctrl-C, the end of stdin with
-/// [`WorkerOptions::leash`]).
+/// [`WorkerOptions::is_leashed`]).
 ///
 /// # Errors
-/// When the access file is unusable, the coordinator refuses this worker (never tried again), or it cannot be reached for
+/// If the access file is unusable, the coordinator refuses this worker (not retried), or it cannot be reached for
 /// [`WorkerOptions::reconnect_for`].
 pub fn run(options: &WorkerOptions, registry: Registry) -> Result<(), WorkerError> {
-    // One thread is enough to talk; the cores belong to the pool.
+    // One thread is enough for communication; the cores are for the pool.
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(WorkerError::Runtime)?;
     runtime.block_on(async {
         let wishes = watch_for_the_end(options.is_leashed).map_err(WorkerError::Runtime)?;
@@ -49,7 +49,7 @@ pub fn run(options: &WorkerOptions, registry: Registry) -> Result<(), WorkerErro
     })
 }
 
-/// The same in any world, on the runtime that there is, asked to end by `wishes` alone.
+/// As [`run`], in any world, on the current runtime; only `wishes` can ask it to end.
 ///
 /// # Errors
 /// Those of [`run`].
@@ -69,14 +69,14 @@ pub fn main_with(registry: Registry) -> ExitCode {
 }
 
 /// The program `lookalike-worker` with these node types and this command line, whose first entry is the program's name:
-/// parses it, runs, and tells errors on stderr.
+/// parses it, runs, and prints errors to stderr.
 #[must_use]
 pub fn main_from(arguments: impl IntoIterator<Item = OsString>, registry: Registry) -> ExitCode {
     let program = match Program::try_parse_from(arguments) {
         Ok(program) => program,
         Err(error) => {
             let is_error = error.use_stderr();
-            // If even stderr is gone, there is nobody to tell.
+            // If stderr is closed, the error cannot be reported.
             let _ = error.print();
             return ExitCode::from(if is_error { 2 } else { 0 });
         }
@@ -85,7 +85,7 @@ pub fn main_from(arguments: impl IntoIterator<Item = OsString>, registry: Regist
     run_and_report(&program.arguments.into_options(), registry)
 }
 
-/// Run a worker and tell its error on stderr: 0 done, 2 bad input or refused, 3 the coordinator was lost.
+/// Run a worker and print its error to stderr. Exit codes: 0 done, 2 bad input or refused, 3 the coordinator was lost.
 #[must_use]
 pub fn run_and_report(options: &WorkerOptions, registry: Registry) -> ExitCode {
     // A local worker has a coordinator that tells the user.
@@ -99,7 +99,7 @@ pub fn run_and_report(options: &WorkerOptions, registry: Registry) -> ExitCode {
     match run(options, registry) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            // Whoever read its stderr may be gone.
+            // The reader of stderr may have closed it.
             let _ = writeln!(std::io::stderr(), "error: {}", error.with_causes());
             ExitCode::from(error.exit_code())
         }
@@ -124,7 +124,7 @@ struct Program {
     log: Option<String>,
 }
 
-/// The filter itself cannot be cloned, as clap would have to; so the text is kept.
+/// Returns the text, because clap needs values that can be cloned, and the filter cannot be.
 fn checked_filter(text: &str) -> Result<String, String> {
     EnvFilter::try_new(text).map(|_| text.to_owned()).map_err(|error| error.to_string())
 }
@@ -134,8 +134,7 @@ fn init_tracing(level: Option<&str>) {
         || EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new("warn")),
         |level| EnvFilter::try_new(level).unwrap_or_else(|_| EnvFilter::new("warn")),
     );
-    // A second subscriber in one process (tests) is not wanted, and no reason to fail.
-    // A worker may outlive whoever reads its stderr, and must not die of that.
+    // A second subscriber in one process, as in tests, is not an error. A worker must survive the loss of the reader of its stderr.
     let _ = tracing_subscriber::fmt()
         .with_env_filter(filter)
         .with_writer(std::io::stderr)

@@ -1,4 +1,4 @@
-//! What a worker can be told: raw arguments, then typed options.
+//! The options of a worker: raw arguments, then typed options.
 
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
@@ -36,7 +36,7 @@ pub struct Arguments {
 }
 
 impl Arguments {
-    /// The typed options; what was not given gets its default here.
+    /// The typed options, with defaults for arguments that were not given.
     #[must_use]
     pub fn into_options(self) -> WorkerOptions {
         let threads = self.threads.or_else(|| std::thread::available_parallelism().ok()).unwrap_or(NonZeroUsize::MIN);
@@ -51,7 +51,7 @@ impl Arguments {
     }
 }
 
-/// How a worker works.
+/// The options of a worker.
 #[derive(Clone, Debug)]
 pub struct WorkerOptions {
     /// The access file.
@@ -62,18 +62,18 @@ pub struct WorkerOptions {
     pub threads: NonZeroUsize,
     /// How long to try to reach the coordinator before giving up.
     pub reconnect_for: Duration,
-    /// How long to finish what executes when asked to end; `None`: as the coordinator says.
+    /// How long to finish running nodes when asked to end; `None` for the coordinator's setting.
     pub drain_time: Option<Duration>,
-    /// Whether to end when stdin ends: a coordinator on this machine holds the other end of the pipe.
+    /// Whether to end when stdin ends; a coordinator on this machine holds the other end of the pipe.
     pub is_leashed: bool,
-    /// How many bytes of blobs to keep beyond those that assigned nodes need.
+    /// How many bytes of blobs to cache beyond those that assigned nodes need.
     pub cached_blob_bytes: usize,
-    /// How many bytes of blobs (counted encoded) to keep decoded.
+    /// How many bytes of blobs (in encoded size) to keep decoded.
     pub decoded_blob_bytes: usize,
 }
 
 impl WorkerOptions {
-    /// One thread, ten minutes of patience, no leash, and caches of 256 and 128 MiB.
+    /// One thread, 10 minutes for reconnecting, no leash, and caches of 256 and 128 MiB.
     #[must_use]
     pub fn new(access: PathBuf) -> Self {
         Self {

@@ -1,4 +1,4 @@
-//! The socket loop: connect, greet, serve one connection, and again while there is hope.
+//! The socket loop: connect, greet, serve the connection, and reconnect within the time limit.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -27,17 +27,17 @@ use crate::world::World;
 
 /// How long connecting and greeting may take.
 const GREETING_TIME: Duration = Duration::from_secs(10);
-/// How long the last words may take when the worker ends.
+/// How long sending the goodbye may take when the worker ends.
 const FAREWELL_TIME: Duration = Duration::from_secs(1);
-/// The first pause before a new attempt to connect; each further one is twice as long, up to chance.
+/// The first pause before a new attempt to connect; each further pause is twice as long, with random jitter.
 const FIRST_PAUSE: Duration = Duration::from_millis(100);
 /// The longest pause between two attempts.
 const LONGEST_PAUSE: Duration = Duration::from_secs(5);
-/// A connection that lasted this long was well; a shorter one makes the next pause longer.
+/// A connection that lasted this long counts as stable; a shorter one makes the next pause longer.
 const STEADY_TIME: Duration = Duration::from_secs(10);
-/// How long to finish what executes while no coordinator has said it yet.
+/// How long to finish running nodes, until the coordinator sets this time.
 const DRAIN_TIME: Duration = Duration::from_secs(30);
-/// For ever, for a process that shall end.
+/// Upper limit of the drain time, in effect unlimited.
 const LONGEST_DRAIN: Duration = Duration::from_hours(24 * 365);
 
 /// Work until the coordinator ends the run or this process is asked to end.
@@ -86,7 +86,7 @@ fn read_access(options: &WorkerOptions) -> Result<Access, WorkerError> {
     Access::parse(&text).map_err(|source| WorkerError::AccessContent { path, source })
 }
 
-/// How one connection came to its end without an error.
+/// How a connection ended without an error.
 enum Ended {
     /// The coordinator said that the run is over.
     RunOver,
@@ -99,14 +99,14 @@ struct Session<W: World> {
     address: String,
     access: Access,
     name: ProcessName,
-    /// A coordinator has started this process.
+    /// Whether a coordinator started this process.
     is_local: bool,
     threads: usize,
     wishes: Wishes,
-    /// What this worker was told; it wins over what the coordinator says.
+    /// The drain time from the options, which takes precedence over the coordinator's.
     own_drain_time: Option<Duration>,
     drain_time: Duration,
-    /// It drains, at most until then.
+    /// While draining, the time at which it ends at the latest.
     leave_by: Option<Instant>,
     executor: Executor<W::Pool>,
     completed: UnboundedReceiver<Completed>,
@@ -150,7 +150,7 @@ impl<W: World> Session<W> {
         Ok(())
     }
 
-    /// From now on begin with nothing more, and leave when what was begun is done, or when there is no more time for it.
+    /// Start no more nodes, and leave when the running ones are done or the drain time is over.
     fn begin_to_drain(&mut self) {
         self.leave_by = Some(Instant::now() + self.drain_time.min(LONGEST_DRAIN));
         self.tasks.drain();
@@ -160,7 +160,7 @@ impl<W: World> Session<W> {
         }
     }
 
-    /// Whether this process was asked to end and nothing keeps it any more.
+    /// Whether this process was asked to end and its running nodes are done or the drain time is over.
     fn may_leave(&self) -> bool {
         self.leave_by.is_some_and(|leave_by| self.tasks.are_done() || Instant::now() >= leave_by)
     }
@@ -184,9 +184,9 @@ impl<W: World> Session<W> {
         if self.leave_by.is_some() {
             self.act(&connection, vec![Action::Send(ToCoordinator::Draining)]);
         }
-        // What has ended meanwhile is an answer by now. It is said before what still executes, which is all that is left then.
+        // Executions that ended while there was no connection become answers now, before `welcomed` reports the running nodes.
         while let Ok(completed) = self.completed.try_recv() {
-            // Nothing of what follows from it has a connection to go to: `welcomed` says what counts.
+            // Drop the actions: there was no connection for them, and `welcomed` returns everything that must be sent.
             drop(self.tasks.completed(completed, || self.executor.context()));
         }
         let actions = self.tasks.welcomed(welcome.run, welcome.epoch);
@@ -199,7 +199,7 @@ impl<W: World> Session<W> {
         drop(heartbeat);
         drop(connection);
         if ended.is_ok() {
-            // What is still to be written: the goodbye. If it does not get through, the coordinator sees the end of the stream.
+            // The goodbye may not be written yet. If it is lost, the coordinator detects the end of the stream.
             let _ = timeout(FAREWELL_TIME, writing).await;
         } else {
             writing.abort();
@@ -234,8 +234,9 @@ impl<W: World> Session<W> {
         let mut silent = std::pin::pin!(sleep_until(connection.silent_at()));
         while !self.may_leave() && !wishes.end.is_cancelled() {
             let actions = tokio::select! {
-                // A node that is there to be cancelled is not begun with: what was said is heard before anything follows from the
-                // rest. It cannot be more than the coordinator has to say without an answer.
+                // In this order, so that received messages are handled before nodes start: a node whose cancellation has arrived does
+                // not start. Messages cannot starve the other branches, because the coordinator sends only a limited number
+                // without an answer.
                 biased;
                 () = heart.notified() => vec![Action::Send(ToCoordinator::Heartbeat { executing: self.tasks.executing() })],
                 received = connection.incoming.next() => match received?.ok_or(WireError::Ended)? {
@@ -302,7 +303,7 @@ impl<W: World> Session<W> {
         }
     }
 
-    /// Do what the tasks ask for. Nothing here waits.
+    /// Execute the actions of the tasks. Does not wait.
     fn act(&self, connection: &Connection<W>, actions: Vec<Action>) {
         for action in actions {
             let outgoing = match action {
@@ -317,15 +318,15 @@ impl<W: World> Session<W> {
                     Outgoing::Output(ToCoordinator::Finished { lease, hash: output.hash().0, length }, output)
                 }
             };
-            // A writer that has ended is noticed by `connect_and_serve`; answers are kept until acknowledged.
+            // `connect_and_serve` detects that the writer has ended; answers are kept until acknowledged.
             let _ = connection.outgoing.send(outgoing);
         }
     }
 
-    /// A pause of half to all of this length: many workers that lost one coordinator shall not all come back at the same time.
+    /// A random pause of half to all of this length, so that workers that lost one coordinator do not all reconnect at the same time.
     fn scattered(&self, pause: Duration) -> Duration {
         let mut chance = [0];
-        // Without chance the pause is as long as it may be.
+        // Without random bytes, the full pause.
         let share = self.world.fill_random(&mut chance).map_or(1.0, |()| 0.5 + f64::from(chance[0]) / 512.0);
         pause.mul_f64(share)
     }
@@ -339,12 +340,12 @@ struct Connection<W: World> {
     outgoing: UnboundedSender<Outgoing>,
     announced: UnboundedReceiver<u64>,
     transfer: Option<IncomingBlob>,
-    /// How long the coordinator may say nothing.
+    /// How long the coordinator may send nothing.
     silence: Duration,
 }
 
 impl<W: World> Connection<W> {
-    /// When it has been silent for too long, unless a byte comes before.
+    /// When the connection times out, unless a byte arrives before.
     fn silent_at(&self) -> Instant {
         self.incoming.heard() + self.silence
     }
@@ -371,7 +372,7 @@ type Writing = JoinHandle<Result<(), WireError>>;
 /// How much of the queue is written at a time.
 const WRITTEN_TOGETHER: usize = 256;
 
-/// Write in a task of its own: a large output must not keep the worker from reading, nor the other way round.
+/// Write in a separate task, so that a large output does not block reading, and reading does not block writing.
 fn start_writing(
     writer: impl AsyncWrite + Unpin + Send + 'static,
 ) -> (UnboundedSender<Outgoing>, UnboundedReceiver<u64>, Writing) {
@@ -380,7 +381,7 @@ fn start_writing(
     (outgoing, announced, tokio::spawn(write(writer, queue, written)))
 }
 
-/// Write what is queued, together what came together: the output of a node and the start of the next leave in one packet.
+/// Write the queue, and combine what is queued at the same time: the output of a node and the start of the next fit into one packet.
 async fn write(
     mut writer: impl AsyncWrite + Unpin,
     mut queue: UnboundedReceiver<Outgoing>,
@@ -398,7 +399,7 @@ async fn write(
             serials.extend(serial);
             let is_large = output.as_ref().is_some_and(|output| !is_small(output));
             if parcel.is_full() || is_large {
-                // Nobody shall wait for a large output who is to begin.
+                // Announced nodes must not wait for a large output.
                 parcel.send(&mut writer).await?;
                 serials.drain(..).for_each(|serial| _ = written.send(serial));
             }
@@ -413,7 +414,7 @@ async fn write(
     Ok(())
 }
 
-/// Wait until then; for ever if there is no then.
+/// Wait until a time; for ever if there is none.
 async fn sleep_until_some(then: Option<Instant>) {
     match then {
         Some(then) => sleep_until(then).await,

@@ -1,10 +1,10 @@
-//! What this worker was assigned and how far it is: a state machine without sockets, threads and time.
+//! The nodes that were assigned to this worker, and their progress: a state machine without sockets, threads and time.
 //!
 //! ```text
-//!   Gathering --all inputs there, a thread free--> Announcing --"started" is on the wire--> Executing --> Answered
+//!   Gathering --all inputs here, a thread free--> Announcing --"started" is on the wire--> Executing --> Answered
 //! ```
-//! A node executes only after the coordinator was told: if the node kills this process, the coordinator must know whom to
-//! suspect. An answer is kept until it is acknowledged, and sent again on a new connection.
+//! A node executes only after its start was sent to the coordinator: if the node kills this process, the coordinator must know which
+//! node to suspect. An answer is kept until it is acknowledged, and sent again on a new connection.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -14,12 +14,12 @@ use lookalike::protocol::{Assignment, Executing, FailureKind, LeaseName, RunName
 use crate::cache::BlobCache;
 use crate::execute::{Completed, Job};
 
-/// What to do next.
+/// An action that the caller must execute.
 #[derive(Debug)]
 pub(crate) enum Action {
     /// Send a message.
     Send(ToCoordinator),
-    /// Send a message that a node starts, then say so with [`Tasks::announced`].
+    /// Send the message that a node starts, then call [`Tasks::announced`].
     Announce { lease: LeaseName, serial: u64 },
     /// Send an output.
     SendOutput { lease: LeaseName, output: Blob },
@@ -36,13 +36,13 @@ pub(crate) struct Tasks {
     coordinator: Option<(RunName, u64)>,
     /// By node number.
     tasks: BTreeMap<u64, Task>,
-    /// Blobs that were asked for and have not come.
+    /// Blobs that were requested and have not arrived.
     fetching: BTreeSet<BlobHash>,
-    /// Nothing more begins.
+    /// Whether the worker drains: no more nodes start.
     is_draining: bool,
-    /// Those whose inputs are there, in the order in which they came; also some that have gone since.
+    /// Nodes with all inputs, in order of arrival; may contain nodes that were cancelled since.
     ready: BTreeMap<u64, u64>,
-    /// Executions, by serial number, that use a thread: also those whose task is gone.
+    /// Executions that use a thread, by serial number, including those whose task was dropped.
     running: BTreeMap<u64, u64>,
     next_serial: u64,
 }
@@ -55,7 +55,7 @@ struct Task {
 
 #[derive(Debug)]
 enum Stage {
-    /// Inputs that are there are held here: the cache may drop them before the last one comes.
+    /// Holds the inputs that have arrived, because the cache may drop them before the last one arrives.
     Gathering {
         assignment: Assignment,
         inputs: Vec<Option<Blob>>,
@@ -109,13 +109,13 @@ impl Tasks {
         actions
     }
 
-    /// This process shall end: begin with nothing more. What had not begun goes back to the coordinator.
+    /// Start no more nodes, because this process must end. Nodes that have not started are dropped; the coordinator re-queues them.
     pub(crate) fn drain(&mut self) {
         self.is_draining = true;
         self.tasks.retain(|_, task| !matches!(task.stage, Stage::Gathering { .. }));
     }
 
-    /// Whether there is nothing that was begun and not acknowledged.
+    /// Whether no node has started whose answer is not acknowledged.
     pub(crate) fn are_done(&self) -> bool {
         self.tasks.is_empty()
     }
@@ -124,7 +124,7 @@ impl Tasks {
     pub(crate) fn assigned(&mut self, assignment: Assignment, new_context: impl Fn() -> RunContext) -> Vec<Action> {
         let lease = assignment.lease;
         if let Some(task) = self.tasks.get_mut(&lease.node) {
-            // We had it before the connection broke: answer under the new lease.
+            // This worker had the node before the connection broke: answer under the new lease.
             task.lease = lease;
             return match &task.stage {
                 Stage::Executing { .. } => vec![Action::Send(ToCoordinator::Started(lease))],
@@ -133,7 +133,8 @@ impl Tasks {
             };
         }
         if self.is_draining {
-            // It crossed our word that we begin with nothing more, or that was not heard: it shall go to another one.
+            // The assignment was sent before the coordinator received `Draining`, or that message was lost: send it again, so that the
+            // coordinator re-queues the node.
             return vec![Action::Send(ToCoordinator::Draining)];
         }
         let inputs: Vec<_> = assignment.inputs.iter().map(|hash| self.cache.get(BlobHash(*hash))).collect();
@@ -169,7 +170,7 @@ impl Tasks {
         }
     }
 
-    /// A fetched blob has come.
+    /// A fetched blob has arrived.
     pub(crate) fn fetched(&mut self, blob: Blob, new_context: impl Fn() -> RunContext) -> Vec<Action> {
         self.fetching.remove(&blob.hash());
         for (node, task) in &mut self.tasks {
@@ -197,7 +198,7 @@ impl Tasks {
         actions
     }
 
-    /// The coordinator does not want this node any more.
+    /// The coordinator no longer needs this node.
     pub(crate) fn cancelled(&mut self, lease: LeaseName, new_context: impl Fn() -> RunContext) -> Vec<Action> {
         if self.tasks.get(&lease.node).is_none_or(|task| task.lease != lease) {
             return Vec::new();
@@ -211,8 +212,8 @@ impl Tasks {
         self.begin(new_context)
     }
 
-    /// Wait no more for the blobs that only this assignment needed: the coordinator may have let go of them, and has to be asked
-    /// again should another node need them.
+    /// Drop the requests for blobs that only this assignment needed: the coordinator may have dropped the blobs, so they must be
+    /// requested again if another node needs them.
     fn forgo(&mut self, assignment: &Assignment) {
         for hash in assignment.inputs.iter().map(|hash| BlobHash(*hash)) {
             let needs = |task: &Task| match &task.stage {
@@ -227,7 +228,7 @@ impl Tasks {
         }
     }
 
-    /// The coordinator has our answer.
+    /// The coordinator has received the answer.
     pub(crate) fn acknowledged(&mut self, lease: LeaseName) {
         if self.tasks.get(&lease.node).is_some_and(|task| matches!(task.stage, Stage::Answered(_))) {
             self.tasks.remove(&lease.node);
@@ -246,7 +247,7 @@ impl Tasks {
         self.tasks.values().filter_map(progress).collect()
     }
 
-    /// Give free threads to the nodes that came first among those whose inputs are there.
+    /// Start nodes with all inputs on free threads, in order of arrival.
     fn begin(&mut self, new_context: impl Fn() -> RunContext) -> Vec<Action> {
         let mut actions = Vec::new();
         while self.running.len() < self.threads
@@ -255,7 +256,7 @@ impl Tasks {
             let serial = self.serial();
             let Some(task) = self.tasks.get_mut(&node) else { continue };
             let Stage::Gathering { assignment, inputs, arrival } = &mut task.stage else { continue };
-            // It was cancelled, and given to us again.
+            // It was cancelled and assigned again since.
             if *arrival != came {
                 continue;
             }
@@ -288,7 +289,7 @@ impl Task {
         }
     }
 
-    /// Which execution this is, while it is one.
+    /// The serial number of its execution, while it is announced or executing.
     fn serial(&self) -> Option<u64> {
         match &self.stage {
             Stage::Announcing(job) => Some(job.serial),
@@ -298,7 +299,7 @@ impl Task {
     }
 }
 
-/// The kind of a failure and its message without what the kind adds to it.
+/// The kind of a failure on the wire, and its message without the text that the kind adds.
 fn on_the_wire(failure: &NodeFailure) -> (FailureKind, String) {
     match failure {
         NodeFailure::Panicked { message } => (FailureKind::Panic, message.clone()),

@@ -50,7 +50,7 @@ fn said(actions: &[Action]) -> Vec<String> {
     actions.iter().map(line).collect()
 }
 
-/// Say that the announcements among these actions were written; the serial numbers of what then executes.
+/// Report the announcements among these actions as written; returns the serial numbers of the jobs that then execute.
 fn announce(tasks: &mut Tasks, actions: &[Action]) -> Vec<u64> {
     let serials = actions.iter().filter_map(|action| match action {
         Action::Announce { serial, .. } => Some(*serial),
@@ -76,13 +76,13 @@ fn shared_input_is_fetched_once_and_kept() {
     assert!(tasks.assigned(assignment(lease(1, 1), &[&table, &table]), context).is_empty());
     let actions = tasks.fetched(table.clone(), context);
     assert_eq!(said(&actions), ["announce 0.1", "announce 1.1"]);
-    // The threads are taken, but nothing has to be fetched any more.
+    // All threads are busy, but nothing must be fetched any more.
     assert!(tasks.assigned(assignment(lease(2, 1), &[&table]), context).is_empty());
     assert_eq!(announce(&mut tasks, &actions).len(), 2);
 }
 
 #[test]
-fn inputs_that_have_come_survive_a_full_cache() {
+fn inputs_that_have_arrived_survive_a_full_cache() {
     let mut tasks = Tasks::new(1, BlobCache::new(100));
     tasks.welcomed(RUN, 1);
     let [first, second] = [1, 2].map(|byte| Blob::new(vec![byte; 80]));
@@ -119,14 +119,14 @@ fn unacknowledged_answers_are_sent_again_on_a_new_connection() {
     tasks.completed(Completed { serial: serials[1], result: failure }, context);
     tasks.acknowledged(lease(0, 1));
     assert_eq!(said(&tasks.welcomed(RUN, 1)), ["failed 1 (Panic): no", "executes [2]"]);
-    // Node 2 went on executing; it comes back to us under a new lease.
+    // Node 2 continued to execute; it is assigned to this worker again under a new lease.
     assert_eq!(said(&tasks.assigned(assignment(lease(2, 2), &[]), context)), ["started 2.2"]);
     assert_eq!(said(&tasks.completed(output(serials[2], 12), context)), ["output 2.2 12"]);
     assert_eq!(said(&tasks.assigned(assignment(lease(2, 3), &[]), context)), ["output 2.3 12"]);
 }
 
 #[test]
-fn what_had_not_begun_is_forgotten_with_its_connection() {
+fn nodes_that_have_not_started_are_dropped_with_their_connection() {
     let mut tasks = tasks(1);
     let unwritten = tasks.assigned(assignment(lease(0, 1), &[]), context);
     tasks.assigned(assignment(lease(1, 1), &[]), context);
@@ -169,24 +169,24 @@ fn cancelled_node_is_not_answered_and_frees_its_thread() {
 }
 
 #[test]
-fn blob_that_a_cancelled_node_waited_for_is_asked_for_again() {
+fn blob_that_a_cancelled_node_waited_for_is_requested_again() {
     let mut tasks = tasks(1);
     let [only, both] = [1, 2].map(|byte| Blob::new(vec![byte]));
     let names = [&only, &both].map(|blob| format!("fetch {}", blob.hash().0[0]));
     assert_eq!(said(&tasks.assigned(assignment(lease(0, 1), &[&only, &both]), context)), names);
     assert!(tasks.assigned(assignment(lease(1, 1), &[&both]), context).is_empty());
-    // The coordinator may have let go of the first before it read our request.
+    // The coordinator may have dropped the first node's inputs before it read the request.
     assert!(tasks.cancelled(lease(0, 1), context).is_empty());
     assert_eq!(said(&tasks.assigned(assignment(lease(2, 1), &[&only, &both]), context)), names[..1]);
     assert_eq!(said(&tasks.fetched(both, context)), ["announce 1.1"]);
 }
 
 #[test]
-fn draining_worker_finishes_what_it_began_and_begins_with_nothing_more() {
+fn draining_worker_finishes_started_nodes_and_starts_no_more() {
     let mut tasks = tasks(1);
     let actions = tasks.assigned(assignment(lease(0, 1), &[]), context);
     tasks.assigned(assignment(lease(1, 1), &[]), context);
-    // The word that node 0 starts is under way: it counts as begun.
+    // The message that node 0 starts is being sent, so it counts as started.
     tasks.drain();
     let serials = announce(&mut tasks, &actions);
     assert!(!tasks.are_done());

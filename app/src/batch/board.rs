@@ -12,7 +12,7 @@ use crate::{
     run::Clock,
     settings::BatchFit,
 };
-use lookalike::{brdf, fit::BestScore, graph::split_label};
+use lookalike::{fit::BestScore, graph::split_label};
 use lookalike_coordinator::{events::RunEvent, journal::PartLedger, metrics::Metrics};
 use std::{
     collections::BTreeMap,
@@ -70,17 +70,17 @@ impl Board {
     ) -> anyhow::Result<Self> {
         let row = |(fit, complete): (&BatchFit, Option<(Scores, f64)>)| {
             let (scores, seconds) = complete.unzip();
-            Ok::<_, brdf::ParameterError>(Row {
+            Row {
                 name: fit.name.clone(),
                 photo: fit.capture.photo.to_string_lossy().into_owned(),
                 env: fit.capture.environment.path.to_string_lossy().into_owned(),
                 model: fit.method.model,
                 state: scores.map_or(State::Waiting, State::Done),
                 seconds,
-            })
+            }
         };
         let inner = Inner {
-            rows: fits.iter().zip(complete).map(row).collect::<Result<_, _>>()?,
+            rows: fits.iter().zip(complete).map(row).collect(),
             numbers: (0..).zip(fits).map(|(number, fit)| (fit.name.clone(), number)).collect(),
             clocks: BTreeMap::new(),
             watchers,

@@ -106,11 +106,10 @@ fn flat(model: &dyn Model, parameters: &Value) -> Option<Vec<f64>> {
 mod tests {
     use super::*;
     use crate::outputs::parameters_json;
-    use lookalike::brdf;
 
     #[test]
     fn parameters_come_back_from_their_names() {
-        let model = brdf::model("cook-torrance").unwrap();
+        let model = lookalike::brdf::model("cook-torrance").unwrap();
         let vector: Vec<f64> = (1..=8).map(f64::from).collect();
         let mut json = parameters_json(model, &vector);
         assert_eq!(flat(model, &json), Some(vector));

@@ -1,13 +1,19 @@
 //! `--preset`: named bundles of flags.
 
 use crate::settings::Preset;
-use lookalike::fit::{Compress, Start};
+use lookalike::{
+    brdf::PAPER_MODEL,
+    fit::{Compress, Start},
+};
 use std::ffi::OsString;
 
 /// The flags a preset stands for. They precede all others, so that a flag given explicitly wins.
 pub(crate) fn flags(preset: Preset) -> Vec<OsString> {
     match preset {
-        Preset::Paper => PAPER.iter().map(Into::into).collect(),
+        Preset::Paper => {
+            let model = format!("--model={}", PAPER_MODEL.name()).into();
+            std::iter::once(model).chain(PAPER.iter().map(Into::into)).collect()
+        }
     }
 }
 
@@ -27,9 +33,8 @@ pub(crate) fn compress(preset: Option<Preset>) -> Compress {
     }
 }
 
-/// \[BP20b\] section 3, with the start of design section 10 and one pixel subset.
-const PAPER: [&str; 8] = [
-    "--model=cook-torrance",
+/// \[BP20b\] section 3 but for the model, with the start of design section 10 and one pixel subset.
+const PAPER: [&str; 7] = [
     "--gammas=1:3:0.1",
     "--samples=256",
     "--sampling=importance",

@@ -4,6 +4,7 @@ use super::{args::Command, parse};
 use crate::settings::{CompareSettings, DisplayExposure, FitSettings, MetricKind, Workers};
 use clap::CommandFactory;
 use lookalike::{
+    brdf::DEFAULT_MODEL,
     fit::{Compress, Gammas, Method, SearchKind, Start},
     render::subset::SampleCount,
     scene::Camera,
@@ -77,7 +78,7 @@ fn a_plain_fit_has_the_defaults_of_the_design() {
     assert_eq!(format!("{method:?}"), format!("{:?}", Method::default()), "command line and library have one default");
     assert_eq!(
         (method.model.name(), method.gammas, method.samples),
-        ("ggx", Gammas::DEFAULT.values(), SampleCount::Draws(256))
+        (DEFAULT_MODEL.name(), Gammas::DEFAULT.values(), SampleCount::Draws(256))
     );
     assert_eq!((method.search, method.polish, method.seed), (SearchKind::LeastSquares, true, 0));
     assert_eq!((method.start, method.compress), (Start::Scan, Compress::Tangent));

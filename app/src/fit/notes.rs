@@ -1,7 +1,7 @@
 //! What a user should know about a result beyond its numbers.
 
 use lookalike::{
-    brdf::{Model, Role, flat_bounds, flat_names},
+    brdf::{Model, flat_bounds, flat_names},
     fit::{Method, Uncertainty, gamma_range},
     plan::FitOutcome,
 };
@@ -33,19 +33,15 @@ pub(crate) fn notes(method: &Method, outcome: &FitOutcome) -> Vec<String> {
     notes
 }
 
-/// A reflectance of 1 at grazing incidence is what a smooth interface has.
-const FULL_RIM: &str = "f90";
-
 fn at_bounds(model: &dyn Model, parameters: &[f64], is_determined: impl Fn(usize) -> bool) -> Option<String> {
     let (lower, upper) = flat_bounds(model.parameters());
     let names = flat_names(model.parameters());
-    // A colour of zero is an answer (no diffuse part), and so are both ends of a blend (a metal); any other upper bound or a width at its
-    // end is a limit of the model.
+    // A lower bound is an answer (no diffuse part, a dielectric), except that of a width. An upper bound is a limit of the model, except
+    // where it is a kind of surface.
     let is_width = |i: usize| model.lobes().iter().any(|b| b.width.is_some_and(|width| width.entry == i));
-    let roles: Vec<Role> =
-        model.parameters().iter().flat_map(|p| std::iter::repeat_n(p.role, p.channels.count())).collect();
-    let is_kind = |i: usize| matches!(roles[i], Role::Blend(_)) || names[i] == FULL_RIM;
-    let limited = |&i: &usize| (parameters[i] == upper[i] && !is_kind(i)) || (is_width(i) && parameters[i] == lower[i]);
+    let is_kind: Vec<bool> =
+        model.parameters().iter().flat_map(|p| std::iter::repeat_n(p.upper_is_kind, p.channels.count())).collect();
+    let limited = |&i: &usize| (parameters[i] == upper[i] && !is_kind[i]) || (is_width(i) && parameters[i] == lower[i]);
     let limited: Vec<String> = (0..parameters.len())
         .filter(limited)
         .filter(|&i| is_determined(i))

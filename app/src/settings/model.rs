@@ -1,54 +1,61 @@
 //! `--model` and `--params`: which BRDF, and with which values.
 
 use anyhow::{Context, bail};
-use lookalike::brdf;
-use std::{fmt, str::FromStr};
+use clap::{ValueEnum, builder::PossibleValue};
+use lookalike::brdf::{DEFAULT_MODEL, MODELS, Model};
+use std::{fmt, str::FromStr, sync::LazyLock};
 
-/// The name of a BRDF model that can be fitted (design section 4).
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct ModelName(String);
+/// A BRDF model of the registry (design section 4).
+#[derive(Debug, Clone, Copy)]
+pub struct ModelName(&'static dyn Model);
 
 impl ModelName {
     /// The name as it is written in settings and outputs.
     #[must_use]
-    pub fn as_str(&self) -> &str {
-        &self.0
+    pub fn as_str(self) -> &'static str {
+        self.0.name()
+    }
+
+    /// The model.
+    #[must_use]
+    pub fn model(self) -> &'static dyn Model {
+        self.0
     }
 }
 
 impl Default for ModelName {
     fn default() -> Self {
-        Self("ggx".into())
+        Self(DEFAULT_MODEL)
     }
 }
 
-impl FromStr for ModelName {
-    type Err = anyhow::Error;
+impl PartialEq for ModelName {
+    fn eq(&self, other: &Self) -> bool {
+        self.as_str() == other.as_str()
+    }
+}
 
-    /// One of the models' names; those of the design that do not exist yet are told apart from those that never will.
-    fn from_str(text: &str) -> anyhow::Result<Self> {
-        if brdf::model(text).is_ok() {
-            return Ok(Self(text.into()));
-        }
-        if PLANNED.contains(&text) {
-            bail!("the model {text} is not there yet: this version fits {}", fitted().join(", "));
-        }
-        bail!("no such model; possible values: {}", fitted().join(", "))
+impl Eq for ModelName {}
+
+impl ValueEnum for ModelName {
+    fn value_variants<'a>() -> &'a [Self] {
+        static ALL: LazyLock<Vec<ModelName>> = LazyLock::new(|| MODELS.iter().map(|model| ModelName(*model)).collect());
+        &ALL
+    }
+
+    /// The name; its help is the model's summary and the names of its parameters.
+    fn to_possible_value(&self) -> Option<PossibleValue> {
+        let parameters: Vec<&str> = self.0.parameters().iter().map(|parameter| parameter.name).collect();
+        let help = format!("{}. Parameters: {}", self.0.summary(), parameters.join(", "));
+        Some(PossibleValue::new(self.as_str()).help(help))
     }
 }
 
 impl fmt::Display for ModelName {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&self.0)
+        f.write_str(self.as_str())
     }
 }
-
-/// The models of the registry.
-fn fitted() -> Vec<&'static str> {
-    brdf::MODELS.iter().map(|m| m.name()).collect()
-}
-/// Models of the design that this version does not have.
-const PLANNED: [&str; 1] = ["merl"];
 
 /// Values of a model's parameters by name, in the order given; names, counts and bounds are the model's to check.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -101,16 +108,15 @@ mod tests {
     use super::*;
 
     #[test]
-    fn models_are_known_planned_or_unknown() {
-        assert_eq!("ggx".parse::<ModelName>().unwrap(), ModelName::default());
-        let planned = "merl".parse::<ModelName>().unwrap_err().to_string();
-        assert!(
-            planned.contains("not there yet")
-                && planned.contains("ggx, ggx-f90, cook-torrance, ward, blinn-phong, ashikhmin-shirley, disney"),
-            "{planned}"
-        );
-        let unknown = "phong".parse::<ModelName>().unwrap_err().to_string();
-        assert!(unknown.contains("possible values: ggx, ggx-f90, cook-torrance"), "{unknown}");
+    fn every_model_is_a_value_whose_help_names_its_parameters() {
+        for model in MODELS {
+            let value = <ModelName as ValueEnum>::from_str(model.name(), false).unwrap();
+            assert_eq!(value.model().name(), model.name());
+            let help = value.to_possible_value().unwrap().get_help().unwrap().to_string();
+            assert!(model.parameters().iter().all(|parameter| help.contains(parameter.name)), "{help}");
+        }
+        assert_eq!(ModelName::default().as_str(), DEFAULT_MODEL.name());
+        assert!(<ModelName as ValueEnum>::from_str("phong", false).is_err());
     }
 
     #[test]

@@ -224,7 +224,7 @@ impl Plan<'_> {
     /// The paper's method and single costs.
     fn rivals(&mut self, scene: Scene) -> anyhow::Result<()> {
         let paper = Method {
-            model: brdf::model("cook-torrance")?,
+            model: brdf::PAPER_MODEL,
             search: SearchKind::Pattern,
             start: Start::Paper,
             compress: Compress::Clamp,
@@ -503,6 +503,6 @@ mod tests {
                 assert!(inside, "{} {name} {start:?}", model.name());
             }
         }
-        assert_eq!(starts(brdf::MODELS[0])[1].1, [0.3, 0.3, 0.3, 0.04, 0.04, 0.04, 0.05]);
+        assert_eq!(starts(brdf::DEFAULT_MODEL)[1].1, [0.3, 0.3, 0.3, 0.04, 0.04, 0.04, 0.05]);
     }
 }

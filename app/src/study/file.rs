@@ -272,7 +272,7 @@ fn name_of(path: &Path) -> anyhow::Result<String> {
 }
 
 fn default_model() -> String {
-    "ggx".to_owned()
+    brdf::DEFAULT_MODEL.name().to_owned()
 }
 
 const fn default_size() -> u32 {

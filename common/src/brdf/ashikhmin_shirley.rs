@@ -3,9 +3,9 @@
 //! `f = 28/(23 pi) kd (1 - f0) (1 - (1 - n.l/2)^5) (1 - (1 - n.v/2)^5) + F (n + 1)/(8 pi) (n.h)^n / (v.h max(n.l, n.v))` with
 //! `F = f0 + (1 - f0) F5`, `F5 = (1 - v.h)^5`
 //!
-//! (Ashikhmin & Shirley 2000, with both of their exponents equal; Fresnel's term of Schlick 1994.) What the specular lobe reflects is
-//! taken from the diffuse one, so that both together never reflect more than they receive. Split: the weights are `kd (1 - f0)`, `f0`
-//! and 1. The first is a product of parameters: the scan solves for it instead of `kd`.
+//! (Ashikhmin & Shirley 2000, with both exponents equal; Fresnel term of Schlick 1994.) The diffuse lobe loses what the specular lobe
+//! reflects, so that both together conserve energy. Split: the weights are `kd (1 - f0)`, `f0` and 1. The first is a product of two
+//! parameters; the scan solves for the product instead of `kd`.
 //!
 //! The lobe gets narrower as `n` grows: its width is `alpha = sqrt(2/(n + 2))`, from 0.0045 to 0.82 within the bounds. Searches move
 //! `n` by its logarithm.
@@ -16,10 +16,8 @@
 //! | `f0` | specular reflectance at normal incidence, linear Rec. 709 | [0, 1] |
 //! | `n` | exponent of the cosine between normal and half vector | [1, 1e5] |
 
-use super::{
-    Angles, BasisLobe, Channels, Incident, Lobe, Model, Parameter, Role, Scale, Split, Spread, lobe::accumulate, power,
-};
-use crate::math::{Rgb, elementary::fifth_power};
+use super::{Angles, BasisLobe, Expected, LinearModel, Lobe, Parameter, Split, Spread, Weight, power};
+use crate::math::elementary::fifth_power;
 use std::f64::consts::PI;
 
 /// The model `ashikhmin-shirley`.
@@ -30,95 +28,20 @@ const KD: usize = 0;
 const F0: usize = 3;
 const N: usize = 6;
 
-static PARAMETERS: [Parameter; 3] = [
-    Parameter {
-        name: "kd",
-        meaning: "diffuse colour, linear Rec. 709: the albedo of what is not reflected specularly",
-        channels: Channels::Rgb,
-        lower: 0.0,
-        upper: 1.0,
-        start: 0.3,
-        role: Role::Linear,
-        scale: Scale::Linear,
-    },
-    Parameter {
-        name: "f0",
-        meaning: "specular reflectance at normal incidence, linear Rec. 709",
-        channels: Channels::Rgb,
-        lower: 0.0,
-        upper: 1.0,
-        start: 0.3,
-        role: Role::Linear,
-        scale: Scale::Linear,
-    },
-    Parameter {
-        name: "n",
-        meaning: "exponent of the cosine between normal and half vector",
-        channels: Channels::Scalar,
-        lower: 1.0,
-        upper: 1e5,
-        start: 20.0,
-        role: Role::Width,
-        scale: Scale::Logarithmic,
-    },
-];
-
-static LOBES: [BasisLobe; 2] =
-    [BasisLobe { lobe: &DiffuseLobe, width: None }, BasisLobe { lobe: &SpecularLobe, width: Some(power::width(N)) }];
-
-impl Model for AshikhminShirley {
-    fn name(&self) -> &'static str {
-        "ashikhmin-shirley"
-    }
-
-    fn summary(&self) -> &'static str {
-        "Ashikhmin & Shirley 2000, isotropic: coupled diffuse and specular lobes, Schlick Fresnel"
-    }
-
-    fn parameters(&self) -> &'static [Parameter] {
-        &PARAMETERS
-    }
-
-    fn lobes(&self) -> &'static [BasisLobe] {
-        &LOBES
-    }
-
-    fn weights(&self, p: &[f64], weights: &mut [Rgb]) {
-        let f0 = Rgb::from_slice(&p[F0..]);
-        weights[0] = Rgb::from_slice(&p[KD..]) * (Rgb::ONE - f0);
-        weights[1] = f0;
-        weights[2] = Rgb::ONE;
-    }
-
-    fn weight_derivatives(&self, p: &[f64], push: &mut dyn FnMut(usize, usize, usize, f64)) {
-        for c in 0..3 {
-            push(0, c, KD + c, 1.0 - p[F0 + c]);
-            push(0, c, F0 + c, -p[KD + c]);
-            push(1, c, F0 + c, 1.0);
-        }
-    }
-
-    /// With `kd (1 - f0)` in the place of `kd`.
-    fn scan_weights(&self, p: &[f64], weights: &mut [Rgb]) {
-        weights[0] = Rgb::from_slice(&p[KD..]);
-        weights[1] = Rgb::from_slice(&p[F0..]);
-        weights[2] = Rgb::ONE;
-    }
-
-    fn parameters_of_scan(&self, p: &mut [f64]) {
-        for c in 0..3 {
-            let rest = 1.0 - p[F0 + c];
-            p[KD + c] = if p[KD + c] < rest { p[KD + c] / rest } else { 1.0 };
-        }
-    }
-
-    fn diffuse_albedo(&self, p: &[f64]) -> Rgb {
-        Rgb::from_slice(&p[KD..]) * (Rgb::ONE - Rgb::from_slice(&p[F0..])) * (1.0 - fifth_power(0.5))
-    }
-
-    fn normal_incidence_specular(&self, p: &[f64]) -> Rgb {
-        Rgb::from_slice(&p[F0..])
-    }
+impl LinearModel for AshikhminShirley {
+    const NAME: &'static str = "ashikhmin-shirley";
+    const SUMMARY: &'static str =
+        "Ashikhmin & Shirley 2000, isotropic: coupled diffuse and specular lobes, Schlick Fresnel";
+    const PARAMETERS: &'static [Parameter] = &[
+        Parameter::colour("kd", "diffuse colour, linear Rec. 709: the albedo of what is not reflected specularly"),
+        Parameter::colour("f0", "specular reflectance at normal incidence, linear Rec. 709"),
+        power::EXPONENT,
+    ];
+    const LOBES: &'static [BasisLobe] =
+        &[BasisLobe::fixed(&DiffuseLobe), BasisLobe::with_width(&SpecularLobe, power::width(N))];
+    const WEIGHTS: &'static [Weight] = &[Weight::Remainder(KD, F0), Weight::Colour(F0), Weight::One];
+    /// `1 - (1 - n.v/2)^5` at `n.v = 1`.
+    const DIFFUSE_ALBEDO: f64 = 1.0 - 1.0 / 32.0;
 }
 
 /// The diffuse lobe of unit weight; its albedo is `1 - (1 - n.v/2)^5`.
@@ -138,35 +61,27 @@ impl Lobe for DiffuseLobe {
         None
     }
 
-    /// It is bent the same way from the normal to the horizon, so that the errors of a cut add up.
+    /// Its curvature has one sign from the normal to the horizon, so the errors of a cut add up.
     fn care(&self) -> f64 {
         4.0
     }
 
-    /// `28/23 (1 - (1 - n.l/2)^5) (1 - (1 - n.v/2)^5) n.l` is most bent at the horizon of the light: by 5 times 28/23.
+    /// The second derivative of `28/23 (1 - (1 - n.l/2)^5) (1 - (1 - n.v/2)^5) n.l` is largest at the horizon: 5 times 28/23.
     fn bend(&self) -> f64 {
         6.1
     }
 
-    /// It falls to nothing with the viewer's cosine.
+    /// It falls to 0 with the viewer's cosine.
     fn footprint(&self, width: f64, cos_o: f64) -> f64 {
         width.min(cos_o)
     }
 
-    fn eval(&self, angles: &Angles, _width: f64) -> f64 {
-        diffuse(angles, &Spread::default(), 0.0)
+    #[inline(always)]
+    fn kernel(&self, g: &Angles, _spread: &Spread, _width: f64) -> f64 {
+        let cos_i = g.cos_i.max(0.0);
+        let transmitted = |cos: f64| 1.0 - fifth_power(1.0 - 0.5 * cos);
+        28.0 / (23.0 * PI) * transmitted(cos_i) * transmitted(g.cos_o) * cos_i
     }
-
-    fn accumulate(&self, incident: &[Incident], cos_o: f64, widths: &[f64], sums: &mut [f64]) {
-        accumulate(self.split(), incident, cos_o, widths, sums, diffuse);
-    }
-}
-
-#[inline(always)]
-fn diffuse(g: &Angles, _spread: &Spread, _width: f64) -> f64 {
-    let cos_i = g.cos_i.max(0.0);
-    let transmitted = |cos: f64| 1.0 - fifth_power(1.0 - 0.5 * cos);
-    28.0 / (23.0 * PI) * transmitted(cos_i) * transmitted(g.cos_o) * cos_i
 }
 
 /// The specular lobe without Fresnel.
@@ -191,20 +106,17 @@ impl Lobe for SpecularLobe {
         2.0
     }
 
-    fn eval(&self, angles: &Angles, width: f64) -> f64 {
-        specular(angles, &Spread::default(), width)
+    fn expected(&self) -> Expected {
+        let sharp_albedo = |width, cos_o| (1.0, power::beyond_kink(width, cos_o));
+        Expected { sharp_albedo, is_kinked: true, ..Expected::default() }
     }
 
-    fn accumulate(&self, incident: &[Incident], cos_o: f64, widths: &[f64], sums: &mut [f64]) {
-        accumulate(self.split(), incident, cos_o, widths, sums, specular);
+    /// Zero for light below the horizon, where `v.h` may be 0.
+    #[inline(always)]
+    fn kernel(&self, g: &Angles, spread: &Spread, alpha: f64) -> f64 {
+        let cos_i = g.cos_i.max(0.0);
+        let (lobe, blur) = power::cosine(g, spread, alpha);
+        let cos_d = g.cos_d.max(f64::MIN_POSITIVE);
+        lobe * blur * (power::exponent(alpha) + 1.0) * cos_i / (8.0 * PI * cos_d * g.cos_o.max(cos_i))
     }
-}
-
-/// Zero below the horizon of the light; there `v.h` may be as small as it likes.
-#[inline(always)]
-fn specular(g: &Angles, spread: &Spread, alpha: f64) -> f64 {
-    let cos_i = g.cos_i.max(0.0);
-    let (lobe, blur) = power::cosine(g, spread, alpha);
-    let cos_d = g.cos_d.max(f64::MIN_POSITIVE);
-    lobe * blur * (power::exponent(alpha) + 1.0) * cos_i / (8.0 * PI * cos_d * g.cos_o.max(cos_i))
 }

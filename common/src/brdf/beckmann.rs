@@ -4,7 +4,7 @@ use super::{Angles, Spread, lobe::second_order};
 use crate::math::elementary::exp_nonpositive;
 use std::f64::consts::PI;
 
-/// `D = exp(-tan^2(th)/m^2) / (pi m^2 cos^4(th))`, and the factor that its mean over the spread of light has.
+/// `D = exp(-tan^2(th)/m^2) / (pi m^2 cos^4(th))`, and the factor by which the spread of light changes its mean.
 ///
 /// Spread: with `u = sin^2(th)` and `c = 1 - u`, `ln D = 1/m^2 - 1/(c m^2) - 2 ln c + ..`, whose slope is `g = 2/c - 1/(c m)^2` and
 /// curvature `2/c^2 - 2/(c^3 m^2)`; `D'/D = g` and `D''/D = g^2 + g'`.

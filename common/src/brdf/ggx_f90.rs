@@ -2,9 +2,9 @@
 //!
 //! `f = kd/pi + F D V` with `D` and `V` of `ggx` and `F = f0 + (f90 - f0) F5`, `F5 = (1 - v.h)^5` (Schlick 1994, with his 1 replaced).
 //!
-//! A smooth interface reflects everything at grazing incidence. The measured materials of docs/results.md do not: they darken towards the
-//! rim, whether by their roughness or by how they were measured and fitted, and `ggx` must give them a rim that they have not.
-//! In MaterialX it is the generalized Schlick BSDF with a grey `color90`.
+//! A smooth interface reflects all light at grazing incidence. The measured materials of docs/results.md darken towards the rim, either
+//! by their roughness or by the way they were measured and fitted; `ggx` renders them with a rim that is too bright.
+//! MaterialX has this model as the generalized Schlick BSDF with a grey `color90`.
 //!
 //! Split: `F = f0 (1 - F5) + f90 F5`, so the weights are `kd`, `f0` and `f90`.
 //!
@@ -15,8 +15,7 @@
 //! | `f90` | specular reflectance at grazing incidence, of all colours | [0, 1] |
 //! | `alpha` | microfacet width (an artist's roughness is its square root) | [0.005, 1] |
 
-use super::{BasisLobe, Channels, Lambert, Model, Parameter, Role, Scale, Width, ggx::GgxLobe};
-use crate::math::Rgb;
+use super::{BasisLobe, Lambert, LinearModel, Parameter, Role, Weight, Width, ggx::GgxLobe};
 
 /// The model `ggx-f90`.
 #[derive(Debug, Clone, Copy)]
@@ -27,66 +26,22 @@ const F0: usize = 3;
 const F90: usize = 6;
 const ALPHA: usize = 7;
 
-const fn parameter(name: &'static str, meaning: &'static str, channels: Channels, role: Role) -> Parameter {
-    Parameter { name, meaning, channels, lower: 0.0, upper: 1.0, start: 0.3, role, scale: Scale::Linear }
-}
-
-static PARAMETERS: [Parameter; 4] = [
-    parameter("kd", "diffuse albedo, linear Rec. 709", Channels::Rgb, Role::Linear),
-    parameter("f0", "specular reflectance at normal incidence, linear Rec. 709", Channels::Rgb, Role::Linear),
-    parameter("f90", "specular reflectance at grazing incidence, of all colours", Channels::Scalar, Role::Linear),
-    Parameter {
-        lower: 0.005,
-        ..parameter(
-            "alpha",
-            "microfacet width of GGX; an artist's roughness is its square root",
-            Channels::Scalar,
-            Role::Width,
-        )
-    },
-];
-
-static LOBES: [BasisLobe; 2] =
-    [BasisLobe { lobe: &Lambert, width: None }, BasisLobe { lobe: &GgxLobe, width: Some(Width::itself(ALPHA)) }];
-
-impl Model for GgxF90 {
-    fn name(&self) -> &'static str {
-        "ggx-f90"
-    }
-
-    fn summary(&self) -> &'static str {
-        "ggx with its reflectance at grazing incidence as a parameter (Schlick's 1 replaced)"
-    }
-
-    fn parameters(&self) -> &'static [Parameter] {
-        &PARAMETERS
-    }
-
-    fn lobes(&self) -> &'static [BasisLobe] {
-        &LOBES
-    }
-
-    fn weights(&self, p: &[f64], weights: &mut [Rgb]) {
-        weights[0] = Rgb::from_slice(&p[KD..]);
-        weights[1] = Rgb::from_slice(&p[F0..]);
-        weights[2] = Rgb::splat(p[F90]);
-    }
-
-    fn weight_derivatives(&self, _p: &[f64], push: &mut dyn FnMut(usize, usize, usize, f64)) {
-        for c in 0..3 {
-            push(0, c, KD + c, 1.0);
-            push(1, c, F0 + c, 1.0);
-            push(2, c, F90, 1.0);
-        }
-    }
-
-    fn diffuse_albedo(&self, p: &[f64]) -> Rgb {
-        Rgb::from_slice(&p[KD..])
-    }
-
-    fn normal_incidence_specular(&self, p: &[f64]) -> Rgb {
-        Rgb::from_slice(&p[F0..])
-    }
+impl LinearModel for GgxF90 {
+    const NAME: &'static str = "ggx-f90";
+    const SUMMARY: &'static str = "ggx with its reflectance at grazing incidence as a parameter (Schlick's 1 replaced)";
+    const PARAMETERS: &'static [Parameter] = &[
+        Parameter::colour("kd", "diffuse albedo, linear Rec. 709"),
+        Parameter::colour("f0", "specular reflectance at normal incidence, linear Rec. 709"),
+        // 1 is a smooth interface.
+        Parameter {
+            upper_is_kind: true,
+            ..Parameter::scalar("f90", "specular reflectance at grazing incidence, of all colours", Role::Linear)
+        },
+        Parameter::width("alpha", "microfacet width of GGX; an artist's roughness is its square root"),
+    ];
+    const LOBES: &'static [BasisLobe] =
+        &[BasisLobe::fixed(&Lambert), BasisLobe::with_width(&GgxLobe, Width::itself(ALPHA))];
+    const WEIGHTS: &'static [Weight] = &[Weight::Colour(KD), Weight::Colour(F0), Weight::Scalar(F90)];
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! Lambert's diffuse lobe, `1/pi`.
 
-use super::{Angles, Incident, Lobe, Split, lobe::Spread, lobe::accumulate};
+use super::{Angles, Lobe, Split, Spread};
 use std::f64::consts::FRAC_1_PI;
 
 /// `f = 1/pi`, so that a weight is the diffuse albedo.
@@ -20,16 +20,8 @@ impl Lobe for Lambert {
         None
     }
 
-    fn eval(&self, angles: &Angles, _width: f64) -> f64 {
-        kernel(angles, &Spread::default(), 0.0)
+    #[inline(always)]
+    fn kernel(&self, angles: &Angles, _spread: &Spread, _width: f64) -> f64 {
+        FRAC_1_PI * angles.cos_i.max(0.0)
     }
-
-    fn accumulate(&self, incident: &[Incident], cos_o: f64, widths: &[f64], sums: &mut [f64]) {
-        accumulate(self.split(), incident, cos_o, widths, sums, kernel);
-    }
-}
-
-#[inline(always)]
-fn kernel(angles: &Angles, _spread: &Spread, _width: f64) -> f64 {
-    FRAC_1_PI * angles.cos_i.max(0.0)
 }

@@ -33,10 +33,10 @@ pub struct Incident {
     pub spread: Spread,
 }
 
-/// What the spread of light around its mean direction does to the half vector's angle; `n.l` is that of the mean already.
+/// The effect of the spread of light around its mean direction on the half vector's angle; `n.l` is that of the mean direction.
 ///
 /// With `u = sin^2(th)`, `th` the angle between half vector and normal, a lobe of distribution `D(u)` has the mean `D + D' du +
-/// D''/2 du2`: to second order in the spread, so that a quadrature needs fewer directions.
+/// D''/2 du2` to second order in the spread. With it a quadrature needs fewer directions.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Spread {
     /// Mean change of `sin^2(th)`.
@@ -45,7 +45,7 @@ pub struct Spread {
     pub du2: f64,
 }
 
-/// The factor `1 + x` of a second-order correction, kept where a second-order expansion means anything.
+/// The factor `1 + x` of a second-order correction, clamped to the range in which a second-order expansion holds.
 #[inline(always)]
 pub(super) fn second_order(x: f64) -> f64 {
     (1.0 + x).clamp(0.25, 2.0)
@@ -53,7 +53,7 @@ pub(super) fn second_order(x: f64) -> f64 {
 
 /// A lobe `f(wi, wo) cos(theta_i)` without Fresnel term, of a given width.
 pub trait Lobe: Debug + Sync {
-    /// For messages and table headers.
+    /// The name in messages and table headers.
     fn name(&self) -> &'static str;
 
     /// How its integral splits.
@@ -63,8 +63,7 @@ pub trait Lobe: Debug + Sync {
     /// hemisphere.
     fn equivalent_alpha(&self, width: f64) -> Option<f64>;
 
-    /// How much more the lobe varies than GGX or the cosine of the same width, by which its quadrature is refined: it takes that much less
-    /// of the tolerance.
+    /// How many times more the lobe varies than GGX or the cosine of the same width. The quadrature divides its tolerance by it.
     fn care(&self) -> f64 {
         1.0
     }
@@ -74,61 +73,82 @@ pub trait Lobe: Debug + Sync {
         Tail::Short
     }
 
-    /// Bound of the second derivative of `f cos(theta_i)`, in units of `1/pi`, by the light's cosine alone, for a lobe as wide as the
-    /// hemisphere: where it is not 0, the quadrature is refined up to the horizon too.
+    /// For a lobe as wide as the hemisphere, a bound of the second derivative of `f cos(theta_i)` by the light's cosine, in units of
+    /// `1/pi`. Where it is not 0, the quadrature is refined up to the horizon.
     fn bend(&self) -> f64 {
         0.0
     }
 
-    /// The turn of the normal, in radians, within which a lobe of this width varies little: narrower than the lobe where it changes
+    /// The turn of the normal, in radians, within which a lobe of this width varies little. Less than the width where the lobe changes
     /// fast with the viewer's cosine `cos_o`.
     fn footprint(&self, width: f64, _cos_o: f64) -> f64 {
         width
     }
 
-    /// `f cos(theta_i)` in 1/sr, without Fresnel term; zero for light from below the horizon.
-    fn eval(&self, angles: &Angles, width: f64) -> f64;
+    /// What the tests hold the lobe to.
+    fn expected(&self) -> Expected {
+        Expected::default()
+    }
+
+    /// `f cos(theta_i)` in 1/sr, without Fresnel term, averaged over the spread of the light to second order; zero for light from below
+    /// the horizon. Mark it `#[inline(always)]`, or the loop over the widths is not vectorised.
+    fn kernel(&self, angles: &Angles, spread: &Spread, width: f64) -> f64;
+
+    /// [`Self::kernel`] of light without spread.
+    fn eval(&self, angles: &Angles, width: f64) -> f64 {
+        self.kernel(angles, &Spread::default(), width)
+    }
 
     /// Adds the lobe's basis integrals over `incident`, for every width.
     ///
     /// `sums` has shape `term x channel x width` and grows by `sum over incident of energy * split_t * lobe(width)`.
-    /// `cos_o` is that of all `incident`; it is apart so that the terms that depend on it alone leave the loop.
-    fn accumulate(&self, incident: &[Incident], cos_o: f64, widths: &[f64], sums: &mut [f64]);
+    /// `cos_o` is that of all `incident`. It is a separate argument so that the terms that depend on it alone leave the loop.
+    fn accumulate(&self, incident: &[Incident], cos_o: f64, widths: &[f64], sums: &mut [f64]) {
+        simd::dispatch(Accumulate { lobe: self, incident, cos_o, widths, sums });
+    }
+}
+
+/// What the tests hold a lobe to. The defaults suit a lobe of microfacets that conserves energy; others state what their formula gives.
+#[derive(Debug, Clone, Copy)]
+pub struct Expected {
+    /// Largest directional albedo without Fresnel term.
+    pub most_albedo: f64,
+    /// From width and viewer's cosine, for a width of at most 0.02 and a cosine of at least 0.5: the directional albedo of a mirror,
+    /// and how far below it the lobe may stay.
+    pub sharp_albedo: fn(f64, f64) -> (f64, f64),
+    /// Whether `f` has a kink in the mirror direction, where `n.l = n.v`.
+    pub is_kinked: bool,
+    /// The lobe of the same model that this one only adjusts: the error of a table is a share of the sum of the two.
+    pub adjusts: Option<&'static str>,
+}
+
+impl Default for Expected {
+    fn default() -> Self {
+        Self { most_albedo: 1.0, sharp_albedo: |_, _| (1.0, 0.01), is_kinked: false, adjusts: None }
+    }
 }
 
 /// Widths handled in one pass; longer lists go through in chunks.
 const LANES: usize = 8;
 
-/// The generic loop behind every [`Lobe::accumulate`]: directions outside, widths inside, so that the widths fill SIMD lanes.
+/// The loop of [`Lobe::accumulate`]: directions outside, widths inside, so that the widths fill SIMD lanes.
 ///
-/// Runs under run-time dispatch. Every operation is a plain IEEE one without contraction and each sum runs over directions in
+/// It runs under run-time dispatch. Every operation is a plain IEEE one without contraction and each sum runs over directions in
 /// order, so all SIMD levels give the same bits.
-pub(super) fn accumulate(
-    split: Split,
-    incident: &[Incident],
-    cos_o: f64,
-    widths: &[f64],
-    sums: &mut [f64],
-    kernel: impl Fn(&Angles, &Spread, f64) -> f64 + Copy,
-) {
-    simd::dispatch(Accumulate { split, incident, cos_o, widths, sums, kernel });
-}
-
-struct Accumulate<'a, K> {
-    split: Split,
+struct Accumulate<'a, L: ?Sized> {
+    lobe: &'a L,
     incident: &'a [Incident],
     cos_o: f64,
     widths: &'a [f64],
     sums: &'a mut [f64],
-    kernel: K,
 }
 
-impl<K: Fn(&Angles, &Spread, f64) -> f64 + Copy> pulp::NullaryFnOnce for Accumulate<'_, K> {
+impl<L: Lobe + ?Sized> pulp::NullaryFnOnce for Accumulate<'_, L> {
     type Output = ();
 
     #[inline(always)]
     fn call(self) {
-        let count = self.widths.len();
+        let (count, split) = (self.widths.len(), self.lobe.split());
         for first in (0..count).step_by(LANES) {
             let lanes = LANES.min(count - first);
             // Unused lanes repeat the last width; their sums are dropped.
@@ -138,11 +158,11 @@ impl<K: Fn(&Angles, &Spread, f64) -> f64 + Copy> pulp::NullaryFnOnce for Accumul
                 let mut value = [0.0; LANES];
                 let angles = Angles { cos_o: self.cos_o, ..light.angles };
                 for (v, &width) in value.iter_mut().zip(&widths) {
-                    *v = (self.kernel)(&angles, &light.spread, width);
+                    *v = self.lobe.kernel(&angles, &light.spread, width);
                 }
-                add(self.split, light, &value, &mut total);
+                add(split, light, &value, &mut total);
             }
-            let terms = if self.split == Split::Whole { 1 } else { 2 };
+            let terms = if split == Split::Whole { 1 } else { 2 };
             for (row, lane_sums) in total[..terms].iter().flatten().enumerate() {
                 let out = &mut self.sums[row * count + first..][..lanes];
                 out.iter_mut().zip(lane_sums).for_each(|(s, t)| *s += t);

@@ -1,13 +1,13 @@
 //! Reflectance models, one file each, and the registry that names them.
 //!
 //! A model is a sum of *basis lobes* with weights. For fixed lobe widths the radiance of a pixel is linear in the
-//! weights, which is what makes transport tables possible (design: "transport tables"):
+//! weights, so a transport table per lobe replaces rendering (design section 5):
 //!
 //! `f(wi, wo) cos(theta_i) = sum_t weight_t(parameters) * basis_t(wi, wo; width)`
 //!
-//! A [`Model`] therefore declares its [`Parameter`]s, its [`BasisLobe`]s, and the map (with derivative) from the former
-//! to the weights of the latter. Adding a model is one file and one line in [`MODELS`]; the tests of reciprocity, energy
-//! and derivatives below cover it from then on.
+//! A [`Model`] therefore declares its [`Parameter`]s, its [`BasisLobe`]s, and the map (with derivative) from parameters to
+//! weights of lobes. A new model is one file and one line in [`MODELS`]; help, tests of physics, agreement and recovery iterate
+//! [`MODELS`].
 //!
 //! Conventions: directions point away from the surface; `f` is in 1/sr; `alpha` is the microfacet width, not an artist's
 //! roughness.
@@ -21,6 +21,7 @@ mod disney;
 mod ggx;
 mod ggx_f90;
 mod lambert;
+mod linear;
 mod lobe;
 pub mod merl;
 mod model;
@@ -38,20 +39,27 @@ pub use disney::Disney;
 pub use ggx::Ggx;
 pub use ggx_f90::GgxF90;
 pub use lambert::Lambert;
-pub use lobe::{Incident, Lobe, Split, Spread, Tail};
+pub use linear::{LinearModel, Weight};
+pub use lobe::{Expected, Incident, Lobe, Split, Spread, Tail};
 pub use model::{BasisLobe, Model, lobe_terms, term_count};
 pub use parameter::{Channels, Parameter, ParameterError, Role, Scale, flat_bounds, flat_len, flat_names, offset_of};
 pub use reflectance::{Material, Reflectance};
 pub use ward::Ward;
 pub use width::Width;
 
-/// Every model, by the name users give it. The first is the default.
+/// Every model, in the order in which lists show them.
 pub static MODELS: &[&dyn Model] = &[&Ggx, &GgxF90, &CookTorrance, &Ward, &BlinnPhong, &AshikhminShirley, &Disney];
+
+/// The model of a fit that names none.
+pub static DEFAULT_MODEL: &dyn Model = &Ggx;
+
+/// The model of the papers' results and of `--preset paper`.
+pub static PAPER_MODEL: &dyn Model = &CookTorrance;
 
 /// Looks a model up by name.
 ///
 /// # Errors
-/// Names the known models when there is none of that name.
+/// [`ParameterError::UnknownModel`], which lists the known models.
 pub fn model(name: &str) -> Result<&'static dyn Model, ParameterError> {
     MODELS.iter().copied().find(|m| m.name() == name).ok_or_else(|| ParameterError::UnknownModel {
         name: name.to_owned(),

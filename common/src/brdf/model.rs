@@ -1,4 +1,4 @@
-//! What a reflectance model declares.
+//! The declaration of a reflectance model.
 
 use super::{Lobe, Parameter, Split, Width};
 use crate::math::Rgb;
@@ -14,6 +14,18 @@ pub struct BasisLobe {
 }
 
 impl BasisLobe {
+    /// A lobe of fixed shape.
+    #[must_use]
+    pub const fn fixed(lobe: &'static dyn Lobe) -> Self {
+        Self { lobe, width: None }
+    }
+
+    /// A lobe whose width follows from a parameter.
+    #[must_use]
+    pub const fn with_width(lobe: &'static dyn Lobe, width: Width) -> Self {
+        Self { lobe, width: Some(width) }
+    }
+
     /// The lobe's width at a flat parameter vector; `None` for a lobe of fixed shape.
     #[must_use]
     pub fn width_at(&self, parameters: &[f64]) -> Option<f64> {
@@ -26,32 +38,33 @@ impl BasisLobe {
 /// Terms are counted lobe by lobe: a lobe that splits by Schlick's Fresnel term has two, `(1 - F5)` and `F5`; any other
 /// has one.
 pub trait Model: Debug + Sync {
-    /// The name users give it.
+    /// The name in `--model` and `fit.json`.
     fn name(&self) -> &'static str;
 
-    /// The formula and its source, one line.
+    /// The formula and its source in one line, for the help.
     fn summary(&self) -> &'static str;
 
     /// Parameters in the order of the flat vector.
     fn parameters(&self) -> &'static [Parameter];
 
-    /// Basis lobes in the order of the terms. The first that has a width is the main one: tables may cover a part of its widths alone.
+    /// Basis lobes in the order of the terms. The first lobe with a width is the main one: a table may cover a part of
+    /// its widths.
     fn lobes(&self) -> &'static [BasisLobe];
 
     /// Weight of every term at a flat parameter vector; `weights.len()` is [`term_count`].
     fn weights(&self, parameters: &[f64], weights: &mut [Rgb]);
 
-    /// The weights in the coordinates of the scan, which solves for all entries of [`Role::Linear`](super::Role::Linear) at once:
-    /// affine in all of them together. Another map than [`Self::weights`] only where one linear parameter multiplies another.
+    /// The weights in the coordinates of the scan: affine in all entries of [`Role::Linear`](super::Role::Linear) together, because the
+    /// scan solves for all of them at once. Differs from [`Self::weights`] only where one linear parameter multiplies another.
     fn scan_weights(&self, point: &[f64], weights: &mut [Rgb]) {
         self.weights(point, weights);
     }
 
-    /// From the coordinates of the scan to parameters within their bounds, of the same weights if such exist.
+    /// Converts the coordinates of the scan to parameters within their bounds, with the same weights where the bounds allow.
     fn parameters_of_scan(&self, _point: &mut [f64]) {}
 
-    /// Calls `push(term, channel, entry, value)` for every derivative of a weight with respect to an entry of the flat
-    /// parameter vector that is not always zero.
+    /// Calls `push(term, channel, entry, value)` for every derivative of a weight by an entry of the flat parameter vector that is not
+    /// always zero.
     fn weight_derivatives(&self, parameters: &[f64], push: &mut dyn FnMut(usize, usize, usize, f64));
 
     /// The colour of the specular lobe at normal incidence, for reports: `f0`, or `ks f0`.

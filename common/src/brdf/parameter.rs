@@ -1,4 +1,4 @@
-//! The parameters of a model: names, bounds, units, and the part each plays in a search.
+//! The parameters of a model: names, bounds, units, and roles in a search.
 //!
 //! A parameter vector is flat: colours take three consecutive entries (red, green, blue), scalars one, in the order of
 //! [`Model::parameters`](super::Model::parameters).
@@ -25,18 +25,16 @@ impl Channels {
     }
 }
 
-/// How a search should see the parameter.
+/// How a search treats the parameter.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Role {
     /// The weights are affine in it while all other parameters are held.
     Linear,
     /// The width of the main lobe: radiance depends on it through the table's knots.
     Width,
-    /// It multiplies other parameters, or is the width of a lobe that is not the main one: the scan tries these values and solves for the
-    /// linear ones.
+    /// It multiplies other parameters, or is the width of a lobe other than the main one. The scan tries these values and solves for the
+    /// linear parameters.
     Scanned(&'static [f64]),
-    /// As `Scanned`: the share of one kind of surface in a mixture of two, whose ends are kinds and no limits.
-    Blend(&'static [f64]),
 }
 
 /// The coordinate in which a search moves.
@@ -63,13 +61,42 @@ pub struct Parameter {
     pub upper: f64,
     /// Start of the paper's pattern search (design section 10, `--preset paper`).
     pub start: f64,
-    /// The part it plays in a search.
+    /// How a search treats it.
     pub role: Role,
-    /// The coordinate pattern search moves in. Least squares always moves the width of the main lobe by its logarithm.
+    /// Whether the upper bound is a kind of surface, such as a metal or a smooth interface, and not a limit of the model.
+    pub upper_is_kind: bool,
+    /// The coordinate of pattern search. Least squares always uses the logarithm of the main lobe's width.
     pub scale: Scale,
 }
 
-/// What is wrong with a set of parameters.
+impl Parameter {
+    /// A colour from 0 to 1 that the weights are affine in.
+    #[must_use]
+    pub const fn colour(name: &'static str, meaning: &'static str) -> Self {
+        Self { channels: Channels::Rgb, ..Self::scalar(name, meaning, Role::Linear) }
+    }
+
+    /// A scalar from 0 to 1.
+    #[must_use]
+    pub const fn scalar(name: &'static str, meaning: &'static str, role: Role) -> Self {
+        let (channels, scale) = (Channels::Scalar, Scale::Linear);
+        Self { name, meaning, channels, lower: 0.0, upper: 1.0, start: 0.3, role, upper_is_kind: false, scale }
+    }
+
+    /// The share of one kind of surface in a mixture of two: the scan tries these values.
+    #[must_use]
+    pub const fn blend(name: &'static str, meaning: &'static str, values: &'static [f64]) -> Self {
+        Self { upper_is_kind: true, ..Self::scalar(name, meaning, Role::Scanned(values)) }
+    }
+
+    /// The width of the main lobe, from 0.005 to 1.
+    #[must_use]
+    pub const fn width(name: &'static str, meaning: &'static str) -> Self {
+        Self { lower: 0.005, ..Self::scalar(name, meaning, Role::Width) }
+    }
+}
+
+/// Invalid parameters of a model.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum ParameterError {
@@ -78,7 +105,7 @@ pub enum ParameterError {
     UnknownModel {
         /// As given.
         name: String,
-        /// The names there are.
+        /// The known names, separated by commas.
         known: String,
     },
     /// The model has no such parameter.
@@ -88,7 +115,7 @@ pub enum ParameterError {
         model: &'static str,
         /// As given.
         name: String,
-        /// The names there are.
+        /// The known names, separated by commas.
         known: String,
     },
     /// A parameter was left out.
@@ -98,10 +125,10 @@ pub enum ParameterError {
         model: &'static str,
         /// The parameter.
         name: &'static str,
-        /// How it is written.
+        /// An example of its value.
         example: &'static str,
     },
-    /// One number for a scalar, three (or one for grey) for a colour.
+    /// A wrong number of values: a scalar takes one, a colour three, or one for grey.
     #[error("parameter '{name}' takes {expected} number(s), found {found}")]
     Count {
         /// The parameter.
@@ -131,7 +158,7 @@ pub fn flat_len(parameters: &[Parameter]) -> usize {
     parameters.iter().map(|p| p.channels.count()).sum()
 }
 
-/// Where a named parameter starts in the flat vector.
+/// The first entry of a named parameter in the flat vector.
 #[must_use]
 pub fn offset_of(parameters: &[Parameter], name: &str) -> Option<usize> {
     let index = parameters.iter().position(|p| p.name == name)?;

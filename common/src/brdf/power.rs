@@ -1,9 +1,22 @@
-//! The cosine of the half vector's angle to a power, the lobe of Blinn-Phong and Ashikhmin-Shirley.
+//! The cosine of the half vector's angle to a power: the lobe of Blinn (1977) and of Ashikhmin & Shirley (2000).
 
-use super::{Angles, Spread, Width, lobe::second_order};
+use super::{Angles, Channels, Parameter, Role, Scale, Spread, Width, lobe::second_order};
 use crate::math::elementary::{exp_nonpositive, ln_positive};
 
-/// The width that an exponent in the flat parameter vector stands for: `alpha = sqrt(2 / (n + 2))`, as curved at its peak as GGX.
+/// The exponent as a parameter.
+pub(super) const EXPONENT: Parameter = Parameter {
+    name: "n",
+    meaning: "exponent of the cosine between normal and half vector",
+    channels: Channels::Scalar,
+    lower: 1.0,
+    upper: 1e5,
+    start: 20.0,
+    role: Role::Width,
+    upper_is_kind: false,
+    scale: Scale::Logarithmic,
+};
+
+/// The width of an exponent in the flat parameter vector: `alpha = sqrt(2 / (n + 2))`, for which the peak has the curvature of GGX.
 pub(super) const fn width(entry: usize) -> Width {
     Width { entry, of: |n| (2.0 / (n + 2.0)).sqrt(), inverse: exponent, derivative }
 }
@@ -18,13 +31,18 @@ pub(super) fn exponent(alpha: f64) -> f64 {
     2.0 / (alpha * alpha) - 2.0
 }
 
-/// `(n.h)^n`, and the factor that its mean over the spread of light has.
+/// The albedo that a sharp lobe divided by the larger of `n.l` and `n.v` may lose: half of it lies beyond the kink at `n.l = n.v`.
+pub(super) fn beyond_kink(width: f64, cos_o: f64) -> f64 {
+    width * (1.0 - cos_o * cos_o).sqrt() / cos_o + 0.002
+}
+
+/// `(n.h)^n`, and the factor by which the spread of light changes its mean.
 ///
 /// Spread: with `u = sin^2(th)` and `k = n/2` it is `(1 - u)^k`; its first derivative by `u`, as a share of it, is `-k / (1 - u)`, its
 /// second `k (k - 1) / (1 - u)^2`.
 #[inline(always)]
 pub(super) fn cosine(g: &Angles, spread: &Spread, alpha: f64) -> (f64, f64) {
-    // Not 1 - u where the half vector lies almost in the surface: it may round to nothing.
+    // Near the surface 1 - u may round to 0.
     let cos2 = (1.0 - g.sin2_h).max(1e-300);
     let k = 0.5 * exponent(alpha);
     let inverse = 1.0 / cos2;

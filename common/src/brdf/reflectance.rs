@@ -9,8 +9,8 @@ pub trait Reflectance: Debug + Sync {
     /// `f(wi, wo) cos(theta_i)` in 1/sr for directions in the local frame (normal +Z); zero below the horizon.
     fn eval_cos(&self, wi_local: Vec3, wo_local: Vec3) -> Rgb;
 
-    /// GGX widths of the lobes that importance sampling should draw from; need not be exact, but should cover the sharpest
-    /// feature.
+    /// GGX widths of the lobes that importance sampling draws from. They need not be exact, but the smallest must be as narrow as the
+    /// sharpest feature.
     fn sampling_alphas(&self) -> Vec<f64>;
 }
 
@@ -85,7 +85,7 @@ impl Reflectance for Material {
     }
 
     fn sampling_alphas(&self) -> Vec<f64> {
-        // Lobes as wide as the hemisphere are drawn from together.
+        // All lobes as wide as the hemisphere share one technique.
         let mut has_wide = false;
         let alpha = |b: &BasisLobe| match b.lobe.equivalent_alpha(self.width(b)) {
             Some(alpha) => Some(alpha),

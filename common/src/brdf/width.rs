@@ -1,11 +1,11 @@
-//! Where the width of a lobe comes from.
+//! The width of a lobe as a function of a parameter.
 
 use super::{Parameter, flat_bounds};
 
 /// How the width of a lobe follows from one entry of the flat parameter vector.
 ///
-/// Widths are GGX alphas, or as good as: tables are gridded in their logarithm. What a model calls its parameter may be
-/// something else, such as the exponent of a cosine, which grows as the lobe gets narrower.
+/// Widths are GGX alphas or equivalent to them; tables have a grid in their logarithm. The parameter may be another quantity, such as the
+/// exponent of a cosine, which grows as the lobe gets narrower.
 #[derive(Debug, Clone, Copy)]
 pub struct Width {
     /// The entry.

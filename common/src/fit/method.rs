@@ -2,7 +2,7 @@
 
 use super::gammas::Gammas;
 use crate::{
-    brdf::{MODELS, Model},
+    brdf::{DEFAULT_MODEL, Model},
     choice::choice,
     render::subset::{SampleCount, Sampling},
 };
@@ -149,7 +149,7 @@ pub struct Method {
 impl Default for Method {
     fn default() -> Self {
         Self {
-            model: MODELS[0],
+            model: DEFAULT_MODEL,
             gammas: Gammas::DEFAULT.values(),
             samples: SampleCount::default(),
             sampling: Sampling::default(),

@@ -63,7 +63,7 @@ fn grids(model: &dyn Model, table: &TransportTable) -> Vec<(usize, Vec<f64>)> {
     let (lower, upper) = flat_bounds(model.parameters());
     let scanned = flat_roles(model).into_iter().enumerate().filter_map(|(entry, role)| match role {
         Role::Linear => None,
-        Role::Scanned(values) | Role::Blend(values) => Some((entry, values.to_vec())),
+        Role::Scanned(values) => Some((entry, values.to_vec())),
         Role::Width => {
             let of_entry = |b: &BasisLobe| b.width.filter(|width| width.entry == entry);
             let (lobe, width) = model.lobes().iter().enumerate().find_map(|(l, b)| Some((l, of_entry(b)?)))?;

@@ -1,4 +1,4 @@
-//! What a decoded file gives.
+//! The content of a decoded file.
 
 use std::fmt;
 
@@ -7,43 +7,44 @@ use super::Image;
 /// A decoded image file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Decoded {
-    /// The pixels: linear Rec. 709, top left first. NaN and infinities are kept as the file has them; the caller
-    /// decides. Colours are as stored with regard to [`Self::alpha`], see [`Self::is_premultiplied`].
+    /// The pixels: linear Rec. 709, top left first. NaN and infinities are kept, for the caller to handle. Colours are
+    /// multiplied by [`Self::alpha`] or not, as stored; see [`Self::is_premultiplied`].
     pub image: Image,
-    /// Opacity as stored, one value per pixel, nominally in [0, 1], where the file has it.
+    /// Opacity as stored, one value per pixel, nominally in [0, 1]; `None` if the file has none.
     pub alpha: Option<Vec<f32>>,
-    /// For PNG and JPEG, the pixels that are overexposed: one of red, green and blue is at the largest code (JPEG: less
-    /// than three codes below it, because quantised DCT coefficients move a clipped value by as much). Black is not
-    /// counted: the largest error of code 0 is half a step, that of the largest code has no bound.
+    /// For PNG and JPEG, whether each pixel is overexposed: its red, green or blue is at the largest code. For JPEG
+    /// within two codes of it, because quantised DCT coefficients move a clipped value by as much. Black pixels are not
+    /// marked: the error of code 0 is at most half a step, whereas that of the largest code is unlimited.
     pub clipped: Option<Vec<bool>>,
-    /// How the file stored the pixels (they are linear now).
+    /// The encoding of the pixels in the file (in `image` they are linear).
     pub encoding: Encoding,
     /// The file's format.
     pub format: Format,
-    /// Text that the file carries, in the file's order (OpenEXR: by key). Keys as in [`super::metadata`].
+    /// Text of the file, with keys as in [`super::metadata`]. It is in the file's order; OpenEXR: sorted by key; PNG:
+    /// Latin-1 texts before UTF-8 texts.
     pub metadata: Vec<(String, String)>,
-    /// What the reader assumed, ignored or converted. Sentences for people.
+    /// What the reader assumed, ignored or converted, in words for the user.
     pub warnings: Vec<String>,
 }
 
 impl Decoded {
-    /// Whether the colours are already multiplied by [`Self::alpha`]: OpenEXR stores them so, PNG does not.
+    /// Whether the colours are multiplied by [`Self::alpha`]: in OpenEXR they are, in PNG they are not.
     #[must_use]
     pub fn is_premultiplied(&self) -> bool {
         self.format == Format::OpenExr
     }
 }
 
-/// How a file stores its pixels.
+/// The encoding of the pixels in a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Encoding {
     /// Proportional to radiance.
     Linear,
-    /// Through the sRGB transfer function (IEC 61966-2-1), 8 or 16 bits.
+    /// Encoded by the sRGB transfer function (IEC 61966-2-1), 8 or 16 bits.
     Srgb,
 }
 
-/// The formats that are read.
+/// The supported formats.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Format {
     /// OpenEXR, `.exr`.
@@ -59,7 +60,7 @@ pub enum Format {
 }
 
 impl Format {
-    /// The format that the first bytes promise.
+    /// The format by the first bytes; `None` if they match no supported format.
     #[must_use]
     pub fn sniff(bytes: &[u8]) -> Option<Self> {
         match bytes {

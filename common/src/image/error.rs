@@ -1,35 +1,35 @@
-//! What can be wrong with an image file, with its name, what was expected, what was found and what to do.
+//! Errors of image files. Each has the file's name, what was expected and found, and what to do.
 
 use super::decoded::Format;
 
-/// An image file that cannot be used as it is.
+/// The reason why an image file cannot be used.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ImageError {
-    /// The bytes are of no format that is read.
+    /// The format is not supported.
     #[error(
         "{name}: expected OpenEXR, Radiance HDR, PFM, PNG or JPEG, found {found}; convert the file to one of these"
     )]
     UnknownFormat {
         /// The file, as named by the caller.
         name: String,
-        /// What the first bytes look like.
+        /// A description of the first bytes.
         found: String,
     },
 
-    /// The file breaks the rules of its format, or ends early.
-    #[error("{name}: not a complete {format} file: {detail}; copy or export it again")]
+    /// The file violates its format or is truncated.
+    #[error("{name}: not a valid {format} file: {detail}; copy or export it again")]
     Malformed {
         /// The file, as named by the caller.
         name: String,
-        /// The format its first bytes promise.
+        /// The format by the first bytes.
         format: Format,
         /// What was expected and found.
         detail: String,
     },
 
-    /// The file is valid, but uses a feature that is not read.
-    #[error("{name}: {feature} in a {format} file is not read; {advice}")]
+    /// The file is valid, but uses a feature that is not supported.
+    #[error("{name}: {feature} in a {format} file is not supported; {advice}")]
     Unsupported {
         /// The file, as named by the caller.
         name: String,
@@ -48,28 +48,28 @@ pub enum ImageError {
     TooLarge {
         /// The file, as named by the caller.
         name: String,
-        /// Columns the header claims.
+        /// Columns by the header.
         width: u64,
-        /// Rows the header claims.
+        /// Rows by the header.
         height: u64,
         /// The limit per side.
         max_side: usize,
-        /// The limit of all pixels.
+        /// The limit of the number of pixels.
         max_pixels: usize,
     },
 
-    /// None of the channels that are needed is there.
+    /// The needed channels are missing.
     #[error("{name}: expected {expected}, found channels {found}; export the file with these channels")]
     Channels {
         /// The file, as named by the caller.
         name: String,
-        /// The channels that would do.
+        /// The channels that are needed.
         expected: &'static str,
-        /// The channels there are.
+        /// The channels of the file.
         found: String,
     },
 
-    /// A mask that is no coverage.
+    /// A mask whose colour channels differ.
     #[error(
         "{name}: expected a mask (alpha, one channel, or equal channels), found different colours at column {column}, row {row}; export the mask as grey"
     )]
@@ -91,7 +91,7 @@ pub enum ImageError {
         column: usize,
         /// Row of the pixel.
         row: usize,
-        /// The value there.
+        /// Its value.
         value: f32,
     },
 
@@ -106,18 +106,18 @@ pub enum ImageError {
         column: usize,
         /// Row of the pixel.
         row: usize,
-        /// The length there.
+        /// Its length.
         length: f64,
     },
 
-    /// Something that the output format cannot hold.
+    /// Content that the output format cannot represent.
     #[error("cannot write {format}: expected {expected}, found {found}")]
     Unwritable {
         /// The output format.
         format: Format,
-        /// What the format can hold.
+        /// What the format can represent.
         expected: String,
-        /// What it was asked to hold.
+        /// What was to be written.
         found: String,
     },
 }

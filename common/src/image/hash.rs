@@ -1,5 +1,5 @@
-//! The name of an image by its content: images are hashed after decoding, so that a photo has the same name whatever
-//! file format, compression or metadata it came with.
+//! The identity of an image by its content. Images are hashed after decoding, so that a photo has the same hash in
+//! every file format, with every compression and with any metadata.
 
 use super::Image;
 
@@ -20,10 +20,10 @@ pub fn content_hash(image: &Image) -> blake3::Hash {
     hasher.finalize()
 }
 
-/// Keeps the hash apart from those of other kinds of content. A change of the layout changes the number.
+/// Makes the hash differ from those of other kinds of content. A change of the layout changes the number.
 const PREFIX: &[u8] = b"lookalike image 1\n";
 
-/// Pixels per update: 48 kB, which stays in cache.
+/// Pixels per update: 48 kB, which fit into the cache.
 const BATCH: usize = 4096;
 
 #[cfg(test)]

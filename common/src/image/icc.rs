@@ -1,7 +1,7 @@
-//! Whether an embedded ICC profile says what is assumed, sRGB. Only matrix profiles are looked into (ICC.1:2022, tags
-//! `rXYZ gXYZ bXYZ` and `rTRC`, or `kTRC` of a grey profile); the profile is never applied.
+//! Comparison of an embedded ICC profile with sRGB, which is assumed. Only matrix profiles are examined (ICC.1:2022,
+//! tags `rXYZ gXYZ bXYZ` and `rTRC`, or `kTRC` of a grey profile). The profile is not applied.
 
-/// What, if anything, in `profile` contradicts sRGB.
+/// The first contradiction to sRGB in `profile`, in words.
 pub(super) fn contradiction(profile: &[u8]) -> Option<&'static str> {
     let Some(space) = profile.get(16..20) else { return Some("its ICC profile is broken") };
     if space == b"GRAY" {
@@ -11,7 +11,9 @@ pub(super) fn contradiction(profile: &[u8]) -> Option<&'static str> {
         return Some("its ICC profile is not for RGB");
     }
     for (name, expected) in [(b"rXYZ", SRGB_RED), (b"gXYZ", SRGB_GREEN), (b"bXYZ", SRGB_BLUE)] {
-        let Some(found) = tag(profile, name).and_then(xyz) else { return Some("its ICC profile is not by matrix") };
+        let Some(found) = tag(profile, name).and_then(xyz) else {
+            return Some("its ICC profile is not a matrix profile");
+        };
         if found.iter().zip(expected).any(|(a, b)| (a - b).abs() > 2e-3) {
             return Some("its ICC profile has other primaries");
         }
@@ -19,13 +21,13 @@ pub(super) fn contradiction(profile: &[u8]) -> Option<&'static str> {
     tone_contradiction(tag(profile, b"rTRC"))
 }
 
-/// sRGB and a pure gamma of 2.2 differ by 0.004 at code 1/2, which is let pass.
+/// Compares the curve at code 1/2. A pure gamma of 2.2 differs from sRGB by 0.004 there, which is accepted.
 fn tone_contradiction(curve: Option<&[u8]>) -> Option<&'static str> {
     let middle = curve.and_then(value_at_half);
     match middle {
         Some(value) if (value - super::srgb::to_linear(0.5)).abs() < 0.01 => None,
         Some(_) => Some("its ICC profile has another tone curve"),
-        None => Some("its ICC profile has a tone curve that is not understood"),
+        None => Some("its ICC profile has a tone curve of an unknown type"),
     }
 }
 
@@ -90,7 +92,7 @@ fn fixed_at(data: &[u8], at: usize) -> Option<f64> {
     Some(f64::from(i32::from_be_bytes(*data.get(at..)?.first_chunk()?)) / 65536.0)
 }
 
-/// sRGB's primaries adapted to D50, the connection space (the `sRGB IEC61966-2.1` profile).
+/// sRGB's primaries adapted to D50, the white of the connection space (from the `sRGB IEC61966-2.1` profile).
 const SRGB_RED: [f64; 3] = [0.4360, 0.2225, 0.0139];
 const SRGB_GREEN: [f64; 3] = [0.3851, 0.7169, 0.0971];
 const SRGB_BLUE: [f64; 3] = [0.1431, 0.0606, 0.7141];
@@ -126,7 +128,7 @@ mod tests {
     const LINEAR: &[u8] = b"curv\0\0\0\0\0\0\0\0";
 
     #[test]
-    fn srgb_passes_and_others_are_named() {
+    fn srgb_is_accepted_and_other_profiles_are_described() {
         let srgb = [SRGB_RED, SRGB_GREEN, SRGB_BLUE];
         // Display P3 to D50.
         let p3 = [[0.5151, 0.2412, 0.0], [0.2919, 0.6922, 0.0419], [0.1572, 0.0666, 0.7841]];

@@ -1,7 +1,7 @@
-//! JPEG (ITU-T T.81), through the `image` crate, taken as sRGB. Grey and three-channel files; four channels (print
-//! colours) are refused. The decoder fills what is missing of a cut-off file with grey, so the markers are walked first.
-//! The decoder's inverse transform may differ by one code between processors: a JPEG's content hash is a hash of what
-//! was decoded here.
+//! JPEG (ITU-T T.81), by the `image` crate, decoded as sRGB. Grey and three-channel files are read; four channels
+//! (print colours) are refused. The decoder fills the missing part of a truncated file with grey, so the markers are
+//! checked first. The decoder's inverse transform may differ by one code between processors, so the content hash of a
+//! JPEG may differ too.
 
 use std::io::Cursor;
 
@@ -33,12 +33,12 @@ pub(super) fn read(source: &Source<'_>) -> Result<(Codes, Option<Vec<u8>>), Imag
     Ok((Codes::read(source, FORMAT, decoder)?, profile))
 }
 
-/// Walks the markers up to the end of the image: size and channels of the frame, and that the end is there.
+/// Walks the markers up to the end of the image. Checks the size and channels of the frame, and that the end exists.
 fn check_markers(source: &Source<'_>) -> Result<(), ImageError> {
     let cut = || source.malformed(FORMAT, "it ends before the end-of-image marker");
     let mut rest = source.bytes.get(2..).ok_or_else(cut)?;
     loop {
-        // Between segments: fill bytes; inside a scan: data, with 0xff escaped by 0 and restart markers.
+        // Skips fill bytes between segments, and the data of a scan, with its escaped 0xff and restart markers.
         let start = rest.windows(2).position(|w| w[0] == 0xff && !matches!(w[1], 0 | 0xff | RST0..=RST7));
         let at = start.ok_or_else(cut)?;
         let marker = rest[at + 1];
@@ -58,7 +58,7 @@ fn check_markers(source: &Source<'_>) -> Result<(), ImageError> {
     }
 }
 
-/// Start of frame, but for the Huffman, arithmetic and extension markers among them.
+/// Whether a marker starts a frame. The Huffman, arithmetic and extension markers in the same range do not.
 fn is_frame(marker: u8) -> bool {
     matches!(marker, 0xc0..=0xcf) && !matches!(marker, 0xc4 | 0xc8 | 0xcc)
 }
@@ -83,7 +83,7 @@ fn check_frame(source: &Source<'_>, segment: &[u8]) -> Result<(), ImageError> {
 
 const FORMAT: Format = Format::Jpeg;
 
-/// A clipped value comes out of the quantised transform this far below 255 at the usual qualities.
+/// At the usual qualities the quantised transform decodes a clipped value to at most this far below 255.
 const CLIP_MARGIN: u16 = 2;
 
 const SOI: u8 = 0xd8;

@@ -1,4 +1,4 @@
-//! Images of 8 or 16-bit codes (PNG, JPEG) on their way to linear radiance or to coverage.
+//! Images of 8 or 16-bit codes (PNG, JPEG), and their conversion to linear radiance or to coverage.
 
 use image::{DynamicImage, ImageDecoder};
 
@@ -8,7 +8,7 @@ use super::source::Source;
 use super::{Image, srgb};
 use crate::math::to_f32;
 
-/// Codes as stored, upright.
+/// Codes as stored, after Exif orientation.
 #[derive(Debug)]
 pub(super) struct Codes {
     pub(super) width: usize,
@@ -20,12 +20,12 @@ pub(super) struct Codes {
     pub(super) samples: Vec<u16>,
     /// The largest code: 255 or 65535.
     pub(super) max: u16,
-    /// Exif orientation other than upright, which has been undone.
-    pub(super) turned: bool,
+    /// Whether an Exif orientation other than upright was applied.
+    pub(super) is_reoriented: bool,
 }
 
 impl Codes {
-    /// Decodes all pixels, after a check of the size that the header claims.
+    /// Decodes all pixels. Checks the size in the header first.
     pub(super) fn read(
         source: &Source<'_>,
         format: Format,
@@ -41,7 +41,7 @@ impl Codes {
             .ok_or_else(|| source.unsupported(format, "this pixel type", "convert it to 8 or 16 bits per channel"))
     }
 
-    fn from_image(image: DynamicImage, turned: bool) -> Option<Self> {
+    fn from_image(image: DynamicImage, is_reoriented: bool) -> Option<Self> {
         let (width, height) = (image.width() as usize, image.height() as usize);
         let colour = image.color();
         let has_alpha = colour.has_alpha();
@@ -58,20 +58,20 @@ impl Codes {
             DynamicImage::ImageRgba16(buffer) => (buffer.into_raw(), u16::MAX),
             _ => return None,
         };
-        Some(Self { width, height, colours, has_alpha, samples, max, turned })
+        Some(Self { width, height, colours, has_alpha, samples, max, is_reoriented })
     }
 
-    /// The pixels of the file, all channels of each, alpha last.
+    /// The pixels, each with all its channels, alpha last.
     pub(super) fn pixels(&self) -> std::slice::ChunksExact<'_, u16> {
         self.samples.chunks_exact(self.colours + usize::from(self.has_alpha))
     }
 
-    /// Coverage of a code: linear in [0, 1].
+    /// The code as a fraction of the largest code, in [0, 1].
     pub(super) fn fraction(&self, code: u16) -> f32 {
         to_f32(f64::from(code) / f64::from(self.max))
     }
 
-    /// Decodes from sRGB. Codes within `clip_margin` of the largest count as clipped.
+    /// Decodes from sRGB. A pixel with a code within `clip_margin` of the largest is marked as clipped.
     pub(super) fn into_decoded(self, format: Format, clip_margin: u16) -> Decoded {
         let linear: Vec<f32> =
             (0..=self.max).map(|code| to_f32(srgb::to_linear(f64::from(code) / f64::from(self.max)))).collect();
@@ -81,8 +81,9 @@ impl Codes {
         let clipped = self.pixels().map(|pixel| colour(pixel).iter().any(|&code| code >= limit)).collect();
         let alpha = self.has_alpha.then(|| self.pixels().map(|pixel| self.fraction(pixel[self.colours])).collect());
         let mut warnings = Vec::new();
-        if self.turned {
-            warnings.push("turned upright as its Exif orientation says: pixel coordinates count after that".to_owned());
+        if self.is_reoriented {
+            warnings
+                .push("rotated or mirrored by its Exif orientation: pixel coordinates are those after it".to_owned());
         }
         Decoded {
             image: Image::from_pixels(self.width, self.height, pixels),

@@ -1,5 +1,5 @@
-//! Keys of the text that is written beside the pixels, as OpenEXR string attributes and PNG text chunks. A reader of
-//! `match.exr` needs nothing else to know what it looks at.
+//! Keys of the text in written files, stored as OpenEXR string attributes and PNG text chunks. The text describes
+//! `match.exr` without any other file.
 
 /// The program that wrote the file. OpenEXR's standard `software`, PNG's registered `Software`.
 pub const SOFTWARE: &str = "software";
@@ -9,7 +9,7 @@ pub const COMMENTS: &str = "comments";
 pub const VERSION: &str = "lookalike.version";
 /// Axes, units, colour space and camera, in words.
 pub const CONVENTIONS: &str = "lookalike.conventions";
-/// The factor that brings radiance to the display range before sRGB encoding, a decimal number.
+/// The factor by which radiance is multiplied before it is clipped and sRGB-encoded, a decimal number.
 pub const DISPLAY_EXPOSURE: &str = "lookalike.displayExposure";
 /// The BRDF model.
 pub const MODEL: &str = "lookalike.model";

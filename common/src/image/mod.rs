@@ -1,13 +1,15 @@
-//! Pixel buffers and the file formats they come from and go to. Readers take bytes, never paths; writers give bytes.
+//! Pixel buffers, and readers and writers of image files. Readers take bytes, not paths; writers return bytes.
 //!
-//! - [`decode`] reads a photograph or a light probe: OpenEXR, Radiance HDR, PFM, PNG or JPEG, told apart by content;
+//! - [`decode`] reads a photograph or a light probe: OpenEXR, Radiance HDR, PFM, PNG or JPEG, recognised by content;
 //! - [`decode_mask`] reads a coverage mask, [`decode_normals`] a normal map;
-//! - [`openexr::write`], [`pfm::write`] and [`png::write`] write results; [`metadata`] names what is written beside the pixels;
-//! - [`content_hash`] names an image by its decoded pixels.
+//! - [`openexr::write`], [`pfm::write`] and [`png::write`] write results; [`metadata`] has the keys of the text in
+//!   them;
+//! - [`content_hash`] identifies an image by its decoded pixels.
 //!
-//! Whatever the file holds becomes linear Rec. 709, top left first. What could not be taken over exactly is said in
-//! [`Decoded::warnings`]; what cannot be taken over at all is an [`ImageError`]. Nothing is guessed in silence.
+//! All pixels are converted to linear Rec. 709, top left first. A conversion that is not exact, or an assumption, is
+//! reported in [`Decoded::warnings`]. A file that cannot be converted is an [`ImageError`].
 
+mod decode;
 mod decoded;
 mod error;
 mod hash;
@@ -15,6 +17,7 @@ mod icc;
 mod jpeg;
 mod ldr;
 mod mask;
+mod mask_channels;
 pub mod metadata;
 mod normals;
 pub mod openexr;
@@ -28,11 +31,12 @@ pub mod srgb;
 #[cfg(test)]
 mod tests;
 
+pub use decode::{decode, decode_mask, decode_normals};
 pub use decoded::{Decoded, Encoding, Format};
 pub use error::ImageError;
 pub use hash::content_hash;
 pub use plane::Plane;
-pub use source::{Limits, Source, decode, decode_mask, decode_normals};
+pub use source::{Limits, Source};
 
 /// A colour image: `height x width x 3`, row-major, top left first, linear Rec. 709.
 #[derive(Debug, Clone, PartialEq)]
@@ -77,7 +81,7 @@ impl Image {
         &self.pixels
     }
 
-    /// All pixels, to write to.
+    /// All pixels, mutable.
     #[must_use]
     pub fn pixels_mut(&mut self) -> &mut [[f32; 3]] {
         &mut self.pixels
@@ -86,7 +90,7 @@ impl Image {
     /// The pixel in column `column` of row `row`.
     ///
     /// # Panics
-    /// If outside the image.
+    /// If the pixel is outside the image.
     #[must_use]
     pub fn pixel(&self, column: usize, row: usize) -> [f32; 3] {
         assert!(column < self.width, "column {column} of an image {} wide", self.width);

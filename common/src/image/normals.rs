@@ -1,4 +1,4 @@
-//! Normal maps: world-space unit normals (right-handed, +Y up), exactly zero on the background.
+//! Normal maps: world-space unit normals (right-handed, +Y up), exactly 0 on the background.
 
 use super::decoded::Format;
 use super::error::ImageError;
@@ -30,6 +30,6 @@ pub(super) fn decode(source: &Source<'_>) -> Result<Plane<Vec3>, ImageError> {
     Ok(Plane::from_values(image.width(), image.height(), normals?))
 }
 
-/// How far a normal's length may be from 1. Half floats err by 0.0005, 8-bit normals that were unpacked by 0.007; a normal
-/// that was interpolated or filtered over an edge, or is still packed into [0, 1], errs by more.
+/// The largest accepted difference of a normal's length from 1. The error is 0.0005 for half floats and 0.007 for
+/// unpacked 8-bit normals. It is larger for normals that were filtered across an edge or are still packed into [0, 1].
 pub(super) const LENGTH_TOLERANCE: f64 = 1e-2;

@@ -1,8 +1,8 @@
 //! Portable float maps (Debevec 2001; Netpbm's `pfm(5)`): `PF` (colour) or `Pf` (grey), width and height, then a scale
 //! whose sign gives the byte order (negative: little-endian), then raw 32-bit floats, bottom row first.
 //!
-//! The scale's magnitude is the unit of the samples; they are multiplied by it, with a warning where it is not 1, as some
-//! writers put a number there that means nothing.
+//! The samples are multiplied by the magnitude of the scale, their unit. A magnitude other than 1 is a warning, because
+//! some writers store an unrelated number.
 
 use super::Image;
 use super::decoded::{Decoded, Encoding, Format};
@@ -10,7 +10,7 @@ use super::error::ImageError;
 use super::source::Source;
 use crate::math::to_f32;
 
-/// Decodes a portable float map. Linear Rec. 709 is assumed, as the format cannot say.
+/// Decodes a portable float map. Linear Rec. 709 is assumed, because the format does not state a colour space.
 pub(super) fn decode(source: &Source<'_>) -> Result<Decoded, ImageError> {
     let header = Header::read(source)?;
     let mut warnings = Vec::new();
@@ -37,7 +37,8 @@ pub(super) fn decode(source: &Source<'_>) -> Result<Decoded, ImageError> {
     })
 }
 
-/// The bytes of a colour map of `image`: little-endian, scale 1. NaN and infinities are kept; there is no room for metadata.
+/// The bytes of a colour map of `image`: little-endian, scale 1. NaN and infinities are kept. The format has no
+/// metadata.
 ///
 /// # Errors
 /// If the image is empty.
@@ -83,7 +84,8 @@ impl<'a> Header<'a> {
                 fault(format!("expected a scale such as -1.0, found `{}`", scale_word.escape_debug()))
             })?;
         let expected = width * height * channels * 4;
-        // One white-space character ends the header; a writer in text mode makes it two.
+        // One white-space character ends the header. Some writers in text mode write two, a carriage return and a line
+        // feed.
         let raster = match rest {
             [b'\n', tail @ ..] if scale_ended_with_return(source.bytes, rest) && tail.len() >= expected => tail,
             _ => rest,
@@ -104,7 +106,7 @@ impl<'a> Header<'a> {
     }
 }
 
-/// The next word of the header and what follows the one white-space character after it.
+/// The next word of the header, and the bytes after the one white-space character that ends it.
 fn next_word(bytes: &[u8]) -> Option<(&str, &[u8])> {
     let start = bytes.iter().take(MAX_WORD).position(|byte| !byte.is_ascii_whitespace())?;
     let length = bytes[start..].iter().take(MAX_WORD).position(u8::is_ascii_whitespace)?;
@@ -118,5 +120,5 @@ fn scale_ended_with_return(bytes: &[u8], rest: &[u8]) -> bool {
 
 const FORMAT: Format = Format::Pfm;
 
-/// Longer than any number in a header.
+/// A limit above the length of any number in a header.
 const MAX_WORD: usize = 64;

@@ -1,4 +1,4 @@
-//! One value per pixel.
+//! A grid with one value per pixel.
 
 /// `height x width` values, row-major, top left first: coverage ([`super::decode_mask`]) or normals
 /// ([`super::decode_normals`]).
@@ -38,7 +38,7 @@ impl<T> Plane<T> {
         &self.values
     }
 
-    /// The values, without the plane.
+    /// All values, by value.
     #[must_use]
     pub fn into_values(self) -> Vec<T> {
         self.values
@@ -49,7 +49,7 @@ impl<T: Copy> Plane<T> {
     /// The value in column `column` of row `row`.
     ///
     /// # Panics
-    /// If outside the plane.
+    /// If the pixel is outside the plane.
     #[must_use]
     pub fn value(&self, column: usize, row: usize) -> T {
         assert!(column < self.width, "column {column} of a plane {} wide", self.width);

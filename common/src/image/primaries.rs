@@ -1,6 +1,6 @@
-//! Colours of other primaries brought to Rec. 709: RGB to CIE XYZ by the file's chromaticities, chromatic adaptation of
-//! the white point by Bradford's matrix, XYZ to Rec. 709 (Lindbloom, *RGB/XYZ Matrices* and *Chromatic Adaptation*;
-//! ICC.1:2022 annex E). White stays white: (1, 1, 1) of the file becomes (1, 1, 1).
+//! Conversion of colours to Rec. 709: RGB to CIE XYZ by the file's chromaticities, chromatic adaptation of the white
+//! point by Bradford's matrix, XYZ to Rec. 709 (Lindbloom, *RGB/XYZ Matrices* and *Chromatic Adaptation*; ICC.1:2022
+//! annex E). The file's white, (1, 1, 1), becomes (1, 1, 1).
 
 use crate::math::{Mat3, Vec3, narrow, widen};
 
@@ -23,10 +23,10 @@ impl Primaries {
         Self { red: [v[0], v[1]], green: [v[2], v[3]], blue: [v[4], v[5]], white: [v[6], v[7]] }
     }
 
-    /// The matrix that brings linear colours of these primaries to Rec. 709. `Ok(None)` where they are Rec. 709.
+    /// The matrix from linear colours of these primaries to Rec. 709; `Ok(None)` if they are those of Rec. 709.
     ///
     /// # Errors
-    /// If the chromaticities span no triangle or the white lies on a line of it.
+    /// If the chromaticities span no triangle, or the white lies on an edge of the triangle.
     pub(super) fn to_rec709(self) -> Result<Option<Mat3>, NotPrimaries> {
         if self.is_rec709() {
             return Ok(None);
@@ -41,9 +41,9 @@ impl Primaries {
 
     fn is_rec709(self) -> bool {
         let corners = |p: Self| [p.red, p.green, p.blue, p.white];
-        let far = |(a, b): (f64, f64)| (a - b).abs() > TOLERANCE;
+        let differ = |(a, b): (f64, f64)| (a - b).abs() > TOLERANCE;
         let (ours, rec709) = (corners(self), corners(Self::REC_709));
-        !ours.into_iter().flatten().zip(rec709.into_iter().flatten()).any(far)
+        !ours.into_iter().flatten().zip(rec709.into_iter().flatten()).any(differ)
             && ours.into_iter().flatten().all(f64::is_finite)
     }
 
@@ -57,7 +57,7 @@ impl Primaries {
     }
 }
 
-/// Chromaticities that are no primaries.
+/// The chromaticities are not those of primaries.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct NotPrimaries;
 
@@ -73,14 +73,14 @@ fn xyz([x, y]: [f64; 2]) -> Vec3 {
     Vec3::new(x / y, 1.0, (1.0 - x - y) / y)
 }
 
-/// Bradford's cone responses; columns of the matrix in Lindbloom's rows.
+/// Bradford's cone response matrix (Lindbloom), by columns.
 const BRADFORD: Mat3 = Mat3::from_cols(
     Vec3::new(0.8951, -0.7502, 0.0389),
     Vec3::new(0.2664, 1.7135, -0.0685),
     Vec3::new(-0.1614, 0.0367, 1.0296),
 );
 
-/// Chromaticities are written with three or four digits; sRGB's white is 0.3127 or 0.31271, 0.3290 or 0.32902.
+/// Files have chromaticities of three or four digits; sRGB's white is 0.3127 or 0.31271, 0.3290 or 0.32902.
 const TOLERANCE: f64 = 1e-3;
 
 #[cfg(test)]

@@ -1,14 +1,15 @@
 //! Radiance pictures (RGBE): Ward, *Real Pixels*, Graphics Gems II (1991), and Radiance's *File Formats*, section
 //! "Picture File Format (.hdr)".
 //!
-//! - A component is `mantissa * 2^(exponent - 136)`, exponent 0 is black. Radiance's own tools add half a mantissa step,
-//!   as they truncate when writing; nearly all other readers (Debevec's, HDR Shop, OpenCV, `image`) do not, and the
-//!   published maxima of the usual probes are without it. Nor does this reader: at most 0.4 % of the brightest component.
-//! - `EXPOSURE` and `COLORCORR` say by what the pixels have been multiplied; several multiply up. Radiance is recovered
-//!   by dividing, which is done here.
-//! - `PRIMARIES` other than Rec. 709 are converted; all zero (Photoshop) means unknown and is taken as Rec. 709, and so is
-//!   a file without them (Radiance's documented default is near Rec. 709 but for an equal-energy white).
-//! - All eight orientations of the resolution line are turned upright.
+//! - A component is `mantissa * 2^(exponent - 136)`; exponent 0 is black. Radiance's own tools add half a mantissa
+//!   step, because they truncate when writing. Nearly all other readers (Debevec's, HDR Shop, OpenCV, `image`) do not,
+//!   and the published maxima of the usual probes are without it. This reader does not add it either; the difference is
+//!   at most 0.4 % of the brightest component.
+//! - `EXPOSURE` and `COLORCORR` are factors by which the pixels were multiplied. Several are multiplied together. This
+//!   reader divides by them.
+//! - `PRIMARIES` other than Rec. 709 are converted. All zero (Photoshop) means unknown. Unknown and missing primaries
+//!   are taken as Rec. 709 (Radiance's documented default is close to Rec. 709, except for an equal-energy white).
+//! - All eight orientations of the resolution line are converted to upright.
 
 use super::Image;
 use super::decoded::{Decoded, Encoding, Format};
@@ -48,7 +49,7 @@ pub(super) fn decode(source: &Source<'_>) -> Result<Decoded, ImageError> {
     })
 }
 
-/// What the header says about the values.
+/// The header's information on the values.
 #[derive(Debug)]
 struct Header {
     divisor: [f64; 3],
@@ -66,7 +67,7 @@ impl Header {
             if line.is_empty() {
                 return Ok(header);
             }
-            // Comments and the commands that made the picture have no `=`, or one inside a command.
+            // Not an assignment: a comment, or a command that made the picture, which may contain `=`.
             if let Some((key, value)) = line.split_once('=').filter(|_| !line.starts_with(['#', ' ', '\t'])) {
                 header.apply(key.trim(), value.trim(), reader.source)?;
             }
@@ -98,7 +99,7 @@ impl Header {
             _ => {}
         }
         if !self.divisor.iter().all(|&d| d.is_normal()) {
-            return Err(source.malformed(FORMAT, format!("{key}={value} takes the exposure out of range")));
+            return Err(source.malformed(FORMAT, format!("{key}={value} makes the exposure too large or too small")));
         }
         self.metadata.push((key.to_owned(), value.to_owned()));
         Ok(())
@@ -114,7 +115,7 @@ impl Header {
         }
         self.to_rec709 = Primaries::from_array(numbers)
             .to_rec709()
-            .map_err(|_| source.malformed(FORMAT, format!("PRIMARIES={value} are no colour primaries")))?;
+            .map_err(|_| source.malformed(FORMAT, format!("PRIMARIES={value} are not colour primaries")))?;
         if self.to_rec709.is_some() {
             self.warnings.push(format!("colours converted from the file's primaries ({value}) to Rec. 709"));
         }
@@ -129,16 +130,17 @@ struct Layout {
     height: usize,
     line_count: usize,
     line_length: usize,
-    /// Scan lines are columns of the image.
-    transposed: bool,
-    /// Stored from right to left.
+    /// Whether scan lines are columns of the image.
+    is_transposed: bool,
+    /// Whether rows are stored from right to left.
     flip_x: bool,
-    /// Stored from bottom to top.
+    /// Whether columns are stored from bottom to top.
     flip_y: bool,
 }
 
 impl Layout {
-    /// Parses `-Y 1024 +X 768`: the first axis counts scan lines, the second the pixels of each; `-Y` is top to bottom.
+    /// Parses a line such as `-Y 1024 +X 768`. The first axis is that of scan lines, the second that of the pixels in
+    /// each; `-Y` is top to bottom.
     fn read(reader: &mut Reader<'_>) -> Result<Self, ImageError> {
         let line = reader.text_line()?;
         let fault = || {
@@ -149,27 +151,27 @@ impl Layout {
         let &[first, lines, second, length] = words.as_slice() else { return Err(fault()) };
         let count = |word: &str| word.parse::<u64>().map_err(|_| fault());
         let (lines, length) = (count(lines)?, count(length)?);
-        let (transposed, y, x) = match (first, second) {
+        let (is_transposed, y, x) = match (first, second) {
             ("+Y" | "-Y", "+X" | "-X") => (false, first, second),
             ("+X" | "-X", "+Y" | "-Y") => (true, second, first),
             _ => return Err(fault()),
         };
-        let (width, height) = if transposed { (lines, length) } else { (length, lines) };
+        let (width, height) = if is_transposed { (lines, length) } else { (length, lines) };
         let (width, height) = reader.source.check_size(width, height, FORMAT)?;
-        let (line_count, line_length) = if transposed { (width, height) } else { (height, width) };
-        Ok(Self { width, height, line_count, line_length, transposed, flip_x: x == "-X", flip_y: y == "+Y" })
+        let (line_count, line_length) = if is_transposed { (width, height) } else { (height, width) };
+        Ok(Self { width, height, line_count, line_length, is_transposed, flip_x: x == "-X", flip_y: y == "+Y" })
     }
 
-    /// Where the pixel at `position` of scan line `line` goes.
+    /// The index in the image of the pixel at `position` of scan line `line`.
     fn target(&self, line: usize, position: usize) -> usize {
-        let (x, y) = if self.transposed { (line, position) } else { (position, line) };
+        let (x, y) = if self.is_transposed { (line, position) } else { (position, line) };
         let column = if self.flip_x { self.width - 1 - x } else { x };
         let row = if self.flip_y { self.height - 1 - y } else { y };
         row * self.width + column
     }
 }
 
-/// The bytes that are still to be read.
+/// The bytes that are not yet read.
 #[derive(Debug)]
 struct Reader<'a> {
     source: &'a Source<'a>,
@@ -196,7 +198,7 @@ impl Reader<'_> {
         Ok(*head)
     }
 
-    /// One scan line of `[red, green, blue, exponent]`, in either run-length encoding or none.
+    /// Reads one scan line of `[red, green, blue, exponent]`, in one of the two run-length encodings or without.
     fn read_line(&mut self, line: &mut Vec<[u8; 4]>, layout: &Layout, index: usize) -> Result<(), ImageError> {
         line.clear();
         let first = self.take::<4>(layout, index)?;
@@ -242,7 +244,8 @@ impl Reader<'_> {
         Ok(())
     }
 
-    /// Flat pixels; `[1, 1, 1, n]` repeats the last one n times, a further one 256 n times, and so on.
+    /// Reads plain pixels. `[1, 1, 1, n]` repeats the previous pixel n times; directly after another one, 256 n times,
+    /// and so on.
     fn read_old_line(
         &mut self,
         first: [u8; 4],
@@ -279,7 +282,7 @@ impl Reader<'_> {
     }
 }
 
-/// The weight of a mantissa step, exact; 0 for exponent 0.
+/// The value of one mantissa step, exact; 0 for exponent 0.
 fn power_of_two(exponent: u64) -> f64 {
     if exponent == 0 { 0.0 } else { f64::from_bits((exponent + 1023 - 136) << 52) }
 }
@@ -302,5 +305,5 @@ fn number(word: &str) -> Option<f64> {
 
 const FORMAT: Format = Format::RadianceHdr;
 
-/// Longer header lines than any command that made a picture.
+/// A limit above the length of any command that made a picture.
 const MAX_HEADER_LINE: usize = 1 << 16;

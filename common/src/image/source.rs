@@ -1,45 +1,9 @@
-//! The bytes of one file on their way to pixels: entry points, limits, and the errors every reader raises.
+//! The bytes of one file, its size limits, and the errors common to all readers.
 
-use super::decoded::{Decoded, Format};
+use super::decoded::Format;
 use super::error::ImageError;
-use super::{Plane, jpeg, mask, normals, openexr, pfm, png, rgbe};
-use crate::math::Vec3;
 
-/// Decodes a colour image of any format that is read. `name` only appears in errors; the format is told by content.
-///
-/// - OpenEXR: the first part with `R G B` (the unnamed layer before named ones), else `Y` as grey; placed in the display
-///   window, black where the data window leaves it, cropped where it exceeds it; `chromaticities` converted to Rec. 709.
-/// - Radiance HDR: divided by `EXPOSURE` and `COLORCORR`, `PRIMARIES` converted to Rec. 709.
-/// - PFM: multiplied by the magnitude of the scale.
-/// - PNG, JPEG: decoded from sRGB, whatever the file says of its colours (a contradiction is a warning); Exif orientation
-///   is applied.
-///
-/// # Errors
-/// If the file is of no known format, broken, unsupported, without colours, or larger than [`Limits::default`].
-pub fn decode(name: &str, bytes: &[u8]) -> Result<Decoded, ImageError> {
-    Source::new(name, bytes).decode()
-}
-
-/// Decodes a coverage mask, linear in [0, 1] (no sRGB decoding), from any format that is read: the alpha channel where
-/// there is one that is not 1 everywhere, else the only channel, else equal red, green and blue.
-///
-/// # Errors
-/// As [`decode`], and if the colours differ or a value lies outside [0, 1].
-pub fn decode_mask(name: &str, bytes: &[u8]) -> Result<Plane<f32>, ImageError> {
-    Source::new(name, bytes).mask()
-}
-
-/// Decodes a normal map: world-space unit normals, exactly zero on the background. OpenEXR (channels `X Y Z` or
-/// `R G B`, also of a named layer) or PFM. Normals whose length is within 0.01 of 1 are
-/// renormalised.
-///
-/// # Errors
-/// As [`decode`], and with the pixel's coordinates if a normal is neither zero nor of unit length.
-pub fn decode_normals(name: &str, bytes: &[u8]) -> Result<Plane<Vec3>, ImageError> {
-    Source::new(name, bytes).normals()
-}
-
-/// The bytes of one file, its name for errors, and the limits it has to keep.
+/// The bytes of one file, its name for errors, and its size limits.
 #[derive(Debug, Clone, Copy)]
 pub struct Source<'a> {
     pub(super) name: &'a str,
@@ -47,7 +11,7 @@ pub struct Source<'a> {
     pub(super) limits: Limits,
 }
 
-/// Bounds that are checked before anything is allocated.
+/// Size limits, checked before allocation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Limits {
     /// Pixels per side.
@@ -64,46 +28,16 @@ impl Default for Limits {
 }
 
 impl<'a> Source<'a> {
-    /// The file `name` with content `bytes`, under the default limits.
+    /// The file `name` with content `bytes`, with the default limits.
     #[must_use]
     pub fn new(name: &'a str, bytes: &'a [u8]) -> Self {
         Self { name, bytes, limits: Limits::default() }
     }
 
-    /// The same under other limits.
+    /// The same source with other limits.
     #[must_use]
     pub fn with_limits(self, limits: Limits) -> Self {
         Self { limits, ..self }
-    }
-
-    /// See [`decode`].
-    ///
-    /// # Errors
-    /// See [`decode`].
-    pub fn decode(&self) -> Result<Decoded, ImageError> {
-        match self.format()? {
-            Format::OpenExr => openexr::decode(self),
-            Format::RadianceHdr => rgbe::decode(self),
-            Format::Pfm => pfm::decode(self),
-            Format::Png => png::decode(self),
-            Format::Jpeg => jpeg::decode(self),
-        }
-    }
-
-    /// See [`decode_mask`].
-    ///
-    /// # Errors
-    /// See [`decode_mask`].
-    pub fn mask(&self) -> Result<Plane<f32>, ImageError> {
-        mask::decode(self)
-    }
-
-    /// See [`decode_normals`].
-    ///
-    /// # Errors
-    /// See [`decode_normals`].
-    pub fn normals(&self) -> Result<Plane<Vec3>, ImageError> {
-        normals::decode(self)
     }
 
     /// The format by content.
@@ -112,7 +46,7 @@ impl<'a> Source<'a> {
             .ok_or_else(|| ImageError::UnknownFormat { name: self.name.to_owned(), found: describe(self.bytes) })
     }
 
-    /// Checks the size that a header claims and returns it.
+    /// Checks the size in a header and returns it.
     pub(super) fn check_size(&self, width: u64, height: u64, format: Format) -> Result<(usize, usize), ImageError> {
         if width == 0 || height == 0 {
             return Err(self.malformed(format, format!("expected at least one pixel, found {width} x {height}")));
@@ -127,12 +61,12 @@ impl<'a> Source<'a> {
         Ok((columns, rows))
     }
 
-    /// The file breaks the rules of `format`.
+    /// The error for a file that violates `format`.
     pub(super) fn malformed(&self, format: Format, detail: impl Into<String>) -> ImageError {
         ImageError::Malformed { name: self.name.to_owned(), format, detail: detail.into() }
     }
 
-    /// The file uses `feature`, which is not read.
+    /// The error for a file with a `feature` that is not supported.
     pub(super) fn unsupported(&self, format: Format, feature: impl Into<String>, advice: &str) -> ImageError {
         ImageError::Unsupported {
             name: self.name.to_owned(),
@@ -143,7 +77,7 @@ impl<'a> Source<'a> {
     }
 }
 
-/// What a file of an unknown format looks like.
+/// A description of a file of unknown format.
 fn describe(bytes: &[u8]) -> String {
     match bytes {
         [] => "an empty file".to_owned(),

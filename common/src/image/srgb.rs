@@ -14,7 +14,7 @@ pub fn from_linear(linear: f64) -> f64 {
     if linear <= 0.003_130_8 { linear * 12.92 } else { 1.055 * pow(linear, 1.0 / 2.4) - 0.055 }
 }
 
-/// The nearest 8-bit code of a linear value, after clamping to [0, 1]. NaN gives 0; writers refuse it before.
+/// The nearest 8-bit code of a linear value, after clamping to [0, 1]. NaN gives 0; writers reject it before.
 #[must_use]
 #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to 0..=255 first")]
 pub fn to_code(linear: f64) -> u8 {
@@ -32,7 +32,7 @@ mod tests {
         }
         for code in 0..=65535u16 {
             let x = f64::from(code) / 65535.0;
-            // The standard's two branches miss each other by 3e-8 at the join; elsewhere only rounding is left.
+            // The standard's two branches differ by 3e-8 where they join; elsewhere the error is rounding.
             assert!((from_linear(to_linear(x)) - x).abs() < 1e-7, "{x}");
         }
     }

@@ -1,18 +1,17 @@
-//! The density that directions are drawn from: that of the bilinear map itself (design section 5).
+//! The density from which light directions are drawn. It follows the bilinear map (design section 5).
 //!
-//! A *cell* lies between four neighbouring texel centres. Over the unit square of (u, v) the density is bilinear in each
-//! cell, with the node value `max(r, g, b) sin(theta_i)` of each texel, so it follows the bilinear radiance: the ratio
-//! radiance / pdf is bounded over the sphere, even beside a one-texel sun (a piecewise-constant density is not: it
-//! makes fireflies). The half cells between the first or last row and its pole fall linearly to 0 at the pole, as
-//! sin(theta) does; their node is the larger of the two texels opposite each other, as the radiance there mixes both.
+//! A *cell* lies between four neighbouring texel centres. Over the unit square of (u, v) the density is bilinear in
+//! each cell; its value at a texel centre (a *node*) is `max(r, g, b) sin(theta_i)`. The ratio radiance / pdf is
+//! therefore bounded over the sphere, even beside a one-texel sun. (With a piecewise-constant density it is not, which
+//! makes fireflies.) In the half cells between a pole and the row next to it the density falls linearly to 0 at the
+//! pole, as sin(theta) does. Their node is the larger of two opposite texels, because the radiance there mixes both.
 //! Per solid angle, `pdf = density(u, v) / (2 pi^2 sin(theta))`, which stays finite at the poles.
 //!
-//! Drawing: the row of cells by the integrals of the rows, the cell by those of the cells, then the bilinear density
-//! inside the cell is inverted exactly: first down (the marginal is linear), then across (the conditional is linear).
-//! The map from the unit square is monotone in each coordinate inside a row, so low-discrepancy points stay well spread.
+//! A sample chooses the row of cells by the integrals of the rows, then the cell by the integrals of the cells. Inside
+//! the cell it inverts the bilinear density exactly: first down (the marginal is linear), then across (the conditional
+//! is linear). Inside a row the result is monotone in each coordinate, so low-discrepancy points stay well spread.
 //!
-//! There is no floor under the density: where the map is black nothing is drawn. A light the lobes see but the map does
-//! not have contributes nothing.
+//! The density has no lower bound: no direction is drawn where the map is black.
 
 use super::Environment;
 use super::environment::Place;
@@ -29,10 +28,10 @@ pub struct LightDistribution {
     row_sums: Vec<f64>,
     /// For each row of cells, the running sum of the integrals of its width cells.
     cell_sums: Vec<f64>,
-    /// For each row of cells, [`GUIDE_STEP`]-fold coarser than its cells: where the search for a cell may start.
+    /// For each row of cells, one entry per [`GUIDE_STEP`] cells: the index at which the search for a cell starts.
     guide: Vec<u32>,
     guide_length: usize,
-    /// Node value to density per solid angle times sin(theta).
+    /// Factor from a node value to the density per solid angle times sin(theta).
     scale: f64,
 }
 
@@ -41,7 +40,7 @@ pub struct LightDistribution {
 pub struct LightSample {
     /// Unit vector towards the light, world.
     pub direction: Vec3,
-    /// Radiance from there.
+    /// Radiance from this direction.
     pub radiance: Rgb,
     /// Density per steradian, positive and finite.
     pub pdf: f64,
@@ -70,13 +69,13 @@ impl LightDistribution {
         Self { environment, row_sums, cell_sums, guide, guide_length, scale }
     }
 
-    /// The map that directions are drawn for.
+    /// The map of this distribution.
     #[must_use]
     pub fn environment(&self) -> &Arc<Environment> {
         &self.environment
     }
 
-    /// The direction of a point of the unit square, with its radiance and density.
+    /// Maps a point of the unit square to a direction, with its radiance and density.
     #[must_use]
     pub fn sample(&self, u: [f64; 2]) -> LightSample {
         let (row, across_rows) = draw(&self.row_sums, 0, u[1]);
@@ -125,7 +124,7 @@ impl LightDistribution {
     }
 }
 
-/// The density over one cell, as four node values, or the half of it that exists beside a pole.
+/// The density over one cell as four node values. Beside a pole only half of the cell exists.
 #[derive(Debug, Clone, Copy)]
 struct Cell {
     node: usize,
@@ -138,7 +137,7 @@ struct Cell {
 impl Cell {
     /// The cell right of texel column `column` in row `row` of the height + 1 rows of cells.
     fn of(environment: &Environment, row: usize, column: usize) -> Self {
-        // Bordered column 0 is the wrapped one, so that texel `column` is bordered column `column + 1`.
+        // The border shifts columns by one: texel `column` is column `column + 1` of the bordered grid.
         let node = row * environment.stride() + column + 1;
         let density = |node: usize| f64::from(environment.nodes()[node][3]);
         let below = node + environment.stride();
@@ -158,7 +157,7 @@ impl Cell {
         })
     }
 
-    /// Integral over the cell in units of a whole cell's area.
+    /// Integral over the cell, in units of the area of a whole cell.
     fn integral(self) -> f64 {
         let [first, last] = self.ends();
         0.25 * (first + last) * (self.span[1] - self.span[0])
@@ -175,20 +174,22 @@ impl Cell {
     }
 }
 
-/// The point of \[0, 1\] below which lies the fraction `x` of a density that goes linearly from `a` to `b`.
+/// The point of \[0, 1\] that has the fraction `x` of the integral below it, for a density linear from `a` at 0 to `b`
+/// at 1.
 fn invert_linear(a: f64, b: f64, x: f64) -> f64 {
     let root = (a * a + x * (b * b - a * a)).max(0.0).sqrt();
     if a + root > 0.0 { (x * (a + b) / (a + root)).min(1.0) } else { x }
 }
 
-/// The first entry of the running sums above the fraction `u` of their total, and how far into it the fraction lies, in
-/// (0, 1): never an end, where the density of a cell may vanish. The search starts at entry `start`, which must not lie beyond the answer.
+/// The first entry of the running sums that exceeds the fraction `u` of their total, and the position of that fraction
+/// within the entry. The position is inside (0, 1), because at an end the density of a cell may be 0. The search starts
+/// at entry `start`, which must not lie after the result.
 fn draw(sums: &[f64], start: usize, u: f64) -> (usize, f64) {
     let total = sums[sums.len() - 1];
     let target = u * total;
     let mut index = start + gallop(&sums[start..], |&sum| sum <= target);
     if index == sums.len() {
-        // u * total rounded up to the total: the last entry that adds anything.
+        // u * total was rounded up to the total: take the last entry that is larger than the one before it.
         index = sums.partition_point(|&sum| sum < total);
     }
     let before = if index == 0 { 0.0 } else { sums[index - 1] };
@@ -197,7 +198,7 @@ fn draw(sums: &[f64], start: usize, u: f64) -> (usize, f64) {
     (index, fraction.clamp(EDGE, 1.0 - EDGE))
 }
 
-/// `partition_point` for an answer that is expected near the start.
+/// `partition_point` by galloping search, fast if the result is near the start.
 fn gallop(sums: &[f64], is_before: impl Fn(&f64) -> bool) -> usize {
     let (mut low, mut step) = (0, 1);
     while low + step <= sums.len() && is_before(&sums[low + step - 1]) {
@@ -226,12 +227,12 @@ fn guide_of(sums: &[f64], length: usize) -> Vec<u32> {
 /// Cells per entry of the guide table.
 const GUIDE_STEP: usize = 2;
 
-/// Look-ups of the density stay this far (in v) from the poles, where density and sin(theta) both vanish: 3e-8 radians,
-/// far below any texel, yet far enough that their ratio keeps eight digits.
+/// Look-ups of the density keep this distance (in v) from the poles, where density and sin(theta) are both 0. It is
+/// 3e-8 radians: far smaller than a texel, and large enough that the ratio of the two keeps eight digits.
 const POLE: f64 = 1e-8;
 const SIN_POLE: f64 = PI * POLE;
 
-/// Below the resolution of the 32-bit points that directions are drawn with.
+/// Distance from the ends of a cell, below the resolution of the 32-bit points that directions are drawn with.
 const EDGE: f64 = 1e-10;
 
 #[cfg(test)]

@@ -5,11 +5,11 @@
 //! v = theta/pi a direction is `d = (sin(theta) sin(2 pi u), cos(theta), -sin(theta) cos(2 pi u))`: the image centre is
 //! +Z, u = 1/4 is +X, the left and right edges are -Z.
 //!
-//! The texels are stored with a border of one (the wrapped columns, the rows beyond the poles), so that a look-up has no
-//! branches, and with a fourth channel, the node of the sampling density (see [`super::LightDistribution`]), so that
-//! radiance and density come from the same four loads.
+//! The texels are stored with a border of one texel (the wrapped columns, the rows beyond the poles), so that a look-up
+//! needs no branches. They have a fourth channel, the node of the sampling density (see [`super::LightDistribution`]),
+//! so that one look-up gives both radiance and density.
 //!
-//! A rotation is an offset in u, applied on the way in and out: nothing is resampled.
+//! A rotation is an offset in u that is added when directions are converted. The texels are not resampled.
 
 use super::LightError;
 use crate::image::Image;
@@ -33,7 +33,7 @@ pub struct Environment {
     nodes: Vec<[f32; 4]>,
 }
 
-/// Where a direction falls among the texel centres.
+/// The position of a direction among the texel centres.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Place {
     /// Index of the upper left node in the bordered grid.
@@ -49,7 +49,7 @@ impl Environment {
     ///
     /// # Errors
     /// [`LightError::Size`] for an empty image or an odd width, [`LightError::Texel`] for a texel that is negative or
-    /// not finite, [`LightError::Black`] when there is no light at all.
+    /// not finite, [`LightError::Black`] if every texel is 0.
     #[allow(clippy::needless_pass_by_value, reason = "the map replaces the image: callers should not keep both")]
     pub fn new(image: Image) -> Result<Self, LightError> {
         let (width, height) = (image.width(), image.height());
@@ -69,13 +69,13 @@ impl Environment {
         Ok(Self { width, height, rotation_deg: 0.0, rotation_turns: 0.0, stride, size, nodes })
     }
 
-    /// The same map turned about +Y by `degrees`, right-handed: positive is anticlockwise seen from above, and 90 brings
-    /// the light at +Z to +X. Turns add up; the texels stay as they are.
-    /// `degrees` must be finite: any other value gives a rotation of 0.
+    /// The same map rotated about +Y by `degrees`, right-handed: positive is anticlockwise seen from above, and 90
+    /// brings the light at +Z to +X. Successive rotations add up; the texels do not change. `degrees` must be finite:
+    /// any other value gives a rotation of 0.
     #[must_use]
     pub fn rotated(mut self, degrees: f64) -> Self {
         let sum = (self.rotation_deg + degrees).rem_euclid(360.0);
-        // A tiny negative angle rounds up to a whole turn; a NaN fails the comparison too.
+        // A small negative angle is rounded up to 360. A NaN fails the comparison too.
         self.rotation_deg = if sum < 360.0 { sum } else { 0.0 };
         self.rotation_turns = self.rotation_deg / 360.0;
         self
@@ -99,7 +99,7 @@ impl Environment {
         self.height
     }
 
-    /// The texel of row `i` and column `j` of the map as it was given (before rotation).
+    /// The texel of row `i` and column `j`, before rotation.
     ///
     /// # Panics
     /// If outside the map.
@@ -110,7 +110,7 @@ impl Environment {
         [r, g, b]
     }
 
-    /// The canonical lat-long image this map was made from (before rotation): what [`Environment::new`] was given.
+    /// The canonical lat-long image that [`Environment::new`] was given, before rotation.
     #[must_use]
     pub fn to_image(&self) -> Image {
         let texels = (0..self.height).flat_map(|i| (0..self.width).map(move |j| self.texel(i, j))).collect();
@@ -148,7 +148,8 @@ impl Environment {
         Rgb::new(r, g, b)
     }
 
-    /// Radiance at a point of the map, and how its sum over the channels changes there, per texel: with u, with v, and mixed.
+    /// Radiance at a point of the map, and the derivatives of its sum over the channels, per texel: along u, along v,
+    /// and the mixed second derivative.
     #[must_use]
     #[inline]
     pub fn radiance_and_slopes(&self, u: f64, v: f64) -> (Rgb, [f64; 3]) {
@@ -168,11 +169,11 @@ impl Environment {
         let height = self.height as f64;
         let (sin_theta, _) = sin_cos(PI * (i as f64 + 0.5) / height);
         let (sin_half, _) = sin_cos(0.5 * PI / height);
-        // cos(a) - cos(b) as a product, without cancellation.
+        // cos(a) - cos(b) written as a product, which avoids cancellation.
         TAU / self.width as f64 * 2.0 * sin_theta * sin_half
     }
 
-    /// Sum over all texels of radiance times solid angle (radiance x sr): the energy that resampling keeps.
+    /// Sum over all texels of radiance times solid angle (radiance x sr). Resampling keeps this energy.
     #[must_use]
     pub fn total(&self) -> Rgb {
         (0..self.height).fold(Rgb::ZERO, |total, i| {
@@ -187,7 +188,7 @@ impl Environment {
         self.total() / (4.0 * PI)
     }
 
-    /// The largest texel of each channel: no radiance of the map exceeds it.
+    /// The largest texel value of each channel, an upper bound of the radiance.
     #[must_use]
     pub fn max_radiance(&self) -> Rgb {
         self.nodes.iter().fold(Rgb::ZERO, |max, &[r, g, b, _]| max.max(widen([r, g, b])))
@@ -203,7 +204,7 @@ impl Environment {
         &self.nodes
     }
 
-    /// The map point of a direction whose sin(theta) is at hand.
+    /// The point of the map in a direction whose sin(theta) is already known.
     #[inline]
     pub(super) fn uv_at(&self, direction: Vec3, sin_theta: f64) -> [f64; 2] {
         let v = angle(sin_theta, direction.y) * (1.0 / PI);
@@ -212,7 +213,7 @@ impl Environment {
         [if u >= 1.0 { u - 1.0 } else { u }, v]
     }
 
-    /// The world direction of column position `u` at a given polar angle.
+    /// The world direction at `u` and a given polar angle.
     #[inline]
     pub(super) fn direction_at(&self, u: f64, sin_theta: f64, cos_theta: f64) -> Vec3 {
         let (s, c) = sin_cos(TAU * (u - self.rotation_turns));
@@ -227,7 +228,7 @@ impl Environment {
         Place { node: row * self.stride + column, s, t }
     }
 
-    /// The bilinear value there: red, green, blue, density node.
+    /// The bilinear value at a place: red, green, blue, density node.
     #[inline]
     pub(super) fn bilinear(&self, Place { node, s, t }: Place) -> [f64; 4] {
         let rows = &self.nodes[node..node + self.stride + 2];
@@ -245,9 +246,9 @@ impl Environment {
     }
 }
 
-/// Whole part and fraction of `x`, which is at least 0 and below 2^31 here (a NaN stays in the fraction).
+/// Whole part and fraction of `x`, which is at least 0 and below 2^31 here. A NaN gives 0 and a NaN fraction.
 #[inline]
-#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "the whole part is what is asked for")]
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "the whole part is wanted")]
 fn split(x: f64) -> (usize, f64) {
     let whole = x as i32;
     (whole as usize, x - f64::from(whole))
@@ -255,26 +256,27 @@ fn split(x: f64) -> (usize, f64) {
 
 /// The texels with their border and the nodes of the sampling density.
 ///
-/// The density node of a texel is its largest channel times sin(theta) of its centre; in the rows beside the poles the
-/// larger of the two opposite texels counts. Beyond a pole the node has the opposite sign, so that the interpolated
-/// density falls to 0 at the pole as sin(theta) does, and the density per solid angle stays finite there.
+/// The density node of a texel is its largest channel times sin(theta) of its centre. In the rows next to the poles it
+/// is the larger of the values of two opposite texels. Beyond a pole the node has the opposite sign: the interpolated
+/// density then falls to 0 at the pole as sin(theta) does, and the density per solid angle stays finite.
 fn bordered_nodes(image: &Image) -> Vec<[f32; 4]> {
     let (width, height) = (image.width(), image.height());
     let mut nodes = Vec::with_capacity((width + 2) * (height + 2));
     for bordered_row in 0..height + 2 {
-        let beyond_pole = bordered_row == 0 || bordered_row == height + 1;
+        let is_beyond_pole = bordered_row == 0 || bordered_row == height + 1;
         let i = bordered_row.clamp(1, height) - 1;
-        let shift = if beyond_pole { width / 2 } else { 0 };
+        let shift = if is_beyond_pole { width / 2 } else { 0 };
         let (sin_theta, _) = sin_cos(PI * (i as f64 + 0.5) / height as f64);
-        let beside_pole = i == 0 || i == height - 1;
+        let is_next_to_pole = i == 0 || i == height - 1;
         for bordered_column in 0..width + 2 {
             let j = (bordered_column + width - 1 + shift) % width;
             let [r, g, b] = image.pixel(j, i);
             let brightest = |[r, g, b]: [f32; 3]| f64::from(r.max(g).max(b));
             let here = brightest([r, g, b]);
-            let peak = if beside_pole { here.max(brightest(image.pixel((j + width / 2) % width, i))) } else { here };
+            let peak =
+                if is_next_to_pole { here.max(brightest(image.pixel((j + width / 2) % width, i))) } else { here };
             let density = to_f32(peak * sin_theta);
-            nodes.push([r, g, b, if beyond_pole { -density } else { density }]);
+            nodes.push([r, g, b, if is_beyond_pole { -density } else { density }]);
         }
     }
     nodes

@@ -1,13 +1,13 @@
-//! What can be wrong with an environment map.
+//! Errors of environment maps.
 
 /// A fault in an environment map or its description.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum LightError {
-    /// The map has no texels, or a number of columns that cannot continue across a pole.
+    /// The map has no texels or an odd number of columns.
     #[error(
-        "the environment map is {width} x {height}: expected at least 2 x 1 texels and an even width, so that the map \
-         can continue across its poles at half a turn; resample it"
+        "the environment map is {width} x {height}: expected at least 2 x 1 texels and an even width, because the map \
+         continues across its poles half a width away; resample it"
     )]
     Size {
         /// Columns found.
@@ -18,7 +18,7 @@ pub enum LightError {
     /// A texel is negative, infinite or not a number.
     #[error(
         "the environment map has the radiance ({}, {}, {}) at column {column}, row {row}: expected finite values of at \
-         least 0; repair the map, for example by replacing such texels with their neighbours' mean",
+         least 0; repair the map, for example replace such texels by the mean of their neighbours",
         found[0], found[1], found[2]
     )]
     Texel {
@@ -30,11 +30,11 @@ pub enum LightError {
         found: [f32; 3],
     },
     /// Every texel is black.
-    #[error("the environment map is black everywhere: expected some light; check that the right file was given")]
+    #[error("the environment map is black everywhere: expected some light; check that this is the right file")]
     Black,
-    /// The layout cannot be told from the shape of the image.
+    /// The shape of the image does not determine the layout.
     #[error(
-        "cannot tell the layout of the environment map from its size {width} x {height}: only 2:1 (latlong) and 3:4 \
+        "the size {width} x {height} of the environment map does not determine its layout: only 2:1 (latlong) and 3:4 \
          (cross) are recognised; give --env-mapping latlong, cross, angular or mirror-ball"
     )]
     UnknownLayout {
@@ -43,25 +43,25 @@ pub enum LightError {
         /// Rows found.
         height: usize,
     },
-    /// The image does not have the shape its layout asks for.
+    /// The image does not have the shape that its layout requires.
     #[error(
         "an environment map in the layout {mapping} must be {expected}, found {width} x {height}: crop or resample it, \
          or give another --env-mapping"
     )]
     Shape {
-        /// The layout asked for.
+        /// The layout.
         mapping: &'static str,
-        /// The shape it asks for.
+        /// The shape that the layout requires.
         expected: &'static str,
         /// Columns found.
         width: usize,
         /// Rows found.
         height: usize,
     },
-    /// The name of a layout is not known.
+    /// Not the name of a layout.
     #[error("unknown environment layout `{found}`: expected latlong, cross, angular or mirror-ball")]
     UnknownName {
-        /// What was given.
+        /// The name that was given.
         found: String,
     },
 }

@@ -1,14 +1,14 @@
-//! The layouts that environment maps come in, each as a function from directions to positions in the image and back
+//! The layouts of environment maps, each as a function from directions to positions in the image and its inverse
 //! (design section 3).
 //!
-//! | name | shape | where it looks |
+//! | name | shape | directions |
 //! |---|---|---|
-//! | `latlong` | 2:1 if not asked for by name | the canonical map, see [`super::Environment`] |
+//! | `latlong` | 2:1; any of even width if named | the canonical map, see [`super::Environment`] |
 //! | `cross` | 3:4, vertical | column 1: up, front, down, back (turned by 180 degrees); row 1: left, front, right; from inside, front is -Z, right +X, up +Y |
 //! | `angular` | square | Debevec: phi = pi r, `d = (sin(phi) x/r, sin(phi) y/r, -cos(phi))` |
 //! | `mirror-ball` | square | orthographic view of a ball: n = (x, y, sqrt(1 - r^2)), `d = 2 n_z n - (0,0,1)` |
 //!
-//! In the last two x points right and y up, both in \[-1, 1\], r = |(x, y)| <= 1.
+//! In `angular` and `mirror-ball`, x points right and y up, both in \[-1, 1\], with r = |(x, y)| <= 1.
 
 use super::LightError;
 use crate::math::arctangent::angle;
@@ -25,7 +25,7 @@ pub enum Mapping {
     Cross,
     /// Debevec's light probe: radius proportional to the angle from -Z.
     Angular,
-    /// A mirror ball as this camera sees it: its centre reflects +Z.
+    /// A mirror ball as the camera on +Z sees it: its centre reflects +Z.
     MirrorBall,
 }
 
@@ -44,10 +44,10 @@ impl Mapping {
         }
     }
 
-    /// The layout of an image by its shape alone: 2:1 is `latlong`, 3:4 is `cross`.
+    /// The layout of an image by its shape: 2:1 is `latlong`, 3:4 is `cross`.
     ///
     /// # Errors
-    /// [`LightError::UnknownLayout`] for any other shape: it would be a guess.
+    /// [`LightError::UnknownLayout`] for any other shape, because several layouts share it.
     pub fn recognise(width: usize, height: usize) -> Result<Self, LightError> {
         if height > 0 && width == 2 * height {
             Ok(Self::LatLong)
@@ -58,10 +58,10 @@ impl Mapping {
         }
     }
 
-    /// Checks that an image has a shape this layout can have.
+    /// Checks that an image of this size can have this layout.
     ///
     /// # Errors
-    /// [`LightError::Shape`], which says the shape expected.
+    /// [`LightError::Shape`] with the expected shape.
     pub fn check_shape(self, width: usize, height: usize) -> Result<(), LightError> {
         let (fits, expected) = match self {
             Self::LatLong => (width >= 2 && height >= 1 && width.is_multiple_of(2), "of even width"),
@@ -73,7 +73,8 @@ impl Mapping {
         if fits { Ok(()) } else { Err(LightError::Shape { mapping: self.name(), expected, width, height }) }
     }
 
-    /// Where a direction (unit) is seen in the image: x from 0 at the left edge to 1 at the right, y from 0 at the top.
+    /// The position of a direction (unit) in the image: x from 0 at the left edge to 1 at the right, y from 0 at the
+    /// top to 1 at the bottom.
     #[must_use]
     pub fn position(self, d: Vec3) -> [f64; 2] {
         match self {
@@ -87,13 +88,13 @@ impl Mapping {
                 let phi = angle(radius(d), -d.z);
                 from_disk(d, phi / PI)
             }
-            // phi is the angle from +Z; r = sin(phi / 2), whichever form does not cancel.
+            // phi is the angle from +Z; r = sin(phi / 2), in the form that avoids cancellation on this side.
             Self::MirrorBall if d.z > 0.0 => from_disk(d, radius(d) / (2.0 * (1.0 + d.z)).sqrt()),
             Self::MirrorBall => from_disk(d, (0.5 * (1.0 - d.z)).sqrt()),
         }
     }
 
-    /// The direction (unit) seen at a position of the image; none in the empty parts of a cross or outside a ball.
+    /// The direction (unit) at a position of the image; `None` in the empty parts of a cross and outside a ball.
     #[must_use]
     pub fn direction(self, [x, y]: [f64; 2]) -> Option<Vec3> {
         if !((0.0..=1.0).contains(&x) && (0.0..=1.0).contains(&y)) {
@@ -122,8 +123,8 @@ impl Mapping {
         }
     }
 
-    /// The most image lengths (the image's width is 1) that a radian covers around a direction, over all orientations:
-    /// how finely the layout resolves it.
+    /// The resolution of the layout at a direction: the image length per radian (the image's width is 1), in the
+    /// orientation where it is largest.
     #[must_use]
     pub(super) fn lengths_per_radian(self, d: Vec3) -> f64 {
         match self {
@@ -133,7 +134,7 @@ impl Mapping {
                 (1.0 + a * a + b * b) / 6.0
             }
             Self::Angular => 0.5 * (angle(radius(d), -d.z) / PI / radius(d).max(1e-9)).max(1.0 / PI),
-            // Around the ball: r / sin(phi) = 1 / (2 cos(phi / 2)), never less than the radial cos(phi / 2) / 2.
+            // Tangentially r / sin(phi) = 1 / (2 cos(phi / 2)), which is at least the radial cos(phi / 2) / 2.
             Self::MirrorBall => 0.25 / (0.5 * (1.0 + d.z)).sqrt().max(1e-9),
         }
     }
@@ -178,11 +179,11 @@ const FACES: [Face; 6] = [
     Face { place: [1.0, 1.0], towards: Vec3::NEG_Z, right: Vec3::X, down: Vec3::NEG_Y },
     Face { place: [2.0, 1.0], towards: Vec3::X, right: Vec3::Z, down: Vec3::NEG_Y },
     Face { place: [1.0, 2.0], towards: Vec3::NEG_Y, right: Vec3::X, down: Vec3::Z },
-    // Upright it would have right = -X and down = -Y; it is stored turned by 180 degrees.
+    // Stored rotated by 180 degrees: upright, right would be -X and down -Y.
     Face { place: [1.0, 3.0], towards: Vec3::Z, right: Vec3::X, down: Vec3::Y },
 ];
 
-/// The index of the face that a direction meets, and where: a to the right and b down, in \[-1, 1\].
+/// The index of the face in a direction, and the position on it: a to the right and b down, in \[-1, 1\].
 pub(super) fn face_position(d: Vec3) -> (usize, [f64; 2]) {
     let m = d.abs();
     let face = if m.y >= m.x && m.y >= m.z {
@@ -219,18 +220,18 @@ fn radius(d: Vec3) -> f64 {
     (d.x * d.x + d.y * d.y).sqrt()
 }
 
-/// The image position at distance `r` from the centre, in the direction that `d` has around Z (along x on the axis).
+/// The image position at distance `r` from the centre, at the azimuth of `d` around Z (along x if `d` is on the axis).
 fn from_disk(d: Vec3, r: f64) -> [f64; 2] {
     let length = radius(d);
     let (x, y) = if length > 0.0 { (d.x / length, d.y / length) } else { (1.0, 0.0) };
     [0.5 + 0.5 * r * x, 0.5 - 0.5 * r * y]
 }
 
-/// x right and y up in \[-1, 1\], and their radius, of an image position inside the disk.
+/// The coordinates x (right) and y (up) in \[-1, 1\], and the radius, of an image position; `None` outside the disk.
 fn on_disk(x: f64, y: f64) -> Option<[f64; 3]> {
     let (x, y) = (2.0 * x - 1.0, 1.0 - 2.0 * y);
     let r = (x * x + y * y).sqrt();
-    // The rim belongs to the disk, whatever rounding did to it.
+    // Tolerates rounding, so that the rim belongs to the disk.
     (r <= 1.0 + 1e-12).then_some([x, y, r.min(1.0)])
 }
 

@@ -1,8 +1,8 @@
-//! Natural light: the environment map, its layouts, and the density it is sampled with.
+//! Natural light: the environment map, its layouts, and the density from which directions are sampled.
 //!
-//! [`Environment`] is radiance as a function of direction (canonical lat-long, bilinear). [`Mapping`] names the layouts
-//! files come in and [`to_lat_long`] brings each of them to the canonical one, keeping its energy.
-//! [`LightDistribution`] draws directions with the density of the bilinear function itself.
+//! [`Environment`] is radiance as a function of direction (canonical lat-long, bilinear). [`Mapping`] lists the layouts
+//! of map files; [`to_lat_long`] converts each of them to the canonical layout and keeps the energy.
+//! [`LightDistribution`] draws directions with a density that follows the bilinear function.
 
 mod distribution;
 mod environment;

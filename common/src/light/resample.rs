@@ -1,12 +1,12 @@
-//! From any layout to the canonical lat-long map, keeping the energy.
+//! Conversion of any layout to the canonical lat-long map, with the energy kept.
 //!
-//! Each texel becomes the mean of the source over the texel's solid angle, by a midpoint rule with at least three points
-//! per source pixel in each direction, so that a light of one pixel is neither lost nor doubled. The source is bilinear
-//! between pixel centres; a cube face continues beyond its outermost centres with its own edge pixels and a ball with
-//! the pixels whose centres lie inside it, so that nothing of the image's empty parts leaks in.
+//! Each texel is the mean of the source over the texel's solid angle. The mean is a midpoint rule with at least three
+//! points per source pixel in each direction, so that a light of one pixel is neither lost nor doubled. The source is
+//! bilinear between pixel centres. Beyond its outermost centres, a cube face continues with its own edge pixels and a
+//! ball with pixels whose centres lie inside it, so that the empty parts of the image contribute nothing.
 //!
-//! The texel count follows the source's resolution where it is finest in angle: a cross with faces of F pixels gives
-//! 4F x 2F, an angular map of S pixels S x S/2, a mirror ball of S pixels 1.6 S x 0.8 S.
+//! The size of the result follows the source's finest angular resolution: a cross with faces of F pixels gives 4F x 2F,
+//! an angular map of S pixels S x S/2, a mirror ball of S pixels 1.6 S x 0.8 S.
 
 use super::mapping::{face_place, face_position};
 use super::{Environment, LightError, Mapping};
@@ -16,11 +16,11 @@ use crate::math::{Rgb, Vec3, cell, narrow, widen};
 use rayon::prelude::*;
 use std::f64::consts::{PI, TAU};
 
-/// The environment of an image in the layout `mapping`, not rotated. A lat-long image is taken as it is.
+/// The environment of an image in the layout `mapping`, not rotated. A lat-long image is not resampled.
 ///
 /// # Errors
 /// [`LightError::Shape`] if the image cannot have that layout, [`LightError::Texel`] (with the place in the *source*)
-/// for a pixel in use that is negative or not finite, [`LightError::Black`] when there is no light.
+/// for a pixel in use that is negative or not finite, [`LightError::Black`] if every texel is 0.
 pub fn to_lat_long(image: Image, mapping: Mapping) -> Result<Environment, LightError> {
     mapping.check_shape(image.width(), image.height())?;
     if mapping == Mapping::LatLong {
@@ -54,7 +54,7 @@ fn check_pixels(image: &Image, mapping: Mapping) -> Result<(), LightError> {
     Ok(())
 }
 
-/// Whether a pixel's centre is a direction.
+/// Whether the centre of a pixel has a direction.
 fn is_used(mapping: Mapping, width: usize, height: usize, column: usize, row: usize) -> bool {
     mapping.direction([(column as f64 + 0.5) / width as f64, (row as f64 + 0.5) / height as f64]).is_some()
 }
@@ -117,7 +117,7 @@ impl Source<'_> {
         upper * (1.0 - t) + lower * t
     }
 
-    /// Bilinear at (x, y) in pixels among the pixels whose centres lie in the disk.
+    /// Bilinear radiance at (x, y) in pixels, from the pixels whose centres lie in the disk.
     fn on_disk(&self, x: f64, y: f64) -> Rgb {
         let size = self.image.width();
         let along = |x: f64| (x - 0.5).clamp(0.0, (size - 1) as f64);
@@ -136,7 +136,7 @@ impl Source<'_> {
         if weight > 1e-6 {
             return sum / weight;
         }
-        // Outside the outermost centres: a pixel and a half nearer to the middle there is always one.
+        // No centre near (x, y) lies in the disk. One always does a pixel and a half closer to the middle.
         let half = 0.5 * size as f64;
         let (dx, dy) = (x - half, y - half);
         let shrink = 1.0 - 1.5 / (dx * dx + dy * dy).sqrt();
@@ -144,11 +144,11 @@ impl Source<'_> {
     }
 }
 
-/// Points of the midpoint rule per source pixel, where it is finest.
+/// Points of the midpoint rule per source pixel, at the finest resolution of the source.
 const POINTS_PER_PIXEL: f64 = 3.0;
-/// Points across a texel that is much smaller than a source pixel.
+/// The least number of points across a texel, for texels much smaller than a source pixel.
 const FEWEST_POINTS: usize = 3;
-/// Points across a texel in which a ball's whole rim meets.
+/// The largest number of points across a texel, for the texels that contain the whole rim of a ball.
 const MOST_POINTS: usize = 256;
 
 #[cfg(test)]

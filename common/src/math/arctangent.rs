@@ -1,9 +1,9 @@
 //! The angle of a point in the plane, fast and with the same bits on every platform.
 //!
-//! `libm::atan2` costs about as much as all the rest of a look-up in an environment map. Here both octants are folded
-//! with one division onto |t| <= tan(pi/8), where the odd polynomial below (near-minimax, from a Chebyshev fit of
-//! atan(sqrt z)/sqrt z in 50 digits) is within 5e-17 of the arctangent; only +, -, *, / are used, never a fused
-//! multiply-add.
+//! `libm::atan2` costs about as much as the rest of a look-up in an environment map. Here the angle is reduced, with one
+//! division, to the arctangent of |t| <= tan(pi/8). There the odd polynomial below is within 5e-17 of the arctangent (it
+//! is near-minimax, from a Chebyshev fit of atan(sqrt z)/sqrt z in 50 digits). Only +, -, *, / are used, without a fused
+//! multiply-add, so that every platform computes the same bits.
 
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI};
 
@@ -15,7 +15,7 @@ pub fn angle(y: f64, x: f64) -> f64 {
     let (ax, ay) = (x.abs(), y.abs());
     let (low, high) = if ay > ax { (ax, ay) } else { (ay, ax) };
     let folded = low > TAN_PI_8 * high;
-    // Written so that each choice is a mask, not a branch: half of all directions fold, unpredictably.
+    // Each choice compiles to a mask. A branch would be mispredicted often: about half of all directions fold.
     let numerator = low - if folded { high } else { 0.0 };
     let denominator = high + if folded { low } else { 0.0 };
     let t = numerator / denominator.max(f64::MIN_POSITIVE);

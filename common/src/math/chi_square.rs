@@ -15,8 +15,8 @@ pub(crate) struct ChiSquare {
     pub(crate) p_value: f64,
 }
 
-/// Compares counts with their expectations (of the same total). Bins that expect fewer than five are pooled in order;
-/// a count in bins that together expect nothing gives p = 0.
+/// Compares counts with their expectations (of the same total). Consecutive bins are pooled until they expect at least
+/// five. A count in bins whose pooled expectation is 0 gives p = 0.
 pub(crate) fn chi_square(observed: &[u64], expected: &[f64]) -> ChiSquare {
     assert_eq!(observed.len(), expected.len());
     let (mut statistic, mut bins) = (0.0, 0.0);
@@ -39,8 +39,8 @@ pub(crate) fn chi_square(observed: &[u64], expected: &[f64]) -> ChiSquare {
     ChiSquare { statistic, degrees_of_freedom, p_value }
 }
 
-/// How a sphere of directions is binned: `rows` in theta from +Y, `columns` around it, each bin integrated by a
-/// midpoint rule of `quadrature` x `quadrature` points.
+/// Bins on the sphere of directions: `rows` in theta from +Y, `columns` around +Y. The density of a bin is integrated by
+/// a midpoint rule of `quadrature` x `quadrature` points.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct SphereBins {
     pub(crate) rows: usize,

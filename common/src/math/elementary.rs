@@ -1,7 +1,7 @@
 //! Elementary functions from one portable implementation (`libm`), so that a result has the same bits on every
-//! platform. The methods of `f64` (`x.exp()`, `x.powf(y)`, `x.sin()`, `x.cbrt()`, `x.powi(n)`) go to the system's
-//! library and must not be used where a result depends on them. `sqrt`, `floor`, `abs` and `hypot` of a short vector
-//! through `sqrt` are exact or correctly rounded everywhere.
+//! platform. The methods of `f64` (`x.exp()`, `x.powf(y)`, `x.sin()`, `x.cbrt()`, `x.powi(n)`) call the system's
+//! library and must not be used where a result depends on them. `sqrt`, `floor` and `abs` are exact or correctly
+//! rounded on every platform and may be used.
 
 /// e^x.
 #[must_use]
@@ -58,7 +58,8 @@ pub fn fifth_power(x: f64) -> f64 {
     x2 * x2 * x
 }
 
-/// e^x for x <= 0, as straight-line code that a compiler can put into SIMD lanes; results below the smallest normal number are 0.
+/// e^x for x <= 0, in straight-line code that the compiler can vectorise. The result is 0 for x < -708, just above where
+/// e^x falls below the smallest normal number.
 ///
 /// Cody-Waite reduction `x = k ln 2 + r`, |r| <= ln(2)/2, and the Taylor polynomial of degree 13 (truncation below 1e-17);
 /// within 2 ulp of [`exp`].
@@ -95,15 +96,17 @@ pub fn exp_nonpositive(x: f64) -> f64 {
     if x < -708.0 { 0.0 } else { p * power }
 }
 
-/// The natural logarithm of a positive normal number, as straight-line code that a compiler can put into SIMD lanes or out of a loop.
+/// The natural logarithm of a positive normal number, in straight-line code that the compiler can vectorise or move out of
+/// a loop.
 ///
-/// fdlibm's: `x = 2^k m` with `m` in [sqrt(1/2), sqrt(2)), `s = (m - 1)/(m + 1)`, an odd polynomial in `s`; within 2 ulp of [`ln`].
+/// The method of fdlibm: `x = 2^k m` with `m` in [sqrt(1/2), sqrt(2)), `s = (m - 1)/(m + 1)`, an odd polynomial in `s`; within 2 ulp of [`ln`].
 #[must_use]
 #[inline(always)]
 pub fn ln_positive(x: f64) -> f64 {
     const LN2_HIGH: f64 = 6.931_471_803_691_238e-1;
     const LN2_LOW: f64 = 1.908_214_929_270_587_7e-10;
-    // Bits of 2^52, to make a float of a small integer; and those of 1 less those of sqrt(1/2), where `m` begins.
+    // MAGIC is the bits of 2^52: with a small integer in its low bits it is 2^52 plus that integer. OFFSET is the bits
+    // of 1 minus those of sqrt(1/2), the lower end of the range of `m`.
     const MAGIC: u64 = 0x4330_0000_0000_0000;
     const OFFSET: u64 = 0x0009_5f62_0000_0000;
     let bits = x.to_bits().wrapping_add(OFFSET);

@@ -1,7 +1,7 @@
 //! An orthonormal frame around a normal.
 //!
-//! Source: Duff et al., *Building an Orthonormal Basis, Revisited* (JCGT 6(1), 2017), whose only discontinuity is at
-//! the equator z = 0 of the branch on the sign of z.
+//! Source: Duff et al., *Building an Orthonormal Basis, Revisited* (JCGT 6(1), 2017). The frame is continuous except
+//! across z = 0, where the formula branches on the sign of z.
 
 use super::Vec3;
 

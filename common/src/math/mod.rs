@@ -45,7 +45,7 @@ pub fn to_f32(x: f64) -> f32 {
     x as f32
 }
 
-/// The cell of `count` equal cells that `x` falls into: `floor(x)` clamped to `0..count`. NaN gives 0.
+/// The index of the cell that `x` lies in, of `count` cells of width 1: `floor(x)` clamped to `0..count`. NaN gives 0.
 #[must_use]
 #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturating, then clamped")]
 pub fn cell(x: f64, count: usize) -> usize {

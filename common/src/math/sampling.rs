@@ -15,7 +15,7 @@ pub struct PointStream {
 }
 
 impl PointStream {
-    /// The stream named by a key: equal keys give equal points, different keys independent randomisations.
+    /// The stream of a key. Equal keys give equal points; different keys give independent randomisations.
     #[must_use]
     pub fn new(key: u64) -> Self {
         let mut state = key;
@@ -159,7 +159,7 @@ mod tests {
         }
         mean /= n as f64;
         square /= n as f64;
-        // Standard errors 9e-4 and 9e-4; five of them.
+        // Both standard errors are 9e-4; the bound is five of them.
         assert!((mean - 0.5).abs() < 5e-3 && (square - 1.0 / 3.0).abs() < 5e-3);
     }
 }

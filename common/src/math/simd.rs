@@ -1,20 +1,20 @@
 //! Run-time choice of vector instructions, and the switch that limits it.
 //!
-//! A loop given to `dispatch` is compiled once per instruction set, and the widest one that the processor has is chosen when it
-//! runs. Only the width of the vectors changes: the loops use plain IEEE operations in a fixed order, without contraction, so that
-//! the results have the same bits at every level (design section 9). The switch exists to show that: a test runs one fit at
-//! both levels.
+//! `dispatch` compiles a loop once per instruction set and runs the version of the widest one that the processor supports.
+//! The results have the same bits at every level (design section 9), because the loops use plain IEEE operations in a fixed
+//! order, without contraction; only the width of the vectors differs. A test uses the switch to check this: it runs one fit
+//! at both levels.
 
 use pulp::{Arch, NullaryFnOnce};
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Which instructions `dispatch` uses.
+/// The instructions that `dispatch` uses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Level {
-    /// The widest that this processor has.
+    /// The widest that this processor supports.
     #[default]
     Detected,
-    /// Those that every processor of the target has.
+    /// Only those that every processor of the compilation target supports.
     Baseline,
 }
 
@@ -25,20 +25,20 @@ pub fn limit(level: Level) {
     BASELINE.store(level == Level::Baseline, Ordering::Relaxed);
 }
 
-/// The level in force.
+/// The current level.
 #[must_use]
 pub fn level() -> Level {
     if BASELINE.load(Ordering::Relaxed) { Level::Baseline } else { Level::Detected }
 }
 
-/// Whether this processor has more than the baseline, so that the two levels differ.
+/// Whether this processor supports more than the baseline. If not, the two levels are the same.
 #[must_use]
 pub fn has_levels() -> bool {
     format!("{:?}", Arch::new()) != format!("{:?}", Arch::Scalar)
 }
 
-/// Runs a loop at the level in force. The loop and what it calls should be `#[inline(always)]`: code that is not inlined is
-/// compiled for the baseline.
+/// Runs a loop at the current level. The loop and the functions it calls should be `#[inline(always)]`: code that is not
+/// inlined is compiled for the baseline.
 #[inline(always)]
 pub(crate) fn dispatch<Op: NullaryFnOnce>(op: Op) -> Op::Output {
     match level() {

@@ -63,7 +63,7 @@ mod tests {
 
     /// Integrates the density over the sphere of directions by a midpoint rule in (cos, phi).
     #[test]
-    fn ggx_reflection_density_integrates_to_at_most_one() {
+    fn ggx_reflection_density_integrates_to_one_over_the_sphere() {
         for (alpha, cos_o) in [(0.2, 0.9), (0.5, 0.6), (1.0, 0.95), (0.3, 0.2)] {
             let wo = Vec3::new((1.0_f64 - cos_o * cos_o).sqrt(), 0.0, cos_o);
             let (n, m) = (2000, 2000);
@@ -78,7 +78,7 @@ mod tests {
                 }
             }
             let total = sum * 4.0 * PI / f64::from(n * m);
-            // All half vectors in the upper hemisphere reflect to somewhere on the whole sphere.
+            // Over the whole sphere: a half vector of the upper hemisphere may reflect the direction below the horizon.
             assert!((total - 1.0).abs() < 2e-3, "alpha {alpha} cos {cos_o}: {total}");
         }
     }

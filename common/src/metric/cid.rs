@@ -1,8 +1,9 @@
 //! CID on two displayed images, with the variants of the authors' program (`CID_advanced.m`).
 //!
-//! The default equals [`super::Judge`] with full coverage. Variants: no spatial filter or iCAM's, another viewing distance,
-//! the sixth feature c_C (chroma contrast), and 3 or 5 scales: contrast and structure are taken at every scale with the
-//! exponents of MS-SSIM, lightness only at the coarsest, chroma and hue only at the finest.
+//! The default equals [`super::Judge`] with full coverage. Variants: no spatial filter or iCAM's, another viewing
+//! distance, the sixth feature c_C (chroma contrast), and 3 or 5 scales. With several scales, contrast and structure
+//! are computed at every scale with the exponents of MS-SSIM, lightness only at the coarsest, chroma and hue only at
+//! the finest.
 
 use super::colour::{A, B, LIGHTNESS};
 use super::cssim::{SIGMA, check_size};
@@ -31,13 +32,13 @@ pub enum Scales {
 /// Settings of [`cid`]. The default is the authors'.
 #[derive(Debug, Clone)]
 pub struct CidOptions {
-    /// What models the viewer's acuity. Default S-CIELAB.
+    /// The spatial filter, a model of the viewer's acuity. Default S-CIELAB.
     pub filter: SpatialFilter,
     /// Viewing distance: half the pixels per degree of visual angle, in [1, 500]. Default 20.
     pub cycles_per_degree: f64,
     /// Default one.
     pub scales: Scales,
-    /// Whether the sixth feature, chroma contrast, takes part. Default no.
+    /// Whether to include the sixth feature, chroma contrast. Default no.
     pub chroma_contrast: bool,
     /// The working space. Default `fit00`.
     pub space: Lab2000hl,
@@ -99,8 +100,8 @@ impl Scales {
 
 const EXPONENTS: [f64; 5] = [0.0448, 0.2856, 0.3001, 0.2363, 0.1333];
 
-/// A product of real powers of real numbers. A negative mean to a broken power is complex; the score is 1 minus the real
-/// part, as in the authors' program.
+/// A product of real powers of real numbers. A fractional power of a negative mean is complex; the score is 1 minus the
+/// real part of the product, as in the authors' program.
 struct Power {
     magnitude: f64,
     /// Argument of the product divided by pi.
@@ -122,7 +123,7 @@ impl Power {
     }
 }
 
-/// Fails unless both images have one size and the coarsest of `scales` scales has windows. `needed` is the window's side.
+/// Fails unless both images have the same size and the coarsest of `scales` scales holds a window of side `needed`.
 pub(super) fn check_pair(
     reference: &DisplayImage,
     image: &DisplayImage,
@@ -148,7 +149,7 @@ pub(super) fn working(pipeline: &Pipeline, displayed: &DisplayImage) -> Planes<4
     })
 }
 
-/// Means over all windows of l_L, c_L, s_L, l_C, l_H and c_C (1 if not asked for).
+/// Means over all windows of l_L, c_L, s_L, l_C, l_H and c_C (1 if it is not included).
 pub(super) fn means(statistics: &Statistics, reference: &Planes<4>, image: &Planes<4>) -> [f64; FEATURES + 1] {
     let reference = statistics.prepare(reference.clone());
     let (columns, stride) = (reference.moments.width(), reference.moments.stride());
@@ -166,7 +167,7 @@ pub(super) fn means(statistics: &Statistics, reference: &Planes<4>, image: &Plan
     std::array::from_fn(|feature| 1.0 - rows.iter().map(|row| row[feature]).sum::<f64>() / windows)
 }
 
-/// Half the size of an image in the working space: low-pass of the biorthogonal 9/7 wavelet with half-sample
+/// Halves the size of an image in the working space: low-pass of the biorthogonal 9/7 wavelet with half-sample
 /// reflection, then every second pixel.
 fn halve(planes: &Planes<4>) -> Planes<4> {
     let (width, height) = (planes.width(), planes.height());
@@ -193,7 +194,7 @@ fn halve(planes: &Planes<4>) -> Planes<4> {
     half
 }
 
-/// The weighted sum of nine values around number 4.
+/// The weighted sum of nine values, symmetric around value 4.
 fn low_pass(taps: &[f64; 5], value: impl Fn(usize) -> f64) -> f64 {
     (1..5).fold(taps[0] * value(4), |sum, k| sum + taps[k] * (value(4 - k) + value(4 + k)))
 }

@@ -1,8 +1,8 @@
 //! From linear Rec. 709 to the working space: XYZ, CIELAB, LAB2000HL.
 //!
-//! The constants are those of the authors' program (Getreuer's `colorspace.m` as shipped with CID): XYZ to RGB is the
-//! rounded sRGB matrix and RGB to XYZ its numerical inverse, not the standard's forward matrix (they differ by 1e-4); the
-//! white is D65 for 2 degrees, (0.950456, 1, 1.088754).
+//! The constants are those of the authors' program (Getreuer's `colorspace.m` as shipped with CID). XYZ to RGB is the
+//! rounded sRGB matrix. RGB to XYZ is its numerical inverse, which differs from the standard's forward matrix by 1e-4.
+//! The white is D65 for 2 degrees, (0.950456, 1, 1.088754).
 
 use std::sync::LazyLock;
 
@@ -26,12 +26,12 @@ pub(super) const CHROMA: usize = 3;
 /// Linear Rec. 709 to XYZ.
 pub(super) static RGB_TO_XYZ: LazyLock<Matrix> = LazyLock::new(|| inverse(&XYZ_TO_RGB));
 
-/// XYZ relative to the white: divides by it.
+/// Divides XYZ by the white.
 pub(super) const WHITEN: Matrix = [[1.0 / 0.950_456, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0 / 1.088_754]];
 
 const XYZ_TO_RGB: Matrix = [[3.2406, -1.5372, -0.4986], [-0.9689, 1.8758, 0.0415], [0.0557, -0.2040, 1.0570]];
 
-/// CIELAB's f is a straight line below this.
+/// CIELAB's f is linear below this value.
 const LAB_THRESHOLD: f64 = 0.008_856;
 
 /// CIELAB of a linear Rec. 709 colour whose white is (1, 1, 1).
@@ -41,7 +41,7 @@ pub(super) fn lab_from_linear(rgb: [f64; 3]) -> [f64; 3] {
     lab(x, y, z)
 }
 
-/// Linear Rec. 709 of a CIELAB colour; outside the gamut it is below 0 or above 1.
+/// Linear Rec. 709 of a CIELAB colour. Components are below 0 or above 1 outside the gamut.
 #[must_use]
 pub fn linear_from_lab([l, a, b]: [f64; 3]) -> [f64; 3] {
     let fy = (l + 16.0) / 116.0;
@@ -86,7 +86,7 @@ fn lab(x: f64, y: f64, z: f64) -> [f64; 3] {
     [116.0 * fy - 16.0, 500.0 * (fx - fy), 200.0 * (fy - fz)]
 }
 
-/// CIELAB's f: a cube root with a straight line below the threshold, also for the negative values a filter can make.
+/// CIELAB's f: a cube root, linear below the threshold. Values may be negative after a filter.
 #[inline(always)]
 fn compress(t: f64) -> f64 {
     let root = cbrt(t.max(LAB_THRESHOLD));
@@ -104,7 +104,7 @@ pub(super) fn apply(m: &Matrix, v: [f64; 3]) -> [f64; 3] {
     ]
 }
 
-/// The matrix that applies `b` first.
+/// The matrix product a b, which applies `b` first.
 pub(super) fn product(a: &Matrix, b: &Matrix) -> Matrix {
     std::array::from_fn(|i| std::array::from_fn(|j| a[i][0] * b[0][j] + a[i][1] * b[1][j] + a[i][2] * b[2][j]))
 }
@@ -121,7 +121,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_inverse_matrix_undoes_its_matrix() {
+    fn a_matrix_times_its_inverse_is_the_identity() {
         let identity = product(&inverse(&XYZ_TO_RGB), &XYZ_TO_RGB);
         for (i, row) in identity.iter().enumerate() {
             for (j, x) in row.iter().enumerate() {

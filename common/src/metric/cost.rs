@@ -2,8 +2,9 @@
 //!
 //! `C(A, B, gamma) = sum_p w_p sum_rgb (A[p]^(1/gamma) - B[p]^(1/gamma))^2`
 //!
-//! without clamping. A power below 1 has an infinite slope at zero, so below a small e the power continues as its
-//! tangent line: once continuously differentiable, finite gradient, negative values keep their order. The same for A and B.
+//! without clamping. A power below 1 has an infinite slope at zero, so the tangent line at a small e replaces it below
+//! e. The function is then continuously differentiable with a finite gradient, and negative values keep their order. A
+//! and B are treated the same.
 
 use crate::math::elementary::{ln, pow};
 
@@ -11,20 +12,20 @@ use crate::math::elementary::{ln, pow};
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Compression {
     exponent: f64,
-    /// Below this the tangent line takes over; 0 for the paper's `max(x, 0)`.
+    /// The tangent line is used below this; 0 for the paper's `max(x, 0)`.
     knee: f64,
     value_at_knee: f64,
     slope_at_knee: f64,
-    /// Radiance above this counts as this.
+    /// Radiance is clamped to at most this.
     ceiling: f64,
-    /// The logarithm's scale, where it takes the place of the power.
+    /// The scale of the logarithm, if it replaces the power.
     logarithm: Option<f64>,
 }
 
-/// The scale of [`Compression::logarithm`], as a share of the photo's mean radiance.
+/// The scale of [`Compression::logarithm`], as a fraction of the photo's mean radiance.
 pub const LOGARITHM_SCALE: f64 = 0.01;
 
-/// Where the tangent line takes over, as a share of the photo's mean radiance (design section 1).
+/// The radiance below which the tangent line is used, as a fraction of the photo's mean radiance (design section 1).
 pub const KNEE: f64 = 1e-6;
 
 impl Compression {
@@ -61,8 +62,9 @@ impl Compression {
         Self { ceiling: white, ..Self::clamped(gamma) }
     }
 
-    /// `ln(1 + max(x, 0) / e)`, e being [`LOGARITHM_SCALE`] times the photo's mean radiance: the rival from the fitting of measured
-    /// BRDFs (Loew et al., *BRDF Models for Accurate and Efficient Rendering of Glossy Surfaces*, ACM TOG 31(1), 2012).
+    /// `ln(1 + max(x, 0) / e)`, where e is [`LOGARITHM_SCALE`] times the photo's mean radiance: an alternative from the
+    /// fitting of measured BRDFs (Loew et al., *BRDF Models for Accurate and Efficient Rendering of Glossy Surfaces*,
+    /// ACM TOG 31(1), 2012).
     ///
     /// # Panics
     /// Unless the mean radiance is positive.
@@ -80,7 +82,7 @@ impl Compression {
     /// The compressed value.
     #[must_use]
     pub fn apply(&self, x: f64) -> f64 {
-        // What is no number stays none.
+        // Written so that NaN stays NaN.
         let x = if x > self.ceiling { self.ceiling } else { x };
         if let Some(scale) = self.logarithm {
             ln(1.0 + x.max(0.0) / scale)
@@ -108,7 +110,8 @@ impl Compression {
     }
 }
 
-/// The weighted sum of squared differences over all pixels and channels, in pixel order. `reference` holds compressed values.
+/// The weighted sum of squared differences over all pixels and channels, in pixel order. `reference` holds compressed
+/// values.
 #[must_use]
 pub fn cost(compression: &Compression, weights: &[f64], reference: &[Vec<f64>; 3], radiance: &[Vec<f64>; 3]) -> f64 {
     let mut sum = 0.0;

@@ -1,15 +1,15 @@
 //! CSSIM: the colour-image-difference measure CID of Lissner, Preiss, Urban, Scheller Lichtenauer & Zolliker,
 //! *Image-Difference Prediction: From Grayscale to Color* (IEEE TIP 22(2), 2013), with the authors' defaults.
 //!
-//! Both images are multiplied by the coverage, exposed and clipped to the display; filtered by S-CIELAB at 20 cycles per
-//! degree; taken to LAB2000HL; compared in 11 x 11 Gaussian windows by five features (lightness, contrast, structure, chroma,
-//! hue); each feature's map is averaged and
+//! Both images are multiplied by the coverage, exposed and clipped to the display range. They are filtered by S-CIELAB
+//! at 20 cycles per degree, converted to LAB2000HL, and compared in 11 x 11 Gaussian windows by five features:
+//! lightness, contrast, structure, chroma and hue. Each feature is averaged over all windows, and
 //!
 //! CSSIM = 1 - mean(l_L) mean(c_L) mean(s_L) mean(l_C) mean(l_H): 0 for identical images, above 1 for inverted ones.
 //!
-//! [`Judge`] scores many images against one reference. Encoding to sRGB and decoding again would cancel and is left out
-//! (scores agree with [`super::cid`] to 1e-12). Sums run in a fixed order: the bits depend neither on the number of threads
-//! nor on the vector instructions, nor on how much black surrounds the object.
+//! [`Judge`] scores many images against one reference. It omits encoding to sRGB and decoding, which cancel (scores
+//! agree with [`super::cid`] to 1e-12). Sums run in a fixed order: the bits do not depend on the number of threads, the
+//! vector instructions or the size of the black border around the object.
 
 use super::dispatch::Lanes;
 use super::display::{check_coverage, check_covered_finite, check_exposure, expose};
@@ -29,7 +29,7 @@ pub struct JudgeOptions {
     pub cycles_per_degree: f64,
     /// The working space. Default `fit00`.
     pub space: Lab2000hl,
-    /// Vector instructions; they do not change the result.
+    /// The vector instructions to use. They do not change the result.
     pub lanes: Lanes,
 }
 
@@ -39,10 +39,10 @@ impl Default for JudgeOptions {
     }
 }
 
-/// How far an image is from the reference.
+/// The difference of an image from the reference.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Score {
-    /// CSSIM over all windows of the image: the paper's. 0 for identical images; larger is worse.
+    /// CSSIM over all windows of the image, as in the paper. 0 for identical images; larger is worse.
     pub cssim: f64,
     /// CSSIM over the windows whose centre pixel has a coverage above 0.
     pub cssim_object: f64,
@@ -70,13 +70,14 @@ pub struct Judge {
 impl Judge {
     /// Prepares a reference.
     ///
-    /// `reference`: linear Rec. 709. `coverage`: one value in [0, 1] per pixel, row-major; both images are multiplied by it
-    /// and pixels of coverage 0 are not looked at. `exposure`: factor of the display transform, the same for both images.
+    /// `reference`: linear Rec. 709. `coverage`: one value in [0, 1] per pixel, row-major; both images are multiplied
+    /// by it, and values of pixels with coverage 0 are ignored. `exposure`: factor of the display transform, the same
+    /// for both images.
     ///
     /// # Errors
     /// [`MetricError::TooSmall`] below 11 x 11 pixels; [`MetricError::Length`], [`MetricError::Coverage`],
-    /// [`MetricError::NotFinite`] and [`MetricError::Exposure`] for bad values; [`MetricError::NoObject`] if no window is
-    /// centred on a covered pixel; [`MetricError::CyclesPerDegree`].
+    /// [`MetricError::NotFinite`] and [`MetricError::Exposure`] for bad values; [`MetricError::NoObject`] if no window
+    /// is centred on a covered pixel; [`MetricError::CyclesPerDegree`].
     pub fn new(
         reference: &Image,
         coverage: &[f32],
@@ -86,7 +87,7 @@ impl Judge {
         Self::over(reference, coverage, exposure, options, Region::around)
     }
 
-    /// As [`Judge::new`], over the region that `region` names from (coverage, width, height, reach of the filter).
+    /// As [`Judge::new`], over the region that `region` returns for (coverage, width, height, reach of the filter).
     fn over(
         reference: &Image,
         coverage: &[f32],
@@ -114,7 +115,7 @@ impl Judge {
         Ok(Self { region, coverage, gain, object, object_windows, pipeline, statistics, reference })
     }
 
-    /// Scores an image, which is not yet multiplied by the coverage.
+    /// Scores an image that is not multiplied by the coverage.
     ///
     /// # Errors
     /// [`MetricError::SizeMismatch`]; [`MetricError::NotFinite`] if a covered pixel is NaN or infinite.
@@ -198,7 +199,7 @@ impl Judge {
     }
 }
 
-/// Standard deviation of CID's window in pixels.
+/// Standard deviation of CID's window, in pixels.
 pub(super) const SIGMA: f64 = 1.5;
 
 pub(super) fn check_size(width: usize, height: usize) -> Result<(), MetricError> {

@@ -1,20 +1,20 @@
 //! Run-time choice of vector instructions for the row loops.
 //!
-//! A loop body given to [`Lanes::run`] is compiled once per instruction set and the widest one the processor has is
-//! chosen when it runs. Only the width changes: every lane does the same IEEE operations in the same order, products are
-//! never contracted into fused multiply-adds, and no sum is reassociated, so the bits are those of the plain loop
-//! (a test compares whole scores). Bodies are marked `#[inline(always)]`, as are the functions they call: code that is
-//! not inlined would be compiled for the baseline processor.
+//! [`Lanes::run`] compiles a loop body once per instruction set and runs the version of the widest one that the
+//! processor supports. The bits are those of the plain loop (a test compares whole scores): every lane does the same
+//! IEEE operations in the same order, products are not contracted into fused multiply-adds, and sums are not
+//! reassociated. Bodies and the functions they call are marked `#[inline(always)]`, because code that is not inlined is
+//! compiled for the baseline processor.
 
 use crate::math::simd;
 
-/// Which instructions the row loops use. The results are bit-identical.
+/// The instructions that the row loops use. The results are bit-identical.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Lanes {
-    /// The widest this processor has, as far as [`simd::limit`] lets it.
+    /// The widest that this processor supports, unless [`simd::limit`] is set to the baseline.
     #[default]
     Detected,
-    /// Those every processor of the target has; for tests and comparisons.
+    /// Only those that every processor of the compilation target supports; for tests and comparisons.
     Plain,
 }
 

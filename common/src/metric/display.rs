@@ -1,7 +1,8 @@
-//! The display transform: what an HDR image looks like on an sRGB display.
+//! The display transform, from an HDR image to an image on an sRGB display.
 //!
-//! displayed = encode(clip(exposure x coverage x radiance, 0, 1)), encode the sRGB transfer function of IEC 61966-2-1. The
-//! coverage comes first: a pixel half covered by the object holds half its radiance over a black background.
+//! displayed = encode(clip(exposure x coverage x radiance, 0, 1)), where encode is the sRGB transfer function of IEC
+//! 61966-2-1. The coverage is applied before encoding, because a pixel that the object covers by half shows half the
+//! object's radiance over a black background.
 
 use super::MetricError;
 use crate::image::Image;
@@ -17,7 +18,7 @@ pub struct DisplayImage {
 }
 
 impl DisplayImage {
-    /// An image from encoded values, nominally in [0, 1] (the metric clips nothing).
+    /// An image from encoded values, nominally in [0, 1] (the metric does not clip them).
     ///
     /// # Errors
     /// [`MetricError::Length`] if `pixels.len() != width * height`; [`MetricError::NotFinite`].
@@ -30,8 +31,8 @@ impl DisplayImage {
         Ok(Self { width, height, pixels })
     }
 
-    /// What a linear Rec. 709 image looks like: the display transform at `exposure`, after multiplying by `coverage`
-    /// (one value in [0, 1] per pixel). Pixels of coverage 0 are black, whatever they hold.
+    /// The display transform of a linear Rec. 709 image at `exposure`, after multiplication by `coverage` (one value in
+    /// [0, 1] per pixel). Pixels of coverage 0 become black, whatever their value.
     ///
     /// # Errors
     /// [`MetricError::Exposure`], [`MetricError::Length`], [`MetricError::Coverage`], [`MetricError::NotFinite`].
@@ -48,7 +49,7 @@ impl DisplayImage {
         Ok(Self { width, height, pixels })
     }
 
-    /// Another image with the given pixels, which are known to be finite and of the right number.
+    /// An image of another size. `pixels` must be finite and have one entry per pixel.
     pub(super) fn resized(&self, width: usize, height: usize, pixels: Vec<[f64; 3]>) -> Self {
         debug_assert_eq!(pixels.len(), width * height);
         Self { width, height, pixels }
@@ -75,8 +76,8 @@ impl DisplayImage {
 
 /// The exposure that brings the 97th percentile of the object's largest channel to 0.9 (linear, before encoding).
 ///
-/// The percentile is the nearest rank: of the n pixels with coverage 1, sorted by the larger of red, green and blue, number
-/// `ceil(0.97 n)` counted from 1.
+/// The percentile is by nearest rank: the n pixels of coverage 1 are sorted by the largest of red, green and blue, and
+/// number `ceil(0.97 n)`, counted from 1, is taken.
 ///
 /// # Errors
 /// [`MetricError::Length`], [`MetricError::Coverage`]; [`MetricError::NotFinite`] in a covered pixel;
@@ -96,28 +97,29 @@ pub fn auto_exposure(photo: &Image, coverage: &[f32]) -> Result<f64, MetricError
     }
 }
 
-/// Share of the object's pixels that automatic exposure keeps at or below [`AUTO_TARGET`].
+/// Fraction of the object's pixels that automatic exposure keeps at or below [`AUTO_TARGET`].
 const AUTO_PERCENTILE: f64 = 0.97;
-/// Linear display value to which automatic exposure brings the percentile.
+/// Linear display value of the percentile after automatic exposure.
 const AUTO_TARGET: f64 = 0.9;
 
-/// sRGB value in [0, 1] of a linear one in [0, 1].
+/// sRGB value in [0, 1] of a linear value in [0, 1].
 #[must_use]
 pub fn encode_srgb(linear: f64) -> f64 {
     if linear <= ENCODE_THRESHOLD { 12.92 * linear.max(0.0) } else { 1.055 * pow(linear, 1.0 / 2.4) - 0.055 }
 }
 
-/// Linear value of an sRGB one; negative values continue the straight part.
+/// Linear value of an sRGB value. The linear part continues below 0.
 #[must_use]
 pub fn decode_srgb(encoded: f64) -> f64 {
     if encoded <= DECODE_THRESHOLD { encoded / 12.92 } else { pow((encoded + 0.055) / 1.055, 2.4) }
 }
 
-/// Where the authors' program begins the curve (`colorspace.m`): 0.0404482... encoded, not the standard's 0.04045.
+/// The end of the linear part in the authors' program (`colorspace.m`): 0.0404482... encoded, where the standard has
+/// 0.04045.
 const DECODE_THRESHOLD: f64 = 0.040_448_236_277_107_6;
 const ENCODE_THRESHOLD: f64 = 0.003_130_668_442_500_588_3;
 
-/// A linear display value: exposed and clipped. A gain of 0 gives 0 whatever the radiance.
+/// A linear display value: exposed and clipped. A gain of 0 gives 0, also for NaN.
 #[inline(always)]
 pub(super) fn expose(radiance: f64, gain: f64) -> f64 {
     let exposed = if gain > 0.0 { radiance * gain } else { 0.0 };
@@ -160,7 +162,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn encoding_and_decoding_undo_each_other() {
+    fn encoding_and_decoding_are_inverse() {
         for i in 0..=1000 {
             let linear = f64::from(i) / 1000.0;
             assert!((decode_srgb(encode_srgb(linear)) - linear).abs() < 1e-15, "{linear}");
@@ -170,8 +172,8 @@ mod tests {
     }
 
     #[test]
-    fn auto_exposure_takes_the_nearest_rank_of_the_largest_channel_over_the_object() {
-        // 100 object pixels hold 1..=100 in alternating channels: rank 97 is 97. A half-covered pixel does not count.
+    fn auto_exposure_uses_the_nearest_rank_of_the_largest_channel_over_the_object() {
+        // 100 object pixels hold 1..=100 in alternating channels: rank 97 is 97. A partly covered pixel is not counted.
         let mut pixels = vec![[1e6, 0.0, 0.0]; 102];
         for (i, pixel) in pixels.iter_mut().take(100).enumerate() {
             *pixel = [0.5; 3];
@@ -184,7 +186,7 @@ mod tests {
     }
 
     #[test]
-    fn auto_exposure_of_nothing_is_an_error() {
+    fn auto_exposure_without_light_is_an_error() {
         let black = Image::new(3, 2);
         let none = auto_exposure(&black, &[0.5; 6]).unwrap_err();
         assert_eq!(none, MetricError::NoAutoExposure { pixels: 0, percentile: 0.0 });
@@ -200,7 +202,7 @@ mod tests {
     }
 
     #[test]
-    fn bad_pixels_are_named_by_their_coordinates() {
+    fn invalid_pixels_are_reported_with_their_coordinates() {
         let mut image = Image::new(3, 2);
         image.pixels_mut()[5][1] = f32::INFINITY;
         let message = DisplayImage::from_linear(&image, &[1.0; 6], 1.0).unwrap_err().to_string();

@@ -1,10 +1,10 @@
-//! What can be wrong with the inputs of the metric.
+//! Errors in the inputs of the metric.
 
-/// Why two images could not be compared.
+/// The reason why two images cannot be compared.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum MetricError {
-    /// An axis is shorter than the window, at the coarsest scale asked for.
+    /// An axis is shorter than the window, at the coarsest scale.
     #[error(
         "an image of {width} x {height} pixels is too small: the metric's windows need at least {needed} x {needed}; \
          use a larger image or fewer scales"
@@ -19,7 +19,7 @@ pub enum MetricError {
     },
     /// The two images have different sizes.
     #[error(
-        "images to compare must have one size: expected {} x {} pixels, found {} x {}; resample one of them",
+        "images to compare must have the same size: expected {} x {} pixels, found {} x {}; resample one of them",
         expected.0, expected.1, found.0, found.1
     )]
     SizeMismatch {
@@ -29,17 +29,19 @@ pub enum MetricError {
         found: (usize, usize),
     },
     /// The coverage, or a pixel buffer, does not have one value per pixel.
-    #[error("the {what} must have one value per pixel: expected {expected}, found {found}")]
+    #[error(
+        "the {what} must have one value per pixel: expected {expected} values, found {found}; use one of the same image"
+    )]
     Length {
-        /// Which buffer.
+        /// The buffer.
         what: &'static str,
         /// Pixels of the image.
         expected: usize,
         /// Values found.
         found: usize,
     },
-    /// A coverage value outside [0, 1], or not a number.
-    #[error("coverage must lie in [0, 1]: found {value} at column {column}, row {row}")]
+    /// A coverage value outside [0, 1], or NaN.
+    #[error("coverage must lie in [0, 1]: found {value} at column {column}, row {row}; rescale the mask")]
     Coverage {
         /// Column of the pixel, from the left.
         column: usize,
@@ -54,7 +56,7 @@ pub enum MetricError {
          exclude the pixel with a mask or repair it"
     )]
     NotFinite {
-        /// Which image.
+        /// The image.
         what: &'static str,
         /// Column of the pixel, from the left.
         column: usize,
@@ -66,26 +68,26 @@ pub enum MetricError {
         value: f64,
     },
     /// The display exposure is not a positive finite number.
-    #[error("the display exposure must be a positive finite factor, found {0}")]
+    #[error("the display exposure must be finite and above 0, found {0}; give a positive number")]
     Exposure(f64),
-    /// No pixel from which an automatic exposure could be taken.
+    /// No automatic exposure: no pixel is fully covered, or the percentile is not positive.
     #[error(
-        "no automatic display exposure: of {pixels} pixels of full coverage the 97th percentile is {percentile}, \
+        "cannot choose a display exposure: the 97th percentile of {pixels} pixels of full coverage is {percentile}, \
          expected a positive radiance; check the mask or give the exposure as a number"
     )]
     NoAutoExposure {
         /// Pixels whose coverage is 1.
         pixels: usize,
-        /// The percentile found; 0 without pixels.
+        /// The percentile found; 0 if there are no pixels.
         percentile: f64,
     },
     /// No window has its centre on the object.
     #[error(
-        "the coverage leaves no window on the object: expected a covered pixel at least 5 pixels from the image's \
-         border; check the mask"
+        "the metric has no window on the object: expected a covered pixel at least 5 pixels from the image's border; \
+         check the mask"
     )]
     NoObject,
-    /// The viewing condition is outside what the spatial filters are defined for.
+    /// A viewing distance for which the spatial filters are not defined.
     #[error("cycles per degree must lie in [{}, {}], found {found}", range.0, range.1)]
     CyclesPerDegree {
         /// Smallest and largest accepted.

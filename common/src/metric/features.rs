@@ -1,13 +1,13 @@
-//! The image-difference features of CID, as deficits: 1 minus the feature, 0 where two windows look alike.
+//! The image-difference features of CID, as deficits: 1 minus the feature, 0 for two equal windows.
 //!
 //! With dL, dC, dH the differences of window means, s1, s2 the standard deviations and s12 the covariance of lightness:
 //! l_L = 1/(1 + .002 dL^2); c_L = (.1 + 2 s1 s2)/(.1 + s1^2 + s2^2); s_L = (.1 + s12)/(.1 + s1 s2), signed;
 //! l_C = 1/(1 + .002 dC^2); l_H = 1/(1 + .008 dH^2); and, optionally, c_C as c_L with the chroma's deviations.
 //! Source: Lissner et al. 2013; the constants are those of the authors' program (`CID.m`).
 //!
-//! Deficits instead of features keep small differences exact, make identical images score exactly 0, and let windows
-//! without any difference drop out of a sum without changing its bits. By Cauchy and Schwarz |s12| <= s1 s2; enforcing it
-//! removes rounding errors and nothing else.
+//! Deficits, other than features, keep small differences exact, give identical images a score of exactly 0, and allow
+//! windows without a difference to be left out of a sum without changing its bits. By Cauchy and Schwarz |s12| <= s1
+//! s2; enforcing it removes only rounding errors.
 
 use super::planes::LANES;
 use super::window::{MEAN_CHROMA, MEAN_LIGHTNESS, RowStatistics, VARIANCE_CHROMA, VARIANCE_LIGHTNESS};
@@ -79,8 +79,7 @@ pub(super) fn structure_deficit(k: f64, covariance: f64, product: f64) -> f64 {
 
 /// Sum of a row in a fixed order: one partial sum per lane, then the lanes from left to right.
 ///
-/// Windows of error 0 before, between or after the others change nothing, as long as the row begins at a multiple of the
-/// lanes.
+/// Leaving out windows of error 0 at either end does not change the bits, if the row begins at a multiple of the lanes.
 #[inline(always)]
 pub(super) fn row_sum(row: &[f64]) -> f64 {
     let mut sums = [0.0; LANES];

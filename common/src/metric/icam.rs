@@ -1,10 +1,12 @@
-//! iCAM's spatial filter: contrast sensitivity of luminance, red-green and blue-yellow, by Fourier transform in YCC-RIT.
+//! iCAM's spatial filter: contrast sensitivity of luminance, red-green and blue-yellow, by Fourier transform in
+//! YCC-RIT.
 //!
-//! Source: Preiss, Fernandes & Urban 2014 and the authors' `FilterImageCSF.m` (Johnson & Fairchild's contrast sensitivity
-//! functions). The image is mirrored on all sides to three times its size; along each axis the frequency bin `floor(n/2)`
-//! has the given cycles per degree; luminance loses its mean before and gets it back after.
+//! Source: Preiss, Fernandes & Urban 2014 and the authors' `FilterImageCSF.m` (Johnson & Fairchild's contrast
+//! sensitivity functions). The image is mirrored on all sides to three times its size. Along each axis the frequency
+//! bin `floor(n/2)` has the given cycles per degree. The mean of luminance is subtracted before the filter and added
+//! after it.
 //!
-//! The transform is `rustfft` without its SIMD kernels, so that the processor does not change the rounding.
+//! The transform is `rustfft` without its SIMD kernels, so that the rounding does not depend on the processor.
 
 use rayon::prelude::*;
 use rustfft::num_complex::Complex;
@@ -41,7 +43,7 @@ pub(super) fn filter(planes: &mut Planes<3>, cycles_per_degree: f64) {
     );
 }
 
-/// Filters one channel by a gain that depends on the radial frequency, 1 at the last bin of an axis.
+/// Filters one channel by a gain of the radial frequency, which is 1 at bin `floor(n/2)` of an axis.
 fn filter_channel(values: &[f64], mean: f64, width: usize, gain: impl Fn(f64) -> f64 + Sync) -> Vec<f64> {
     let height = values.len() / width;
     let (columns, rows) = (3 * width, 3 * height);
@@ -63,7 +65,7 @@ fn filter_channel(values: &[f64], mean: f64, width: usize, gain: impl Fn(f64) ->
     transform_rows(&mut spectrum, columns, FftDirection::Forward);
     let mut spectrum = transpose(&spectrum, columns);
     transform_rows(&mut spectrum, rows, FftDirection::Forward);
-    // Both signs of a frequency have one gain, so a quarter of the gains is all of them.
+    // The gain is even in both frequencies, so a quarter of the gains is enough.
     let gains: Vec<Vec<f64>> = (0..=columns / 2)
         .into_par_iter()
         .map(|u| {
@@ -83,7 +85,7 @@ fn filter_channel(values: &[f64], mean: f64, width: usize, gain: impl Fn(f64) ->
     (0..values.len()).map(|i| spectrum[(i / width + height) * columns + i % width + width].re * scale + mean).collect()
 }
 
-/// Frequency of a bin up to `floor(n/2)`, relative to that one's.
+/// Frequency of a bin up to `floor(n/2)`, relative to that of bin `floor(n/2)`.
 fn axis_frequency(bin: usize, n: usize) -> f64 {
     bin as f64 / (n / 2) as f64
 }
@@ -98,7 +100,7 @@ fn transpose(values: &[Complex<f64>], columns: usize) -> Vec<Complex<f64>> {
     (0..values.len()).into_par_iter().map(|i| values[i % rows * columns + i / rows]).collect()
 }
 
-/// Low-pass: 1 up to 13.3395 cycles per degree, where the band-pass function falls through 1 for the second time.
+/// Low-pass: 1 up to 13.3395 cycles per degree, where the band-pass function falls below 1.
 fn luminance_sensitivity(f: f64) -> f64 {
     if f <= 13.3395 { 1.0 } else { 0.63 * pow(f, 0.616) * exp(-0.085 * f) }
 }
@@ -116,7 +118,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_unit_gain_changes_nothing_and_a_zero_gain_leaves_the_mean() {
+    fn a_gain_of_one_keeps_the_values_and_a_gain_of_zero_keeps_the_mean() {
         let (width, height) = (7, 10);
         let values: Vec<f64> = (0..width * height).map(|i| f64::from(u8::try_from(i * 37 % 101).unwrap())).collect();
         let same = filter_channel(&values, 3.0, width, |_| 1.0);
@@ -125,7 +127,7 @@ mod tests {
     }
 
     #[test]
-    fn a_cosine_of_the_mirrored_image_keeps_its_shape_and_takes_the_gain_of_its_frequency() {
+    fn a_cosine_of_the_mirrored_image_is_multiplied_by_the_gain_of_its_frequency() {
         // Half-sample mirroring continues cos(pi k (x + 1/2) / n): its period is 2n/k, so 3n columns hold 3k/2 periods.
         let (n, k) = (24, 6);
         let wave = |x: usize| libm::cos(std::f64::consts::PI * f64::from(k) * (x as f64 + 0.5) / n as f64);

@@ -1,10 +1,13 @@
-//! iCID, the successor of CID: Preiss, Fernandes & Urban, *Color-Image Quality Assessment: From Prediction to Optimization*
-//! (IEEE TIP 23(3), 2014).
+//! iCID, the successor of CID: Preiss, Fernandes & Urban, *Color-Image Quality Assessment: From Prediction to
+//! Optimization* (IEEE TIP 23(3), 2014).
 //!
-//! Differences from CID: large images are first averaged down (in encoded values) by f = max(1, round(min(width, height) /
-//! 256)); iCAM's filter instead of S-CIELAB; windows of sigma 2; constants 10 for contrast and structure; |covariance| in the
-//! structure maps, that of lightness cubed; chroma contrast and structure; and the product is taken per window and only then
-//! averaged.
+//! Differences from CID:
+//! - large images are first averaged down (in encoded values) by f = max(1, round(min(width, height) / 256));
+//! - iCAM's filter replaces S-CIELAB;
+//! - windows have sigma 2, and the constants of contrast and structure are 10;
+//! - the structure maps use |covariance|, and that of lightness is cubed;
+//! - chroma contrast and chroma structure are included;
+//! - the features are multiplied per window, and the product is averaged.
 
 use super::cid::{check_pair, working};
 use super::dispatch::Lanes;
@@ -18,15 +21,15 @@ use super::window::{
 use super::working::{Pipeline, SpatialFilter};
 use super::{Lab2000hl, MetricError};
 
-/// What an iCID score is to be minimised for: how much chroma and hue count.
+/// The intent for which iCID is minimised: the weights of chroma and hue.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Intent {
     /// Overall appearance: the default.
     #[default]
     Perceptual,
-    /// Hue counts ten times as much.
+    /// Hue has ten times the weight.
     HuePreserving,
-    /// Chroma and hue count ten times as much.
+    /// Chroma and hue have ten times the weight.
     Chromatic,
 }
 
@@ -35,11 +38,11 @@ pub enum Intent {
 pub struct IcidOptions {
     /// Default perceptual.
     pub intent: Intent,
-    /// What models the viewer's acuity. Default iCAM.
+    /// The spatial filter, a model of the viewer's acuity. Default iCAM.
     pub filter: SpatialFilter,
     /// Viewing distance: half the pixels per degree of visual angle, in [1, 500]. Default 20.
     pub cycles_per_degree: f64,
-    /// Whether chroma contrast and chroma structure take part. Default yes.
+    /// Whether to include chroma contrast and chroma structure. Default yes.
     pub chroma_maps: bool,
     /// Whether large images are averaged down first. Default yes.
     pub downsample: bool,
@@ -60,21 +63,21 @@ impl Default for IcidOptions {
     }
 }
 
-/// The outcome of [`icid`].
+/// The result of [`icid`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct IcidScore {
     /// iCID over all windows: 0 if identical, larger is worse.
     pub icid: f64,
     /// iCID over the windows whose centre pixel has a coverage above 0.
     pub icid_object: f64,
-    /// The error of every window, at the size compared (after averaging down). Its mean is `icid`.
+    /// The error of every window, at the size after averaging down. Its mean is `icid`.
     pub error: ErrorMap,
 }
 
 /// The improved colour-image difference of two displayed images.
 ///
-/// `coverage`: one value in [0, 1] per pixel; it selects the windows of `icid_object` and changes nothing else (the images
-/// are multiplied by it beforehand: [`DisplayImage::from_linear`]).
+/// `coverage`: one value in [0, 1] per pixel. It only selects the windows of `icid_object`; the images must already be
+/// multiplied by it, see [`DisplayImage::from_linear`].
 ///
 /// # Errors
 /// [`MetricError::SizeMismatch`]; [`MetricError::TooSmall`]; [`MetricError::Length`], [`MetricError::Coverage`];
@@ -125,7 +128,7 @@ const SIGMA: f64 = 2.0;
 /// Constant of the contrast and structure maps.
 const CONSTANT: f64 = 10.0;
 
-/// 1 minus the product of a window's features; exactly 0 where both images are equal.
+/// 1 minus the product of a window's features; exactly 0 if both windows are equal.
 fn window_error(statistics: &RowStatistics<'_>, x: usize, weights: [f64; 3], chroma_maps: bool) -> f64 {
     let of = |plane: usize| (statistics.reference[plane][x], statistics.image[plane][x]);
     let difference = |plane: usize| of(plane).0 - of(plane).1;
@@ -158,8 +161,8 @@ fn averaging_step(side: usize) -> usize {
     ((side + 128) / 256).max(1)
 }
 
-/// Means of `step x step` encoded pixels, with half-sample reflection, at every `step`-th pixel. The mean reaches
-/// `(step - 1) / 2` pixels to the left and up and `step / 2` to the right and down (`imfilter` of MATLAB).
+/// Means of `step x step` encoded pixels at every `step`-th pixel, with half-sample reflection. The mean extends
+/// `(step - 1) / 2` pixels to the left and up, and `step / 2` to the right and down (as MATLAB's `imfilter`).
 fn average_down(displayed: &DisplayImage, step: usize) -> DisplayImage {
     if step == 1 {
         return displayed.clone();
@@ -168,7 +171,7 @@ fn average_down(displayed: &DisplayImage, step: usize) -> DisplayImage {
     let whole = Region::whole(width, height);
     let (columns, rows) = (whole.columns(step), whole.rows(step));
     let (small_width, small_height) = (width.div_ceil(step), height.div_ceil(step));
-    // Position `step` of the continued axis is pixel 0.
+    // Position `step` of the reflected axis is pixel 0.
     let first = step - (step - 1) / 2;
     let mean = |i: usize| {
         let (x, y) = (i % small_width * step + first, i / small_width * step + first);

@@ -1,13 +1,15 @@
 //! LAB2000HL, the hue-linear working space in which Euclidean distances approximate CIEDE2000.
 //!
-//! Source: Lissner & Urban, *Toward a Unified Color Space for Perception-Based Image Processing* (IEEE TIP 21(3), 2012).
-//! Lightness is L00(L) = integral of 1/S_L from 0 to L, S_L = 1 + 0.015 (l-50)^2 / sqrt(20 + (l-50)^2) (CIEDE2000). The
-//! authors publish (a, b) only as a table of unknown licence, so what ships is `fit00`: with C, h the CIELAB chroma and hue,
+//! Source: Lissner & Urban, *Toward a Unified Color Space for Perception-Based Image Processing* (IEEE TIP 21(3),
+//! 2012). Lightness is L00(L) = integral of 1/S_L from 0 to L, S_L = 1 + 0.015 (l-50)^2 / sqrt(20 + (l-50)^2)
+//! (CIEDE2000). The authors publish (a, b) only as a table of unknown licence, so this program ships the fit `fit00`.
+//! With C, h the CIELAB chroma and hue,
 //!
-//! C00 = ln(1 + 0.045 C) / 0.045 * r(C, h), h00 = h + d(C, h), r and d = sum over j < 4, m <= 6 of (C/128)^j {cos, sin}(m h).
+//! C00 = ln(1 + 0.045 C) / 0.045 * r(C, h), h00 = h + d(C, h), r and d = sum over j < 4, m <= 6 of (C/128)^j {cos,
+//! sin}(m h).
 //!
-//! The 2 x 52 coefficients were fitted by least squares to the authors' 257 x 257 table for this project (RMS 0.49 units);
-//! scores stay within 0.007 of the table's. [`Lab2000hl::from_table`] takes the table itself, for comparisons.
+//! The 2 x 52 coefficients were fitted by least squares to the authors' 257 x 257 table for this project (RMS 0.49
+//! units). Scores are within 0.007 of those with the table. [`Lab2000hl::from_table`] reads the table, for comparisons.
 
 use std::sync::{Arc, LazyLock};
 
@@ -73,7 +75,7 @@ impl Lab2000hl {
     }
 }
 
-/// Replaces a row of CIELAB L by L00. A table lookup, so it does not vectorise.
+/// Replaces a row of CIELAB L by L00. It is not vectorised, because it looks values up in a table.
 #[inline(always)]
 pub(super) fn lightness_row(l: &mut [f64]) {
     let table = &LIGHTNESS[..];
@@ -98,8 +100,8 @@ static LIGHTNESS: LazyLock<Box<[f64]>> = LazyLock::new(|| {
 const LIGHTNESS_STEPS: usize = 100_000;
 const LIGHTNESS_STEPS_PER_UNIT: f64 = 1000.0;
 
-/// (a00, b00) of CIELAB (a, b). No trigonometry of the hue itself: cos h and sin h are a/C and b/C, those of its
-/// multiples follow by Chebyshev's recurrence, and only the small offset d needs a sine and a cosine.
+/// (a00, b00) of CIELAB (a, b). The hue angle is not computed: cos h and sin h are a/C and b/C, those of its multiples
+/// follow by Chebyshev's recurrence, and only the small offset d needs a sine and a cosine.
 #[inline(always)]
 fn fit00(a: f64, b: f64) -> (f64, f64) {
     let chroma = (a * a + b * b).sqrt();
@@ -200,7 +202,7 @@ mod tests {
     }
 
     #[test]
-    fn the_fit_is_the_sum_of_harmonics_it_claims_to_be() {
+    fn the_fit_is_the_documented_sum_of_harmonics() {
         for i in -40..=40 {
             for j in -40..=40 {
                 let (a, b) = (f64::from(i) * 3.3, f64::from(j) * 3.3 + 0.1);
@@ -241,7 +243,7 @@ mod tests {
     }
 
     #[test]
-    fn a_broken_table_is_refused() {
+    fn an_invalid_table_is_refused() {
         let message = Lab2000hl::from_table(&[0; 24]).unwrap_err().to_string();
         assert!(message.contains("(1056784 bytes), found 24"), "{message}");
         let mut bytes = vec![0; 257 * 257 * 16];

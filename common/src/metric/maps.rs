@@ -1,4 +1,4 @@
-//! Where two images differ: per-window maps and a picture of them.
+//! Maps of the difference of two images, one value per window, and a picture of them.
 
 use super::colour::linear_from_lab;
 use super::features::FEATURES;
@@ -13,8 +13,8 @@ pub struct Maps {
     pub width: usize,
     /// Rows of the image.
     pub height: usize,
-    /// l_L, c_L, s_L, l_C, l_H, each `(height - 10) x (width - 10)`, row-major; entry (0, 0) belongs to the window centred on
-    /// pixel (5, 5). 1 is equal; s_L can be negative.
+    /// l_L, c_L, s_L, l_C, l_H, each `(height - 10) x (width - 10)`, row-major; entry (0, 0) belongs to the window
+    /// centred on pixel (5, 5). 1 is equal; s_L can be negative.
     pub features: [Vec<f64>; 5],
 }
 
@@ -25,8 +25,8 @@ pub struct ErrorMap {
     pub width: usize,
     /// Rows of the image.
     pub height: usize,
-    /// 1 minus the product of the features: `(height - 10) x (width - 10)`, row-major, laid out as [`Maps::features`].
-    /// 0 is equal; above 1 where structure is inverted.
+    /// 1 minus the product of the features: `(height - 10) x (width - 10)`, row-major, in the layout of
+    /// [`Maps::features`]. 0 is equal; values above 1 mean inverted structure.
     pub error: Vec<f64>,
 }
 
@@ -39,7 +39,7 @@ impl Maps {
 
     /// The local error: 1 minus the product of the five features of a window.
     ///
-    /// Its mean is not CSSIM, which averages each feature before multiplying.
+    /// Its mean is not CSSIM, which averages each feature before the multiplication.
     #[must_use]
     pub fn error(&self) -> ErrorMap {
         let error = (0..self.features[0].len())
@@ -50,10 +50,10 @@ impl Maps {
 }
 
 impl ErrorMap {
-    /// A picture of the map at the image's size, linear Rec. 709 (encode it to sRGB to look at it).
+    /// A picture of the map at the image's size, linear Rec. 709 (encode it to sRGB for display).
     ///
-    /// 0 is black, `full_scale` and above pale yellow, through purple, red and orange; lightness grows evenly with the error.
-    /// The border of 5 pixels, where no window fits, is neutral grey.
+    /// Colours go from black at 0 through purple, red and orange to pale yellow at `full_scale` and above. Lightness is
+    /// linear in the error. The border of 5 pixels, which has no windows, is neutral grey.
     #[must_use]
     pub fn picture(&self, full_scale: f64) -> Image {
         let mut pixels = vec![[BORDER_GREY; 3]; self.width * self.height];
@@ -67,11 +67,11 @@ impl ErrorMap {
     }
 }
 
-/// Linear grey of the border, middle grey on a display.
+/// Linear value of the grey border, middle grey on a display.
 const BORDER_GREY: f32 = 0.2;
 
-/// The colour map: a path through CIELAB from black to pale yellow in steps of equal length, so that equal steps of `t` look
-/// equal. `t` is clamped to [0, 1]; NaN (a full scale of 0 and no error) is 0.
+/// The colour map: a path through CIELAB from black to pale yellow in segments of equal length, so that equal steps of
+/// `t` look equal. `t` is clamped to [0, 1]; NaN (an error of 0 with a full scale of 0) counts as 0.
 fn heat(t: f64) -> [f32; 3] {
     let position = t.clamp(0.0, 1.0) * HEAT_STEPS as f64;
     let i = cell(position, HEAT_STEPS);
@@ -99,7 +99,7 @@ mod tests {
         let count = 600;
         let colours: Vec<[f64; 3]> =
             (0..=count).map(|i| widen(heat(f64::from(i) / f64::from(count))).to_array()).collect();
-        // Single precision shifts the end, which is black.
+        // Rounding to single precision moves black slightly below 0.
         assert!(colours.iter().flatten().all(|x| (-1e-7..=1.0).contains(x)));
         let steps: Vec<f64> = colours
             .windows(2)

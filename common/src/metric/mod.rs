@@ -1,12 +1,12 @@
-//! How far apart two images are: the per-pixel cost of stage one and the perceptual error CSSIM of stage two.
+//! The difference between two images: the per-pixel cost of stage one and the perceptual error CSSIM of stage two.
 //!
-//! [`Judge`] is what selection and polishing call: CSSIM against a prepared reference. [`cid`] is the same measure on two
-//! displayed images with the authors' variants, [`icid`] its successor. [`DisplayImage`] and [`auto_exposure`] are the display
-//! transform before them. The pipeline, in the order of the files: `display`, `colour` and `scielab` (or `icam`) under
-//! `working`, `lab2000hl`, `window`, `features`, then `cssim`, `cid` or `icid`, and `maps` for pictures.
+//! Selection and polishing use [`Judge`]: CSSIM against a prepared reference. [`cid`] is the same measure on two
+//! displayed images, with the authors' variants; [`icid`] is its successor. [`DisplayImage`] and [`auto_exposure`] are
+//! the display transform before them. The pipeline, in the order of the files: `display`, `colour` and `scielab` (or
+//! `icam`) under `working`, `lab2000hl`, `window`, `features`, then `cssim`, `cid` or `icid`, and `maps` for pictures.
 //!
-//! Scores depend on resolution, exposure and background far more than on details of the formulas: compare only scores made the
-//! same way.
+//! Scores depend much more on resolution, exposure and background than on details of the formulas. Compare only scores
+//! with equal resolution, exposure and background.
 
 mod cid;
 mod colour;

@@ -1,10 +1,10 @@
 //! Working buffers of the metric: `N` planes of `f64`, interleaved by row.
 
-/// Values that the row loops handle together. Row lengths are padded to a multiple of it.
+/// Values that the row loops process together. Row lengths are padded to a multiple of it.
 pub(super) const LANES: usize = 16;
 
-/// `N` planes of `height x width` values. The rows of all planes with the same index lie together, so that one parallel
-/// task can write to all planes of its row. Each row is followed by padding up to a multiple of [`LANES`].
+/// `N` planes of `height x width` values. Rows with the same index are adjacent in memory, so that a parallel task can
+/// write to this row of all planes. Each row is padded to a multiple of [`LANES`].
 #[derive(Debug, Clone)]
 pub(super) struct Planes<const N: usize> {
     width: usize,
@@ -44,7 +44,7 @@ impl<const N: usize> Planes<N> {
         &self.values[(y * N + plane) * self.stride..(y * N + plane + 1) * self.stride]
     }
 
-    /// Runs `fill` for every row, in parallel, with buffers made by `scratch` once per task.
+    /// Runs `fill` for every row, in parallel. `scratch` makes buffers once per task.
     pub(super) fn fill_rows<S: Send>(
         &mut self,
         scratch: impl Fn() -> S + Sync + Send,
@@ -60,7 +60,7 @@ impl<const N: usize> Planes<N> {
     }
 }
 
-/// Rows a parallel task takes at least: enough to pay for its scratch buffers.
+/// The least number of rows per parallel task, so that the cost of its scratch buffers is small.
 pub(super) const ROWS_PER_TASK: usize = 8;
 
 /// The `N` rows of length `stride` in a row of planes.

@@ -1,9 +1,9 @@
-//! The part of an image that has to be looked at: the object's bounding box and a margin.
+//! The part of an image that a score needs: the object's bounding box and a margin.
 //!
-//! Outside the box both images are 0 (they are multiplied by the coverage). What the filter spreads from it ends
-//! `reach` pixels away; a window that lies beyond sees the same constant in both images and its error is exactly 0.
-//! So the region needs `reach` pixels of filtered values, then the windows that touch them (5 pixels) and what those
-//! windows read (5 more). The score is that of the whole image, bit for bit.
+//! Outside the box both images are 0, because they are multiplied by the coverage. The filter spreads the object by
+//! `reach` pixels. A window beyond these has the same constant in both images, so its error is exactly 0. The margin is
+//! therefore `reach` pixels of filtered values, 5 pixels for the centres of windows that touch them, and 5 more that
+//! these windows read. The score is that of the whole image, bit for bit.
 
 use super::planes::LANES;
 use super::window::{RADIUS, SIZE};
@@ -15,7 +15,7 @@ pub(super) struct Region {
     pub(super) image_width: usize,
     /// Rows of the image.
     pub(super) image_height: usize,
-    /// First column, a multiple of [`LANES`] so that sums over lanes are those of the whole image.
+    /// First column, a multiple of [`LANES`], so that sums over lanes are those of the whole image.
     pub(super) x0: usize,
     /// First row.
     pub(super) y0: usize,
@@ -51,12 +51,14 @@ impl Region {
         Some(Self { image_width: width, image_height: height, x0, y0, width: x1 - x0, height: y1 - y0 })
     }
 
-    /// Windows that lie inside the region: columns and rows. The first is centred 5 pixels inside the region's corner.
+    /// Columns and rows of the windows inside the region. The first window is centred 5 pixels inside the region's
+    /// corner.
     pub(super) fn windows(&self) -> (usize, usize) {
         (self.width - 2 * RADIUS, self.height - 2 * RADIUS)
     }
 
-    /// Where a filter that reaches `reach` columns reads its values from, for the columns `-reach..width + reach`.
+    /// The column of the region from which a filter reads, for each of the columns `-reach..width + reach`; `None` for
+    /// a 0.
     pub(super) fn columns(&self, reach: usize) -> Vec<Option<usize>> {
         sources(self.image_width, self.x0, self.width, reach)
     }
@@ -67,14 +69,14 @@ impl Region {
     }
 }
 
-/// Index into the region, or `None` for a 0, of the positions `start - reach..start + length + reach` of an axis of `n`
-/// pixels. The axis is continued by half-sample reflection, except that a filter at least as long as the axis sees
-/// `n / 2` reflected values and zeros beyond (`pad4conv.m` of the authors).
+/// The index in the region, or `None` for a 0, of each of the positions `start - reach..start + length + reach` of an
+/// axis of `n` pixels. The axis is continued by half-sample reflection. A filter at least as long as the axis gets `n /
+/// 2` reflected values and then zeros (`pad4conv.m` of the authors).
 fn sources(n: usize, start: usize, length: usize, reach: usize) -> Vec<Option<usize>> {
     let reflected = if 2 * reach + 1 < n { reach } else { n / 2 };
     (0..length + 2 * reach)
         .map(|i| {
-            let position = start + i; // of the axis, shifted by `reach`
+            let position = start + i; // on the axis, plus `reach`
             let inside = if position < reach {
                 let outside = reach - position;
                 (outside <= reflected).then(|| outside - 1)
@@ -94,7 +96,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_short_filter_reflects_and_a_long_one_runs_into_zeros() {
+    fn a_short_filter_reads_reflected_values_and_a_long_one_also_zeros() {
         let reflect = sources(6, 0, 6, 2);
         assert_eq!(reflect, [1, 0, 0, 1, 2, 3, 4, 5, 5, 4].map(Some));
         let long = sources(4, 0, 4, 3);

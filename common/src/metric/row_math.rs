@@ -1,13 +1,13 @@
-//! Elementary functions that a compiler can turn into vector code: no branches, no calls, no tables.
+//! Elementary functions that the compiler can vectorise: no branches, no calls, no tables.
 //!
-//! They are as portable as `libm` (IEEE additions, multiplications, divisions and bit operations in a fixed order; never
-//! fused), agree with it to 1e-14 relative (tests) and, in a loop over a row, take 1-3 ns instead of 20-40. They are less
-//! general: each states its domain, and outside it the result is meaningless but defined.
+//! They are as portable as `libm`: IEEE additions, multiplications, divisions and bit operations in a fixed order, not
+//! fused. They agree with it to 1e-14 relative (tested). In a loop over a row they take 1-3 ns instead of 20-40 ns.
+//! Each states its domain; outside it the result is wrong, but the behaviour is defined.
 
 /// Cube root of `x`, for normal positive `x`.
 ///
-/// `x^(-1/3)` by exponent division (error 3.5 %) and two steps of the binomial series of `(1 - r)^(-1/3)`, r = 1 - x y^3,
-/// of order 6 and 3; then one Newton step on the cube root.
+/// `x^(-1/3)` by division of the exponent (error 3.5 %) and two steps of the binomial series of `(1 - r)^(-1/3)`,
+/// r = 1 - x y^3, of order 6 and 3. Then one Newton step on the cube root.
 #[inline(always)]
 pub(super) fn cbrt(x: f64) -> f64 {
     // The upper half of the bits, divided by 3 through a 32 x 32 -> 64 bit product.
@@ -24,7 +24,7 @@ pub(super) fn cbrt(x: f64) -> f64 {
 
 /// ln(1 + x) for `x` in [0, 1e300].
 ///
-/// The algorithm of FreeBSD's `e_log.c` (Sun Microsystems 1993) on u = 1 + x, with the rounding of u given back.
+/// The algorithm of FreeBSD's `e_log.c` (Sun Microsystems 1993) on u = 1 + x, corrected for the rounding of u.
 #[inline(always)]
 pub(super) fn ln_1p(x: f64) -> f64 {
     let u = 1.0 + x;
@@ -66,8 +66,8 @@ pub(super) fn sin_cos(x: f64) -> (f64, f64) {
     (s, c)
 }
 
-/// 4/3 of the exponent bias in the upper half of a double, less what balances the error of the linear approximation
-/// of the mantissa (the double-precision form of the constant 0x54a21d2a of single precision).
+/// 4/3 of the exponent bias in the upper half of a double, minus a term that balances the error of the linear
+/// approximation of the mantissa. In single precision the constant is 0x54a21d2a.
 const INVERSE_CBRT_MAGIC: u64 = 1_430_187_600;
 /// Upper half of the bits of sqrt(1/2).
 const SQRT_HALF_HIGH: u64 = 0x3fe6_a09e;
@@ -112,7 +112,7 @@ const COS: [f64; 6] = [
 mod tests {
     use super::*;
 
-    /// A few units in the last place: what the module promises. A wrong coefficient shows at 1e-12 or more.
+    /// The accuracy that the module states, a few units in the last place. A wrong coefficient shows at 1e-12 or more.
     const TOLERANCE: f64 = 1e-14;
     const COUNT: u32 = 200_000;
 
@@ -146,7 +146,7 @@ mod tests {
     #[test]
     fn sine_and_cosine_agree_with_libm_on_both_sides_of_zero() {
         let near = || (0..=COUNT).map(|i| f64::from(i) / f64::from(COUNT) * 20.0 - 10.0);
-        // Near its zeros the relative error is that of the reduced argument, so compare absolutely.
+        // Near a zero the relative error is that of the reduced argument, so compare absolute errors.
         for x in near().chain(powers(10.0, 1e5)) {
             let ((s, c), (es, ec)) = (sin_cos(x), libm::sincos(x));
             assert!((s - es).abs() < TOLERANCE && (c - ec).abs() < TOLERANCE, "{x}: {s} {es} {c} {ec}");

@@ -1,12 +1,14 @@
-//! The S-CIELAB spatial filter: what a viewer at a given distance can resolve.
+//! The S-CIELAB spatial filter, which removes detail that a viewer at a given distance cannot resolve.
 //!
-//! Zhang & Wandell, *A Spatial Extension of CIELAB for Digital Color Image Reproduction* (SID 1996), with the constants and
-//! the discretisation of the authors' CID program (`separableFilters.m`, `gauss.m`): in Poirson & Wandell's opponent
-//! space, each channel is a weighted sum of separable Gaussians. The weight w enters as sqrt|w| along each axis with its
-//! sign on x only. The gains for constant colours are 1.0048, 0.9920 and 0.9944 and are not normalised away.
+//! Zhang & Wandell, *A Spatial Extension of CIELAB for Digital Color Image Reproduction* (SID 1996), with the constants
+//! and the discretisation of the authors' CID program (`separableFilters.m`, `gauss.m`). In Poirson & Wandell's
+//! opponent space, each channel is a weighted sum of separable Gaussians. The weight w is applied as sqrt|w| along each
+//! axis, with its sign along x only. The gains for constant colours are 1.0048, 0.9920 and 0.9944; they are not
+//! normalised to 1.
 //!
-//! Each output row filters along y first (one sum of mirrored rows serves all Gaussians of a channel), then along x from
-//! buffers that stay in the first-level cache. The authors filter along x first; the difference is rounding.
+//! Each output row is filtered along y first (the sum of two mirrored rows is used for all Gaussians of a channel),
+//! then along x from buffers that stay in the first-level cache. The authors filter along x first; the results differ
+//! by rounding.
 
 #![allow(
     clippy::needless_range_loop,
@@ -30,10 +32,10 @@ const ACHROMATIC: [(f64, f64); 3] = [(0.05, 1.003_27), (0.225, 0.114_416), (7.0,
 const RED_GREEN: [(f64, f64); 2] = [(0.0685, 0.616_725), (0.826, 0.383_275)];
 const BLUE_YELLOW: [(f64, f64); 2] = [(0.092, 0.567_885), (0.6451, 0.432_115)];
 
-/// The kernels are built at no less than this many samples per degree and then resampled.
+/// The kernels are built with at least this many samples per degree and then resampled.
 const MINIMUM_SAMPLES_PER_DEGREE: f64 = 224.0;
 
-/// Taps below this fraction of the centre tap are left out: all of them together are below the rounding of the sum.
+/// Taps below this fraction of the centre tap are omitted: their sum is below the rounding error of the result.
 const NEGLIGIBLE_TAP: f64 = 1e-19;
 
 /// The filter for one viewing distance.
@@ -45,12 +47,12 @@ pub(super) struct Scielab {
     reach: usize,
 }
 
-/// One channel: a narrow Gaussian and `W` wide ones. Each kernel is the half from its centre, along y; along x it has the
-/// sign of its weight.
+/// One channel: a narrow Gaussian and `W` wide ones. Each kernel is stored as the half from its centre, along y; along
+/// x it is multiplied by the sign of its weight.
 #[derive(Debug, Clone)]
 struct Channel<const W: usize> {
     narrow: Vec<f64>,
-    /// Tap k of all wide kernels, as they are used together.
+    /// Tap k of all wide kernels, which are used together.
     wide: Vec<[f64; W]>,
     sign: [f64; W],
 }
@@ -97,7 +99,7 @@ impl Scielab {
     }
 }
 
-/// What one task needs to filter rows.
+/// The buffers of one task that filters rows.
 #[derive(Debug)]
 pub(super) struct Scratch {
     rows: Vec<Option<usize>>,
@@ -201,7 +203,7 @@ impl<const W: usize> Channel<W> {
     }
 }
 
-/// Fills a row that begins `reach` columns before column 0 beyond both ends of the region.
+/// Continues a row, which begins `reach` columns before column 0, beyond both ends of the region.
 #[inline(always)]
 fn continue_row(row: &mut [f64], layout: &Layout<'_>) {
     let (reach, width) = (layout.reach, layout.width);
@@ -233,10 +235,11 @@ fn add_scaled(sum: &mut [f64; LANES], tap: f64, chunk: &[f64; LANES]) {
     }
 }
 
-/// The half from its centre of one Gaussian's kernel, times sqrt|weight|.
+/// Half of the kernel of one Gaussian, from its centre, times sqrt|weight|.
 ///
-/// A Gaussian over one degree at `up` times the sampling, normalised, convolved with a triangle of base 2 `up` and read at
-/// every `up`-th sample. As in `gauss.m`, the width parameter is 2 sqrt(ln 2) / (half-width - 1) in samples.
+/// A Gaussian over one degree is sampled `up` times as finely, normalised, convolved with a triangle of base 2 `up`,
+/// and read at every `up`-th sample. As in `gauss.m`, the width parameter is 2 sqrt(ln 2) / (half-width - 1) in
+/// samples.
 fn half_kernel((half_width, weight): (f64, f64), samples_per_degree: f64) -> Vec<f64> {
     let up = (MINIMUM_SAMPLES_PER_DEGREE / samples_per_degree).ceil().max(1.0);
     let samples = samples_per_degree * up;

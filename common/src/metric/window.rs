@@ -1,6 +1,6 @@
 //! Window statistics: Gaussian means, variances and covariances over 11 x 11 pixels.
 //!
-//! Only windows that lie inside the region count. CID uses sigma 1.5, iCID 2.0 (`fspecial('gaussian', 11, sigma)`).
+//! Only windows inside the region are used. CID uses sigma 1.5, iCID 2.0 (`fspecial('gaussian', 11, sigma)`).
 
 #![allow(
     clippy::needless_range_loop,
@@ -22,7 +22,7 @@ pub(super) struct Window {
     taps: [f64; RADIUS + 1],
 }
 
-/// Statistics of one image for every window: see the constants for the planes.
+/// Statistics of one image for every window. The constants below name the planes.
 pub(super) type Moments = Planes<4>;
 /// Planes of [`Moments`].
 pub(super) const MEAN_LIGHTNESS: usize = 0;
@@ -40,7 +40,7 @@ pub(super) struct Prepared {
     pub(super) moments: Moments,
 }
 
-/// The statistics of a reference and an image along a row of windows. Rows are padded to a multiple of the lanes.
+/// The statistics of a reference and an image for a row of windows. Rows are padded to a multiple of the lanes.
 #[derive(Debug)]
 pub(super) struct RowStatistics<'a> {
     /// Moments of the reference.
@@ -55,7 +55,7 @@ pub(super) struct RowStatistics<'a> {
     pub(super) covariance_chroma: &'a [f64],
 }
 
-/// How statistics are taken.
+/// Settings and methods of the window statistics.
 #[derive(Debug, Clone)]
 pub(super) struct Statistics {
     pub(super) window: Window,
@@ -76,7 +76,8 @@ impl Window {
         Self { taps }
     }
 
-    /// Weighted means along a row of windows: of the values of `first` or, with `PRODUCT`, of their products with `second`.
+    /// Weighted means along a row of windows: of the values of `first` or, with `PRODUCT`, of their products with
+    /// `second`.
     #[inline(always)]
     fn mean_row<const PRODUCT: bool>(
         &self,
@@ -128,7 +129,7 @@ fn value<const PRODUCT: bool>(first: f64, second: f64) -> f64 {
 }
 
 impl Statistics {
-    /// Takes the statistics of an image in the working space.
+    /// Computes the statistics of an image in the working space.
     pub(super) fn prepare(&self, working: Planes<4>) -> Prepared {
         let mut moments = Moments::new(working.width() - 2 * RADIUS, working.height() - 2 * RADIUS);
         moments.fill_rows(
@@ -143,8 +144,8 @@ impl Statistics {
         Prepared { working, moments }
     }
 
-    /// Compares an image in the working space with a reference: calls `measure` with the statistics of every row of
-    /// windows, in parallel, and returns its results in the order of the rows.
+    /// Compares an image in the working space with a reference. It calls `measure` with the statistics of each row of
+    /// windows, in parallel, and returns the results in the order of the rows.
     pub(super) fn compare<T: Send>(
         &self,
         reference: &Prepared,
@@ -203,7 +204,7 @@ impl Statistics {
         }
     }
 
-    /// Per pixel, sqrt(da^2 + db^2 - dC^2); rounding can make the radicand negative, which counts as 0.
+    /// Per pixel, sqrt(da^2 + db^2 - dC^2). A radicand that rounding makes negative counts as 0.
     fn hue_differences(&self, reference: &Planes<4>, image: &Planes<4>) -> Planes<1> {
         let mut differences = Planes::new(image.width(), image.height());
         differences.fill_rows(
@@ -254,12 +255,12 @@ fn window_rows<const N: usize>(planes: &Planes<N>, plane: usize, y: usize) -> Wi
     std::array::from_fn(|k| planes.row_of(plane, y + k).as_chunks().0)
 }
 
-/// Room for the vertical sums over a row of pixels and for what the last chunk of windows reads beyond it.
+/// A buffer for the vertical sums over a row of pixels, with room for the values that the last chunk of windows reads.
 fn column_sums(stride: usize) -> Vec<f64> {
     vec![0.0; stride + 2 * RADIUS]
 }
 
-/// Rows that one task fills again and again.
+/// The row buffers that a task reuses.
 struct Buffers {
     column_sums: Vec<f64>,
     moments: [Vec<f64>; 4],

@@ -7,20 +7,20 @@ use super::region::Region;
 use super::scielab::{Scielab, XYZ_TO_OPPONENT};
 use super::{Lab2000hl, MetricError, icam};
 
-/// What removes the detail a viewer cannot see, before colours are compared.
+/// The spatial filter that removes detail invisible to the viewer, before colours are compared.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum SpatialFilter {
     /// S-CIELAB's sums of Gaussians, the default of CID.
     #[default]
     Scielab,
-    /// iCAM's contrast sensitivity in YCC-RIT by Fourier transform, the default of iCID. Its transform takes sines from
-    /// the platform, so the last bits of a score may differ between platforms; nothing that decides a fit uses it.
+    /// iCAM's contrast sensitivity in YCC-RIT by Fourier transform, the default of iCID. The transform uses the
+    /// platform's sines, so the last bits of a score may differ between platforms. A fit does not use this filter.
     Icam,
-    /// None: the image-appearance model is left out.
+    /// No filter.
     None,
 }
 
-/// The steps from linear pixels to the working space, with everything that does not depend on the image.
+/// The steps from linear pixels to the working space, with all data that do not depend on the image.
 #[derive(Debug, Clone)]
 pub(super) struct Pipeline {
     filter: Filter,
@@ -39,7 +39,7 @@ enum Filter {
     None,
 }
 
-/// Cycles per degree for which the filters are built.
+/// Smallest and largest cycles per degree.
 const CYCLES_PER_DEGREE: (f64, f64) = (1.0, 500.0);
 
 impl Pipeline {
@@ -65,7 +65,7 @@ impl Pipeline {
         Ok(Self { filter, before, after, space, lanes })
     }
 
-    /// How many pixels away a pixel can change the result; `None` if everywhere.
+    /// The distance in pixels within which a pixel affects the result; `None` if unlimited.
     pub(super) fn reach(&self) -> Option<usize> {
         match &self.filter {
             Filter::Scielab(filter) => Some(filter.reach()),

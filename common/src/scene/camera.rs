@@ -1,17 +1,17 @@
-//! How the photo was taken.
+//! The camera that took the photo.
 
 use super::SceneError;
 use super::limits::{LEAST_FOV_DEG, MOST_FOV_DEG};
 use crate::math::Vec3;
 use crate::math::elementary::tan;
 
-/// The camera: on +Z, looking along -Z, the photo's x along +X.
+/// The camera: on +Z, looking along -Z, with the photo's x along +X.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub enum Camera {
     /// Parallel rays.
     #[default]
     Orthographic,
-    /// A pinhole whose axis meets the middle of the photo; pixels are square.
+    /// A pinhole whose axis passes through the middle of the photo; pixels are square.
     Perspective {
         /// Vertical field of view of the whole photo, in degrees.
         vertical_fov_deg: f64,
@@ -29,7 +29,7 @@ impl Camera {
         Ok(camera)
     }
 
-    /// Checks the field of view, which the public field lets anyone set.
+    /// Checks the field of view, because it is a public field that may hold any value.
     pub(super) fn check(self) -> Result<(), SceneError> {
         match self {
             Self::Perspective { vertical_fov_deg } if !(LEAST_FOV_DEG..=MOST_FOV_DEG).contains(&vertical_fov_deg) => {
@@ -39,7 +39,7 @@ impl Camera {
         }
     }
 
-    /// The pinhole of a photo of this size; none for parallel rays.
+    /// The pinhole for a photo of this size; `None` for parallel rays.
     pub(super) fn pinhole(self, width: usize, height: usize) -> Option<Pinhole> {
         let Self::Perspective { vertical_fov_deg } = self else { return None };
         let (x, y) = (0.5 * width as f64, 0.5 * height as f64);
@@ -76,7 +76,7 @@ impl std::fmt::Display for Camera {
 /// The rays of a pinhole camera.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Pinhole {
-    /// Where the axis meets the photo, in pixels.
+    /// The point of the photo on the axis, in pixels.
     pub(super) x: f64,
     pub(super) y: f64,
     /// Distance of the image plane, in pixels.
@@ -84,7 +84,7 @@ pub(super) struct Pinhole {
 }
 
 impl Pinhole {
-    /// The direction (unit) in which the camera looks through a point of the photo.
+    /// The direction (unit) of the ray from the camera through a point of the photo.
     pub(super) fn ray(&self, x: f64, y: f64) -> Vec3 {
         Vec3::new(x - self.x, self.y - y, -self.focal_px).normalize()
     }
@@ -95,7 +95,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn text_round_trips_and_nonsense_is_quoted() {
+    fn text_round_trips_and_invalid_text_is_quoted() {
         for camera in [Camera::Orthographic, Camera::Perspective { vertical_fov_deg: 27.5 }] {
             assert_eq!(camera.to_string().parse(), Ok(camera));
         }

@@ -1,4 +1,4 @@
-//! The photo with everything known about it: which pixels show the object, which can be fitted to, and the light.
+//! A photo with its geometry and its light: which pixels show the object, and which of them a fit may use.
 
 use super::{Geometry, Mask, PixelCounts, PixelStatus, SceneError, limits::LEAST_SIDE};
 use crate::image::Image;
@@ -20,14 +20,14 @@ pub struct Capture {
     warnings: Vec<String>,
 }
 
-/// What a [`Capture`] is made of.
+/// The parts of a [`Capture`].
 #[derive(Debug, Clone)]
 pub struct CaptureInput {
     /// The photo: linear Rec. 709.
     pub photo: Image,
-    /// For each pixel whether it is clipped, where the file format has such a thing.
+    /// Whether each pixel is clipped, if the file format limits values.
     pub clipped: Option<Vec<bool>>,
-    /// Which part of the photo is the object; given for photos with a real background.
+    /// The part of the photo that is the object; given for photos with a background.
     pub mask: Option<Mask>,
     /// The object's shape and place.
     pub geometry: Geometry,
@@ -38,8 +38,8 @@ pub struct CaptureInput {
 impl Capture {
     /// Checks the parts against each other and classifies every pixel.
     ///
-    /// Pixels of the photo that are not finite are left out everywhere (coverage 0) and stored as black, so that no
-    /// product with their coverage can bring them back.
+    /// Pixels of the photo that are not finite are excluded from fit and score: their coverage is 0. They are stored as
+    /// black, because NaN times a coverage of 0 would still be NaN.
     ///
     /// # Errors
     /// [`SceneError::TooSmall`], [`SceneError::Size`] when mask or geometry have another size than the photo,
@@ -77,11 +77,11 @@ impl Capture {
         if means.is_black {
             return Err(SceneError::Black { count: counts.usable });
         }
-        let spills = mask.is_none() && means.outside > BACKGROUND * means.usable;
-        let has_background = mask.is_some() || spills;
+        let is_lit_outside = mask.is_none() && means.outside > BACKGROUND * means.usable;
+        let has_background = mask.is_some() || is_lit_outside;
         let mut capture =
             Self { photo, geometry, environment, coverage, status, counts, has_background, warnings: Vec::new() };
-        capture.warnings = capture.worth_knowing(spills);
+        capture.warnings = capture.collect_warnings(is_lit_outside);
         Ok(capture)
     }
 
@@ -103,14 +103,14 @@ impl Capture {
         &self.environment
     }
 
-    /// How much of each pixel is the object, in \[0, 1\]: geometric coverage times mask, 0 where the photo is not
-    /// finite; `height x width`, row-major.
+    /// The fraction of each pixel that the object covers, in \[0, 1\]: geometric coverage times mask, 0 where the photo
+    /// is not finite; `height x width`, row-major.
     #[must_use]
     pub fn coverage(&self) -> &[f32] {
         &self.coverage
     }
 
-    /// Whether each pixel can be fitted to; `height x width`, row-major.
+    /// The status of each pixel; `height x width`, row-major.
     #[must_use]
     pub fn status(&self) -> &[PixelStatus] {
         &self.status
@@ -127,28 +127,29 @@ impl Capture {
         self.status.iter().enumerate().filter(|(_, status)| **status == PixelStatus::Usable).map(|(index, _)| index)
     }
 
-    /// Whether something else than black surrounds the object: a mask was given, or the photo is not black outside.
+    /// Whether the photo has a background other than black: a mask was given, or the photo is not black outside the
+    /// object.
     #[must_use]
     pub fn has_background(&self) -> bool {
         self.has_background
     }
 
-    /// What a rendering is multiplied by before it is scored (design section 6); pixels of value 0 are not scored. It is the
-    /// coverage, which a photo over black holds already, or, for a photo with a background, 1 where the coverage is full and 0
-    /// elsewhere, as an edge pixel shows the background too.
+    /// The factor of each pixel of photo and rendering before they are scored (design section 6); a pixel of factor 0
+    /// is not scored. For a photo over black it is the coverage. For a photo with a background it is 1 where the
+    /// coverage is full and 0 elsewhere, because an edge pixel also shows the background.
     #[must_use]
     pub fn scoring_coverage(&self) -> Vec<f32> {
         let kept = |&coverage: &f32| if !self.has_background || coverage == 1.0 { coverage } else { 0.0 };
         self.coverage.iter().map(kept).collect()
     }
 
-    /// What the user should know before trusting a fit.
+    /// Warnings about the photo that the user should read before trusting a fit.
     #[must_use]
     pub fn warnings(&self) -> &[String] {
         &self.warnings
     }
 
-    fn worth_knowing(&self, spills: bool) -> Vec<String> {
+    fn collect_warnings(&self, is_lit_outside: bool) -> Vec<String> {
         let counts = self.counts;
         let mut warnings = self.geometry.normal_map().map_or_else(Vec::new, |map| map.warnings().to_vec());
         let mut warn = |applies: bool, text: String| {
@@ -157,44 +158,45 @@ impl Capture {
             }
         };
         let cut = self.geometry.circle().is_some_and(|circle| !circle.fits(self.photo.width(), self.photo.height()));
-        warn(cut, "a part of the sphere lies outside the photo: only what is seen is fitted".to_owned());
+        warn(cut, "a part of the sphere lies outside the photo: only the visible part is fitted".to_owned());
         warn(
-            spills,
-            "the photo is not black around the object: its edge pixels are left out of the score; give --mask to say \
-             which pixels are the object"
+            is_lit_outside,
+            "the photo is not black around the object: edge pixels are excluded from the score; give --mask to mark the \
+             pixels of the object"
                 .to_owned(),
         );
         warn(
             counts.not_finite > 0,
-            format!("{} pixels of the object are not finite: left out of everything", counts.not_finite),
+            format!("{} not finite: excluded from fit and score", object_pixels(counts.not_finite)),
         );
         warn(
             counts.clipped > 0,
-            format!("{} pixels of the object are clipped: left out of the fit, kept in the score", counts.clipped),
+            format!("{} clipped: excluded from the fit, kept in the score", object_pixels(counts.clipped)),
         );
         warn(
             counts.usable < FEW_PIXELS,
-            format!("only {} pixels are usable: expected at least {FEW_PIXELS} for a reliable fit", counts.usable),
+            format!("usable pixels: {}; a reliable fit needs at least {FEW_PIXELS}", counts.usable),
         );
-        let too_bright = self.brighter_than_the_light();
+        let too_bright = self.count_brighter_than_light();
         warn(
             1000 * too_bright > counts.usable,
             format!(
-                "{too_bright} pixels of the object are brighter than the brightest light of the map, which no material \
-                 can be: if photo and map have different exposures, scale one of them to the exposure of the other"
+                "{} brighter than the brightest light of the map, which is impossible for a material: if photo and map \
+                 have different exposures, scale one of them to the exposure of the other",
+                object_pixels(too_bright)
             ),
         );
         warnings
     }
 
-    /// Usable pixels that reflect more than a perfect mirror could, in any channel.
-    fn brighter_than_the_light(&self) -> usize {
+    /// The number of usable pixels that are brighter, in any channel, than a perfect mirror could be.
+    fn count_brighter_than_light(&self) -> usize {
         let limit = self.environment.max_radiance() * 1.01;
         self.usable().filter(|&index| widen(self.photo.pixels()[index]).cmpgt(limit).any()).count()
     }
 }
 
-/// Coverage and status of every pixel; the coverage still counts pixels that are not finite.
+/// Coverage and status of every pixel. The coverage still includes pixels that are not finite.
 fn classify(
     photo: &Image,
     clipped: Option<&[bool]>,
@@ -224,6 +226,11 @@ fn classify(
         (shape * mask, status)
     };
     (0..photo.pixels().len()).into_par_iter().with_min_len(width).map(one).unzip()
+}
+
+/// "1 pixel of the object is", "2 pixels of the object are".
+fn object_pixels(count: usize) -> String {
+    if count == 1 { "1 pixel of the object is".to_owned() } else { format!("{count} pixels of the object are") }
 }
 
 fn is_finite(pixel: [f32; 3]) -> bool {
@@ -256,7 +263,7 @@ fn check_finite(photo: &Image, coverage: &[f32], status: &[PixelStatus]) -> Resu
 struct Means {
     usable: f64,
     outside: f64,
-    /// No channel of a usable pixel is above 0.
+    /// Whether every channel of every usable pixel is 0 or less.
     is_black: bool,
 }
 
@@ -283,10 +290,10 @@ impl Means {
     }
 }
 
-/// Brightness around the object, relative to the object, above which the photo has a background.
+/// Mean luminance outside the object, relative to the object, above which the photo has a background.
 const BACKGROUND: f64 = 0.01;
 
-/// The paper's number of samples: fewer pixels than that cannot even be drawn once each.
+/// The number of pixels that the paper draws for stage one.
 const FEW_PIXELS: usize = 256;
 
 #[cfg(test)]

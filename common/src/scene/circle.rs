@@ -1,4 +1,4 @@
-//! Where the sphere lies in the photo.
+//! The circle that the sphere fills in the photo.
 
 use super::SceneError;
 
@@ -40,7 +40,7 @@ impl Circle {
         dx * dx + dy * dy < self.radius * self.radius
     }
 
-    /// Whether the whole disk lies in a photo of this size, up to a thousandth of a pixel.
+    /// Whether the whole disk lies in a photo of this size, to a thousandth of a pixel.
     #[must_use]
     pub fn fits(&self, width: usize, height: usize) -> bool {
         let margin = self.radius - 1e-3;
@@ -81,7 +81,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn text_round_trips_and_nonsense_is_quoted() {
+    fn text_round_trips_and_invalid_text_is_quoted() {
         assert_eq!("128, 127.5,120".parse(), Ok(Circle { x: 128.0, y: 127.5, radius: 120.0 }));
         let circle = Circle { x: 0.1, y: -3.0, radius: 1e-3 };
         assert_eq!(circle.to_string().parse(), Ok(circle));
@@ -98,10 +98,10 @@ mod tests {
     }
 
     #[test]
-    fn meeting_and_fitting_the_photo() {
+    fn circles_partly_and_wholly_in_the_photo_are_recognised() {
         let at = |x: f64, y: f64| Circle { x, y, radius: 10.0 };
         assert!(at(-9.0, 50.0).meets(100, 100) && !at(-9.0, 50.0).fits(100, 100));
-        // The corner is 7.1 away diagonally in x and y each: 10.04 in all.
+        // The corner is 7.1 away in x and in y: a distance of 10.04.
         assert!(!at(-7.1, -7.1).meets(100, 100) && at(-7.0, -7.0).meets(100, 100));
         assert!(at(10.0, 90.0).fits(100, 100) && !at(10.0, 90.1).fits(100, 100));
     }

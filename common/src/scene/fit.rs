@@ -1,16 +1,16 @@
 //! The circle of a mask, by least squares on coverage.
 //!
-//! The disk's coverage `c(p) = clamp((R - |p - centre|) / w + 1/2, 0, 1)` is compared with the mask at every pixel centre,
-//! and `sum (c - mask)^2` minimised by Gauss-Newton steps over (x, y, R) while the width w of the edge shrinks from R/4 to
-//! one pixel. Only pixels on the edge have a gradient, so holes inside and specks outside do not move the circle, and a
-//! notch moves it little; parts of the disk outside the photo are simply not seen.
+//! The disk's coverage `c(p) = clamp((R - |p - centre|) / w + 1/2, 0, 1)` is compared with the mask at every pixel
+//! centre. Gauss-Newton steps over (x, y, R) minimise `sum (c - mask)^2` while the width w of the edge shrinks from R/4
+//! to one pixel. Only pixels on the edge have a gradient: holes inside and specks outside do not move the circle, a
+//! notch moves it little, and the part of the disk outside the photo has no influence.
 
 use super::limits::LEAST_AREA;
 use super::{Circle, Mask, SceneError};
 use crate::math::{Mat3, Vec3};
 use std::f64::consts::PI;
 
-/// A fitted circle and how well a disk describes the mask.
+/// A fitted circle and its difference from the mask.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CircleFit {
     /// The circle, in pixels.
@@ -22,14 +22,14 @@ pub struct CircleFit {
 /// Fits a circle to the object in a mask.
 ///
 /// # Errors
-/// [`SceneError::EmptyMask`] when the mask covers less than 20 pixels.
+/// [`SceneError::EmptyMask`] if the mask covers less than 20 pixels.
 pub fn fit_circle(mask: &Mask) -> Result<CircleFit, SceneError> {
     let mut circle = start(mask)?;
     let mut edge = (0.25 * circle.radius).max(1.0);
     loop {
         for _ in 0..STEPS {
             let step = gauss_newton_step(mask, circle, edge);
-            // A step is trusted as far as the edge is wide: beyond it the model knows nothing.
+            // The linearisation holds only within the width of the edge, so no step is longer.
             let step = step.clamp_length_max(edge);
             circle.x += step.x;
             circle.y += step.y;
@@ -60,7 +60,7 @@ fn start(mask: &Mask) -> Result<Circle, SceneError> {
     Ok(Circle { x: x / sum, y: y / sum, radius: (sum / PI).sqrt() })
 }
 
-/// The step in (x, y, R) that solves the linearised problem; 0 where it has no solution.
+/// The step in (x, y, R) that solves the linearised problem; 0 if it has no unique solution.
 fn gauss_newton_step(mask: &Mask, circle: Circle, edge: f64) -> Vec3 {
     let mut normal = Mat3::ZERO;
     let mut gradient = Vec3::ZERO;
@@ -74,7 +74,7 @@ fn gauss_newton_step(mask: &Mask, circle: Circle, edge: f64) -> Vec3 {
             gradient += slope * (inside + 0.5 - f64::from(value));
         }
     }
-    // Fewer than three pixels on the edge, or all in one line, leave the matrix singular.
+    // The matrix is singular with fewer than three pixels on the edge, or if all of them lie on one line.
     let determinant = normal.determinant();
     let scale = normal.x_axis.x * normal.y_axis.y * normal.z_axis.z;
     if determinant > 1e-9 * scale { -(normal.inverse() * gradient) } else { Vec3::ZERO }
@@ -91,7 +91,7 @@ fn mismatch(mask: &Mask, circle: Circle) -> f64 {
     difference / sum
 }
 
-/// Steps per edge width; they converge quadratically within a few.
+/// The limit of steps per edge width. They converge quadratically, within a few steps.
 const STEPS: usize = 30;
 
 #[cfg(test)]

@@ -1,4 +1,4 @@
-//! The surface in the photo, whatever its kind: what rendering asks for.
+//! The surface in the photo, of any kind, as rendering needs it.
 
 use super::coverage::pixel_coverage;
 use super::limits::LEAST_SIDE;
@@ -6,7 +6,7 @@ use super::{Camera, Circle, NormalMap, SceneError, Sphere, SurfacePoint};
 use crate::image::Image;
 use crate::math::arctangent::angle;
 
-/// An object as it lies in a photo of a given size.
+/// An object in a photo of a given size.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Geometry {
     width: usize,
@@ -26,16 +26,16 @@ impl Geometry {
     /// The unit sphere that fills `circle` in a photo of `width` x `height` pixels; see [`Sphere`].
     ///
     /// # Errors
-    /// [`SceneError::TooSmall`] below 2 x 2 pixels, [`SceneError::Circle`] and [`SceneError::Camera`] for values out of range,
-    /// [`SceneError::CircleOutside`] when the circle does not meet the photo.
+    /// [`SceneError::TooSmall`] below 2 x 2 pixels, [`SceneError::Circle`] and [`SceneError::Camera`] for values out of
+    /// range, [`SceneError::CircleOutside`] if the circle lies outside the photo.
     pub fn sphere(width: usize, height: usize, circle: Circle, camera: Camera) -> Result<Self, SceneError> {
         check_size(width, height)?;
         let surface = Surface::Sphere(Sphere::new(width, height, circle, camera)?);
         Ok(Self { width, height, camera, surface })
     }
 
-    /// The surface of a normal map (world-space unit normals, length 0 is background) for a photo of the map's size; see
-    /// [`NormalMap`].
+    /// The surface of a normal map (world-space unit normals, length 0 is background) for a photo of the map's size;
+    /// see [`NormalMap`].
     ///
     /// # Errors
     /// [`SceneError::TooSmall`] below 2 x 2 pixels, and those of [`NormalMap::new`].
@@ -58,13 +58,13 @@ impl Geometry {
         self.height
     }
 
-    /// How the photo was taken.
+    /// The camera that took the photo.
     #[must_use]
     pub fn camera(&self) -> Camera {
         self.camera
     }
 
-    /// The circle the sphere fills; none for a normal map.
+    /// The circle that the sphere fills; `None` for a normal map.
     #[must_use]
     pub fn circle(&self) -> Option<Circle> {
         match &self.surface {
@@ -73,7 +73,7 @@ impl Geometry {
         }
     }
 
-    /// The normal map; none for a sphere.
+    /// The normal map; `None` for a sphere.
     #[must_use]
     pub fn normal_map(&self) -> Option<&NormalMap> {
         match &self.surface {
@@ -82,8 +82,8 @@ impl Geometry {
         }
     }
 
-    /// The surface seen through the point (x, y) of the photo: pixels from the top left corner, y down, so that pixel
-    /// (c, r) covers \[c, c + 1\] x \[r, r + 1\]. None beside the object.
+    /// The surface at the point (x, y) of the photo: pixels from the top left corner, y down, so that pixel (c, r)
+    /// covers \[c, c + 1\] x \[r, r + 1\]. `None` outside the object.
     #[must_use]
     #[inline]
     pub fn point(&self, x: f64, y: f64) -> Option<SurfacePoint> {
@@ -93,12 +93,12 @@ impl Geometry {
         }
     }
 
-    /// The fraction of a pixel that the object covers, in \[0, 1\]: 1 exactly if no part of it misses the object, else
-    /// by 256 points and at most 255/256.
+    /// The fraction of a pixel that the object covers, in \[0, 1\]: exactly 1 if the object covers all of it, else an
+    /// estimate by 256 points of at most 255/256.
     #[must_use]
     pub fn coverage(&self, column: usize, row: usize) -> f32 {
         if let Some(circle) = self.circle() {
-            // Half a diagonal beyond the circle, which holds the silhouette.
+            // The silhouette lies inside the circle, so a pixel half a diagonal outside is empty.
             if circle.distance(column as f64 + 0.5, row as f64 + 0.5) > circle.radius + 0.708 {
                 return 0.0;
             }
@@ -106,15 +106,15 @@ impl Geometry {
         pixel_coverage(column, row, |x, y| self.point(x, y).is_some())
     }
 
-    /// Whether a pixel is known to show nothing but the object: full coverage, and away from the edge of a normal map,
-    /// which is only known to a pixel.
+    /// Whether a pixel surely shows only the object: it has full coverage and is not next to the edge of a normal map,
+    /// whose place is known only to a pixel.
     #[must_use]
     pub fn is_interior(&self, column: usize, row: usize) -> bool {
         self.coverage(column, row) == 1.0 && self.normal_map().is_none_or(|map| map.is_interior(column, row))
     }
 
-    /// How far the normal turns over a pixel, in radians: the largest angle between its normals at the centre and the
-    /// corners, as far as they lie on the object. 0 where fewer than two of them do.
+    /// The largest angle between normals of a pixel, in radians, of those at its centre and its corners that lie on the
+    /// object. 0 if fewer than two of these points do.
     #[must_use]
     pub fn normal_spread(&self, column: usize, row: usize) -> f64 {
         let (x, y) = (column as f64, row as f64);

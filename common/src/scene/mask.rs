@@ -1,4 +1,4 @@
-//! Which part of the photo is the object.
+//! The part of the photo that is the object.
 
 use super::SceneError;
 use crate::image::Image;
@@ -28,12 +28,12 @@ impl Mask {
         Ok(Self { width, height, coverage })
     }
 
-    /// A mask from the mean of an image's channels, which are taken as coverage without any transfer function.
+    /// A mask from the mean of an image's channels, as linear coverage (no transfer function).
     ///
     /// # Errors
     /// As [`Mask::new`].
     pub fn from_image(image: &Image) -> Result<Self, SceneError> {
-        // Equal channels keep their exact value.
+        // Equal channels keep their exact value, which a mean would round.
         let mean = |[r, g, b]: &[f32; 3]| if r == g && g == b { *r } else { (r + g + b) / 3.0 };
         Self::new(image.width(), image.height(), image.pixels().iter().map(mean).collect())
     }

@@ -1,11 +1,11 @@
-//! The photographed object: its shape, the camera, and where both lie in the photo.
+//! The photographed object: its shape, its place in the photo, and the camera.
 //!
-//! [`Geometry`] answers, for a point of the photo, which way the surface faces and where the camera is; [`Capture`] joins
-//! it with the photo and the light and says which pixels can be used and why the others cannot.
+//! [`Geometry`] gives the surface normal and the direction to the camera for a point of the photo. [`Capture`] joins it
+//! with the photo and the light, and classifies each pixel as usable or with the reason why it is not.
 //!
-//! Conventions (design section 3): the world is right-handed with +Y up; the camera sits on +Z and looks along -Z; pixel
-//! (column, row), top left first, covers \[column, column + 1\] x \[row, row + 1\], so x grows to the right with +X and y
-//! grows downwards, against +Y.
+//! Conventions (design section 3): the world is right-handed with +Y up; the camera sits on +Z and looks along -Z;
+//! pixel (column, row), top left first, covers \[column, column + 1\] x \[row, row + 1\], so x grows to the right with
+//! +X and y grows downwards, against +Y.
 
 mod camera;
 mod capture;

@@ -1,19 +1,19 @@
-//! A surface given by its normals, one per pixel: for shapes other than the sphere.
+//! A surface given by one normal per pixel, for shapes other than the sphere.
 //!
-//! Normals are world-space unit vectors; length 0 is background. Inside a pixel they are bilinear between the pixel centres,
-//! taken among the pixels that show the object and normalised. A point is on the object where the equally interpolated indicator (1 on
-//! the object, 0 elsewhere) reaches one half: a straight edge between two columns runs along the pixels' border, a
-//! slanted one cuts across pixels, so that coverage and normals agree.
+//! Normals are world-space unit vectors; length 0 is background. Between pixel centres they are bilinear over the
+//! pixels that show the object, and normalised. A point lies on the object where the indicator (1 on the object, 0
+//! elsewhere), interpolated the same way, is at least one half. So an edge between two columns lies on the border of
+//! the pixels, and a slanted edge cuts through pixels; coverage and normals agree.
 //!
-//! Only direct light is seen: self-occlusion and inter-reflection are ignored. A normal that faces away from the camera
-//! counts as background.
+//! Only direct light is rendered: self-occlusion and inter-reflection are ignored. A normal that faces away from the
+//! camera counts as background.
 
 use super::camera::Pinhole;
 use super::{Camera, SceneError, SurfacePoint};
 use crate::image::Image;
 use crate::math::{Vec3, cell, narrow, widen};
 
-/// A map of normals as it appears in a photo of the same size.
+/// A map of normals for a photo of the same size.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NormalMap {
     width: usize,
@@ -31,8 +31,9 @@ impl NormalMap {
     /// smoothed edge of a rendered map): they become background, with a warning.
     ///
     /// # Errors
-    /// [`SceneError::Normal`] for a vector that is not finite, [`SceneError::NormalLength`] when too many are not unit vectors,
-    /// [`SceneError::NoSurface`] when none faces the camera, [`SceneError::Camera`] for a camera out of range.
+    /// [`SceneError::Normal`] for a vector that is not finite, [`SceneError::NormalLength`] if too many are not unit
+    /// vectors, [`SceneError::NoSurface`] if no normal faces the camera, [`SceneError::Camera`] for a camera out of
+    /// range.
     pub fn new(map: &Image, camera: Camera) -> Result<Self, SceneError> {
         camera.check()?;
         let (width, height) = (map.width(), map.height());
@@ -53,7 +54,7 @@ impl NormalMap {
                 odd.push((column, row, length));
                 continue;
             }
-            // A map that went through here once comes back unchanged, bit for bit.
+            // A map that was normalised before is kept bit for bit.
             let normal = if (length - 1.0).abs() < ROUNDING { found } else { narrow(widen(found) / length) };
             if widen(normal).dot(view(pinhole, column as f64 + 0.5, row as f64 + 0.5)) > 0.0 {
                 normals[index] = normal;
@@ -82,7 +83,7 @@ impl NormalMap {
         Image::from_pixels(self.width, self.height, self.normals.clone())
     }
 
-    /// The surface seen through the point (x, y) of the photo, in pixels; none on the background and outside the map. The
+    /// The surface at the point (x, y) of the photo, in pixels; `None` on the background and outside the map. The
     /// normal always faces the camera.
     #[must_use]
     #[inline]
@@ -116,7 +117,8 @@ impl NormalMap {
         self.normals[row * self.width + column] != [0.0; 3]
     }
 
-    /// Whether the pixel and its neighbours (eight, fewer at the photo's border) show the object: the edge of a map is only known to a pixel.
+    /// Whether the pixel and its neighbours (eight; fewer at the border of the photo) show the object. The place of the
+    /// edge of a map is known only to a pixel.
     #[must_use]
     pub fn is_interior(&self, column: usize, row: usize) -> bool {
         let around = |k: usize, count: usize| k.saturating_sub(1)..(k + 2).min(count);
@@ -132,22 +134,22 @@ fn warnings(odd: usize, away: usize) -> Vec<String> {
     let mut warnings = Vec::new();
     if odd > 0 {
         warnings.push(format!(
-            "{odd} vectors of the normal map have neither length 0 nor 1 (a smoothed edge?): taken as background"
+            "vectors of the normal map with a length other than 0 or 1 (a smoothed edge?): {odd}; taken as background"
         ));
     }
     if away > 0 {
-        warnings.push(format!("{away} normals of the normal map face away from the camera: taken as background"));
+        warnings.push(format!("normals of the normal map that face away from the camera: {away}; taken as background"));
     }
     warnings
 }
 
-/// Half-precision files keep three digits; a smoothed edge is off by more.
+/// Half-precision files keep three digits; vectors of a smoothed edge deviate by more than this.
 const LENGTH_TOLERANCE: f64 = 0.05;
 
-/// What rounding a unit vector to single precision does to its length, ten times over.
+/// Ten times the change of a unit vector's length when it is rounded to single precision.
 const ROUNDING: f64 = 1e-6;
 
-/// Cosine below which opposite normals have cancelled or the surface is seen edge-on.
+/// The cosine below which opposite normals cancel or the surface is seen edge-on.
 const MOST_GRAZING: f64 = 1e-9;
 
 #[cfg(test)]

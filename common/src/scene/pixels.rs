@@ -1,19 +1,19 @@
-//! What each pixel of a photo can be used for.
+//! The status of a photo's pixels: usable for a fit, or the reason why not.
 
-/// Whether a pixel can be fitted to, and if not, the first reason that applies, in this order.
+/// Whether a fit may use a pixel, or else the first reason against it, in this order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PixelStatus {
-    /// Shows nothing but the object, with a known value.
+    /// Shows only the object, with a known value.
     Usable,
-    /// The geometry leaves it free.
+    /// The geometry does not cover it.
     Outside,
-    /// The mask says background, or, inside the object, not wholly object.
+    /// The mask is 0, or it is below 1 inside the object.
     Masked,
     /// The photo's value is infinite or not a number.
     NotFinite,
-    /// The object's edge runs through it.
+    /// Contains the edge of the object.
     Silhouette,
-    /// The photo's value is at the limit of what its file could hold.
+    /// The photo's value is at the limit of the file format.
     Clipped,
 }
 

@@ -1,8 +1,8 @@
-//! Which circle of the photo is the sphere: the one given, else that of the mask, else the largest in the photo.
+//! The choice of the circle that the sphere fills: the given one, else that of the mask, else the largest in the photo.
 
 use super::{Circle, Mask, SceneError, fit_circle};
 
-/// Where the circle came from.
+/// The origin of the circle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum CircleSource {
     /// Given by the user.
@@ -18,9 +18,9 @@ pub enum CircleSource {
 pub struct Placement {
     /// The circle, in pixels.
     pub circle: Circle,
-    /// Where it came from.
+    /// Its origin.
     pub source: CircleSource,
-    /// What the user should know about it.
+    /// A warning for the user.
     pub warning: Option<String>,
 }
 
@@ -28,7 +28,7 @@ impl Placement {
     /// Chooses the circle for a photo of `width` x `height` pixels.
     ///
     /// # Errors
-    /// [`SceneError::EmptyMask`] when a circle has to be fitted to a mask that covers nothing.
+    /// [`SceneError::EmptyMask`] if the circle must be fitted to a mask that covers too little.
     pub fn choose(given: Option<Circle>, mask: Option<&Mask>, width: usize, height: usize) -> Result<Self, SceneError> {
         if let Some(circle) = given {
             return Ok(Self { circle, source: CircleSource::Given, warning: None });
@@ -40,8 +40,8 @@ impl Placement {
         let fit = fit_circle(mask)?;
         let warning = (fit.mismatch > MOST_MISMATCH).then(|| {
             format!(
-                "the mask differs from its best circle {} by {:.1} % of its area: if the object is no sphere give \
-                 --normals, if the circle is wrong give --sphere",
+                "the mask differs from its best circle {} by {:.1} % of its area: give --normals if the object is not a \
+                 sphere, or --sphere if the circle is wrong",
                 fit.circle,
                 100.0 * fit.mismatch
             )
@@ -50,7 +50,7 @@ impl Placement {
     }
 }
 
-/// A square differs from its circle by 18 %, a clean mask of a sphere by less than 1 %.
+/// A square differs from its best circle by 18 %, a clean mask of a sphere by less than 1 %.
 const MOST_MISMATCH: f64 = 0.05;
 
 #[cfg(test)]
@@ -58,7 +58,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_given_circle_wins_then_the_mask_then_the_photo() {
+    fn the_given_circle_is_preferred_then_the_mask_then_the_photo() {
         let given = Circle { x: 1.0, y: 2.0, radius: 3.0 };
         let disk = Circle { x: 30.0, y: 22.0, radius: 15.0 };
         let inside = |k: usize| disk.distance((k % 60) as f64 + 0.5, (k / 60) as f64 + 0.5) < disk.radius;

@@ -1,7 +1,7 @@
-//! The wire form of a [`Geometry`]: plain data that travels in a job, beside the pixels of its normal map as a blob.
+//! The wire form of a [`Geometry`]: plain data in a node's parameters. The pixels of a normal map are sent as a blob.
 //!
-//! `Geometry::from_spec(&geometry.spec(), map)` gives the same geometry, bit for bit, when `map` is
-//! [`super::NormalMap::to_image`] of its normal map (none for a sphere).
+//! `Geometry::from_spec(&geometry.spec(), map)` gives the same geometry, bit for bit, if `map` is
+//! [`super::NormalMap::to_image`] of its normal map (`None` for a sphere).
 
 use super::{Camera, Circle, Geometry, SceneError};
 use crate::image::Image;
@@ -14,9 +14,9 @@ pub struct GeometrySpec {
     pub width: u32,
     /// Rows of the photo.
     pub height: u32,
-    /// How the photo was taken.
+    /// The camera that took the photo.
     pub camera: CameraSpec,
-    /// What is seen.
+    /// The surface of the object.
     pub surface: SurfaceSpec,
 }
 
@@ -37,7 +37,7 @@ pub enum CameraSpec {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum SurfaceSpec {
-    /// The unit sphere filling a circle of the photo, in pixels.
+    /// The unit sphere that fills a circle of the photo, in pixels.
     Sphere {
         /// Centre, from the left edge.
         x: f64,
@@ -46,7 +46,7 @@ pub enum SurfaceSpec {
         /// Radius.
         radius: f64,
     },
-    /// A normal map of the photo's size, whose pixels travel beside this.
+    /// A normal map of the photo's size, whose pixels are sent as a blob.
     Normals,
 }
 
@@ -70,7 +70,7 @@ impl Geometry {
     /// The geometry that `spec` describes, with the pixels of its normal map if it has one.
     ///
     /// # Errors
-    /// [`SceneError::MissingNormals`] without the map it needs, [`SceneError::Size`] for a map of another size, and those of
+    /// [`SceneError::MissingNormals`] if the map is missing, [`SceneError::Size`] if it has another size, and those of
     /// [`Geometry::sphere`] and [`Geometry::normals`].
     pub fn from_spec(spec: &GeometrySpec, normals: Option<&Image>) -> Result<Self, SceneError> {
         let (width, height) = (spec.width as usize, spec.height as usize);
@@ -95,7 +95,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn spheres_and_maps_survive_the_wire_bit_for_bit() {
+    fn the_wire_form_keeps_spheres_and_maps_bit_for_bit() {
         let camera = Camera::Perspective { vertical_fov_deg: 33.3 };
         let sphere = Geometry::sphere(64, 48, Circle { x: 30.1, y: 20.2, radius: 15.3 }, camera).unwrap();
         let text = serde_json::to_string(&sphere.spec()).unwrap();

@@ -1,13 +1,13 @@
-//! The built-in object: a sphere of radius 1 at the origin, seen so that it fills a given circle of the photo.
+//! The built-in object: a sphere of radius 1 at the origin that fills a given circle of the photo.
 //!
-//! Orthographic: the point (x, y) of the photo sees the normal with components (x - cx)/R, (cy - y)/R.
+//! Orthographic: the normal at the point (x, y) of the photo has the components (x - cx)/R, (cy - y)/R.
 //!
-//! Perspective: the camera's distance follows from the circle. The axis of the camera meets the middle of the photo and
-//! points along -Z whether or not the circle lies there; a sphere away from the middle is seen obliquely, as it was when the photo
-//! was taken, from a camera that is moved sideways while the sphere stays at the origin (the light is infinitely far away,
-//! so nothing else changes). Its silhouette is then an ellipse, longest along the line from the middle of the photo
-//! through the circle's centre; it is made to touch the circle at both ends of that line and lies inside it. Around the middle
-//! the two agree exactly.
+//! Perspective: the distance of the camera follows from the circle. The axis of the camera passes through the middle of
+//! the photo along -Z, also if the circle lies elsewhere. The camera then sees the sphere obliquely, as it did when the
+//! photo was taken. In the scene the camera is moved sideways and the sphere stays at the origin, which is the same
+//! because the light is infinitely far away. The silhouette of such a sphere is an ellipse, longest along the line from
+//! the middle of the photo through the centre of the circle. It touches the circle at both ends of that line and lies
+//! inside it. In the middle of the photo ellipse and circle are the same.
 
 use super::camera::Pinhole;
 use super::{Camera, Circle, SceneError, SurfacePoint};
@@ -32,8 +32,8 @@ impl Sphere {
     /// The sphere that fills `circle` in a photo of `width` x `height` pixels taken by `camera`.
     ///
     /// # Errors
-    /// [`SceneError::Circle`] or [`SceneError::Camera`] for values out of range, [`SceneError::CircleOutside`] when the
-    /// circle does not meet the photo.
+    /// [`SceneError::Circle`] or [`SceneError::Camera`] for values out of range, [`SceneError::CircleOutside`] if the
+    /// circle lies outside the photo.
     pub fn new(width: usize, height: usize, circle: Circle, camera: Camera) -> Result<Self, SceneError> {
         let Circle { x, y, radius } = Circle::new(circle.x, circle.y, circle.radius)?;
         camera.check()?;
@@ -47,14 +47,14 @@ impl Sphere {
         Ok(Self { circle, view })
     }
 
-    /// The circle the silhouette touches.
+    /// The circle that the silhouette touches.
     #[must_use]
     pub fn circle(&self) -> Circle {
         self.circle
     }
 
-    /// The surface seen through the point (x, y) of the photo, in pixels; none beside the sphere. The normal always
-    /// faces the camera.
+    /// The surface at the point (x, y) of the photo, in pixels; `None` outside the sphere. The normal always faces the
+    /// camera.
     #[must_use]
     #[inline]
     pub fn point(&self, x: f64, y: f64) -> Option<SurfacePoint> {
@@ -68,18 +68,18 @@ impl Sphere {
                 (position - ray * position.dot(ray), ray)
             }
         };
-        // The ray's point nearest to the centre, then back along the ray to the surface.
+        // From the point of the ray nearest to the sphere's centre, back along the ray to the surface.
         let square = 1.0 - nearest.length_squared();
         (square > 0.0).then(|| SurfacePoint { normal: nearest - ray * square.sqrt(), view: -ray })
     }
 }
 
-/// Where the camera is, seen from the sphere's centre.
+/// The position of the camera, relative to the sphere's centre.
 fn position(circle: Circle, pinhole: Pinhole) -> Vec3 {
     let (right, up) = (circle.x - pinhole.x, pinhole.y - circle.y);
     let offset = (right * right + up * up).sqrt();
     let [right, up] = if offset > 0.0 { [right / offset, up / offset] } else { [1.0, 0.0] };
-    // The silhouette's cone, in the plane of the camera's axis and the circle's centre.
+    // The cone of the silhouette, in the plane through the camera's axis and the circle's centre.
     let near = angle(offset - circle.radius, pinhole.focal_px);
     let far = angle(offset + circle.radius, pinhole.focal_px);
     let (sin_axis, cos_axis) = sin_cos(0.5 * (near + far));

@@ -1,39 +1,39 @@
-//! The box a search stays in, and how each coordinate is scaled inside it.
+//! The box of a search, and the scale of each coordinate inside it.
 //!
-//! A search moves in *scaled* coordinates t; its caller sees *natural* ones x:
+//! A search works in *scaled* coordinates t; its caller uses *natural* coordinates x:
 //!
-//! | scale | x(t) | t runs over |
+//! | scale | x(t) | range of t |
 //! |---|---|---|
 //! | [`Scale::Unscaled`] | t | \[lower, upper\], either may be infinite |
 //! | [`Scale::Linear`] | lower + t (upper - lower) | \[0, 1\] |
 //! | [`Scale::Logarithmic`] | lower (upper / lower)^t | \[0, 1\] |
 //! | [`Scale::OffsetLogarithmic`] | lower + s ((1 + 1/k)^t - 1), s = k (upper - lower), k = [`OFFSET`] | \[0, 1\] |
 //!
-//! The scaling is ours, not MATLAB's: `patternsearch` has `ScaleMesh`, which derives a scale from the start, and takes
-//! no account of bounds. Scaling by the bounds makes one mesh size mean the same fraction of every parameter's range,
-//! whatever its unit, and does not depend on where a search starts.
+//! This scaling differs from MATLAB's: the `ScaleMesh` of `patternsearch` derives a scale from the start and ignores
+//! the bounds. With scaling by the bounds, one mesh size is the same fraction of every parameter's range, whatever its
+//! unit, and does not depend on the start.
 //!
 //! Bounds map to bounds exactly: t = 0 is `lower` and t = 1 is `upper` to the bit. A range of one value (lower ==
-//! upper) is a fixed parameter: its t stays 0.
+//! upper) is a fixed parameter: its t is always 0.
 
 use super::error::{SearchError, check_dimension};
 use crate::math::elementary::{exp, ln};
 
-/// How a coordinate is stretched for the search.
+/// The scale of a coordinate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Scale {
-    /// As it is: a mesh size of 1 is one unit of the parameter.
+    /// No scaling: a mesh size of 1 is one unit of the parameter.
     Unscaled,
     /// The range becomes \[0, 1\]; both bounds must be finite.
     Linear,
     /// The logarithm of the range becomes \[0, 1\]; both bounds must be finite and above 0.
     Logarithmic,
-    /// About linear in the first hundredth of the range ([`OFFSET`]), about logarithmic above it: equal steps look about equal where
-    /// the parameter is a reflectance, and the lower bound may be 0. Both bounds must be finite.
+    /// About linear in the first hundredth of the range ([`OFFSET`]) and about logarithmic above it. Equal steps of a
+    /// reflectance then look about equal, and the lower bound may be 0. Both bounds must be finite.
     OffsetLogarithmic,
 }
 
-/// Where [`Scale::OffsetLogarithmic`] turns from linear to logarithmic, as a share of the range.
+/// The fraction of the range at which [`Scale::OffsetLogarithmic`] changes from linear to logarithmic.
 pub const OFFSET: f64 = 0.01;
 
 /// A box: lower <= upper in every coordinate, each with its scale. Never empty.
@@ -48,7 +48,7 @@ impl Bounds {
     /// A box with a scale per coordinate.
     ///
     /// # Errors
-    /// When the lengths differ, there is no coordinate, a range is empty or NaN, or a scale does not fit its range.
+    /// If the lengths differ, there is no coordinate, a range is empty or NaN, or a scale cannot map its range.
     pub fn new(lower: Vec<f64>, upper: Vec<f64>, scales: Vec<Scale>) -> Result<Self, SearchError> {
         if lower.is_empty() {
             return Err(SearchError::NoParameters);
@@ -93,13 +93,13 @@ impl Bounds {
         &self.scales
     }
 
-    /// Whether a natural point has the box's dimension and lies in it, bounds included. NaN lies nowhere.
+    /// Whether a natural point has the box's dimension and lies in the box, bounds included. False for NaN.
     #[must_use]
     pub fn contains(&self, point: &[f64]) -> bool {
         point.len() == self.dimension() && self.check_inside(point).is_ok()
     }
 
-    /// Moves every coordinate of a natural point to the nearest value in the box; NaN stays NaN.
+    /// Clamps every coordinate of a natural point to its bounds; NaN stays NaN.
     pub fn clamp(&self, point: &mut [f64]) {
         for (i, x) in point.iter_mut().enumerate().take(self.dimension()) {
             *x = x.clamp(self.lower[i], self.upper[i]);
@@ -167,7 +167,7 @@ impl Bounds {
         (0..self.dimension()).map(|i| (self.to_scaled(i, a[i]) - self.to_scaled(i, b[i])).abs()).fold(0.0, f64::max)
     }
 
-    /// The error for a start of the wrong length or outside the box.
+    /// Returns an error if the start has the wrong length or lies outside the box.
     pub(super) fn check_start(&self, start: &[f64]) -> Result<(), SearchError> {
         check_dimension("the start", self.dimension(), start.len())?;
         self.check_inside(start)
@@ -195,8 +195,8 @@ fn stretch() -> f64 {
 }
 
 fn check_range(index: usize, lower: f64, upper: f64, scale: Scale) -> Result<(), SearchError> {
-    let ordered = lower <= upper && lower < f64::INFINITY && upper > f64::NEG_INFINITY;
-    if !ordered {
+    let is_ordered = lower <= upper && lower < f64::INFINITY && upper > f64::NEG_INFINITY;
+    if !is_ordered {
         return Err(SearchError::EmptyRange { index, lower, upper });
     }
     let expected = match scale {
@@ -229,7 +229,7 @@ mod tests {
         assert_eq!(bounds.to_natural(0, 0.5), 1.0);
         assert!((bounds.to_natural(1, 0.5) - 0.005_f64.sqrt()).abs() < 1e-15);
         assert_eq!(bounds.to_natural(2, -40.0), -40.0);
-        // A hundredth of the range lies at ln 2 / ln 101.
+        // A hundredth of the range is at t = ln 2 / ln 101.
         assert!((bounds.to_scaled(4, 0.02) - 0.150_190).abs() < 1e-6);
         assert!((bounds.to_natural(4, bounds.to_scaled(4, 0.02)) - 0.02).abs() < 1e-15);
         assert_eq!(bounds.scaled_range(3), (0.0, 0.0));
@@ -259,7 +259,7 @@ mod tests {
     }
 
     #[test]
-    fn inside_includes_the_bounds_and_nothing_else() {
+    fn a_point_is_inside_if_and_only_if_it_is_within_the_bounds() {
         let bounds = Bounds::linear(&[0.0, 0.0], &[1.0, 2.0]).unwrap();
         assert!(bounds.contains(&[0.0, 2.0]) && !bounds.contains(&[0.0, 2.1]) && !bounds.contains(&[f64::NAN, 1.0]));
         assert!(!bounds.contains(&[0.5]));

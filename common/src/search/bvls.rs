@@ -1,23 +1,24 @@
-//! BVLS: linear least squares with bounds on the variables, for a handful of variables given by their normal equations.
+//! BVLS: linear least squares with bounds on the variables, for a few variables, given by the normal equations.
 //!
 //! Minimises `|A x - b|^2`, that is `x^T (A^T A) x / 2 - (A^T b)^T x` up to constants, over lower <= x <= upper.
 //!
 //! Source: Stark & Parker, *Bounded-Variable Least-Squares: an Algorithm and Applications* (Computational Statistics
-//! 10, 1995). Variables are free or at a bound. Free ones take their unconstrained minimum, going only as far as the
-//! first bound on the way, whose variable then stays there. At the minimum of the free ones, the bound variable whose
-//! gradient pulls inwards hardest is freed, until none pulls: the Karush-Kuhn-Tucker conditions, sufficient as the
-//! problem is convex.
+//! 10, 1995). Variables are free or at a bound. The free variables move towards their unconstrained minimum. If one of
+//! them reaches a bound on the way, it is fixed there and the others continue. At the minimum over the free variables,
+//! the variable at a bound with the steepest descent into the box is freed. The search ends when no variable at a bound
+//! has descent into the box. These are the Karush-Kuhn-Tucker conditions, which are sufficient because the problem is
+//! convex.
 //!
-//! Ours differs in two ways. It works on the normal equations (Stark & Parker: a QR factorisation of A), because these
-//! are what many pixels sum to. And freeing a variable is undone unless it lowers the objective by a positive amount,
-//! measured from the step itself; that rules out cycling, for which they test the sign of one step.
+//! This version differs in two ways. It works on the normal equations (Stark & Parker: on a QR factorisation of A),
+//! because the residuals of many pixels are summed to them. And freeing a variable is undone unless it lowers the
+//! objective, as computed from the step. That prevents cycling; Stark & Parker test the sign of one step.
 //!
-//! A singular `A^T A` is no fault: among equal minima one is returned, dependent variables staying where they were.
+//! `A^T A` may be singular: one of the equal minima is returned, and dependent variables keep their values.
 
 use super::error::{SearchError, check_dimension};
 use super::normal_equations::NormalEquations;
 
-/// Where a variable stands.
+/// The state of a variable.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum BoundState {
     /// Between its bounds.
@@ -31,17 +32,17 @@ pub enum BoundState {
 /// The minimum of a bounded linear least-squares problem.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BoundedSolution {
-    /// The minimum; a variable at a bound equals it to the bit.
+    /// The minimum. A variable at a bound is equal to it to the bit.
     pub point: Vec<f64>,
-    /// Where each variable stands.
+    /// The state of each variable.
     pub states: Vec<BoundState>,
 }
 
-/// Solves the problem whose `A^T A` and `A^T b` are `normal`, starting from 0 moved into the box. Bounds may be
-/// infinite where `A^T A` is regular.
+/// Solves the problem whose `A^T A` and `A^T b` are `normal`, starting from 0 clamped to the box. Bounds may be
+/// infinite if `A^T A` is regular.
 ///
 /// # Errors
-/// When a bound has the wrong length, a range is empty or NaN, or the normal equations are not finite.
+/// If a bound has the wrong length, a range is empty or NaN, or the normal equations are not finite.
 pub fn solve(normal: &NormalEquations, lower: &[f64], upper: &[f64]) -> Result<BoundedSolution, SearchError> {
     let n = normal.dimension();
     check_dimension("the lower bound", n, lower.len())?;
@@ -55,12 +56,13 @@ pub fn solve(normal: &NormalEquations, lower: &[f64], upper: &[f64]) -> Result<B
         return Err(SearchError::NormalNotFinite);
     }
     let mut set = ActiveSet::new(normal, lower, upper);
-    set.settle();
-    set.free_while_it_helps();
+    set.minimise_free();
+    set.free_bound_variables();
     Ok(BoundedSolution { point: set.point, states: set.states })
 }
 
-/// The iterate: always inside the box, and after [`settle`](Self::settle) at the minimum over its free variables.
+/// The iterate: always inside the box; after [`minimise_free`](Self::minimise_free), at the minimum over its free
+/// variables.
 #[derive(Debug)]
 struct ActiveSet<'a> {
     normal: &'a NormalEquations,
@@ -74,22 +76,22 @@ impl<'a> ActiveSet<'a> {
     fn new(normal: &'a NormalEquations, lower: &'a [f64], upper: &'a [f64]) -> Self {
         let point: Vec<f64> = lower.iter().zip(upper).map(|(&lower, &upper)| 0.0_f64.clamp(lower, upper)).collect();
         let mut set = Self { normal, lower, upper, point, states: vec![BoundState::Free; lower.len()] };
-        (0..set.point.len()).for_each(|i| set.hold_at_bound(i));
+        (0..set.point.len()).for_each(|i| set.fix_at_bound(i));
         set
     }
 
-    /// Moves the free variables to their minimum, holding at its bound each that meets one on the way.
-    fn settle(&mut self) {
-        // Every round but the last holds at least one more variable.
+    /// Moves the free variables to their minimum. A variable that reaches a bound on the way is fixed there.
+    fn minimise_free(&mut self) {
+        // Every round but the last fixes at least one more variable.
         for _ in 0..=self.point.len() {
             let step = self.free_step();
-            let fraction = (0..step.len()).map(|i| self.room(i, step[i])).fold(1.0, f64::min);
+            let fraction = (0..step.len()).map(|i| self.fraction_to_bound(i, step[i])).fold(1.0, f64::min);
             for (i, &step) in step.iter().enumerate().filter(|&(_, &step)| step != 0.0) {
-                let blocks = fraction < 1.0 && self.room(i, step) <= fraction;
+                let blocks = fraction < 1.0 && self.fraction_to_bound(i, step) <= fraction;
                 let bound = if step < 0.0 { self.lower[i] } else { self.upper[i] };
                 self.point[i] = if blocks { bound } else { self.point[i] + fraction * step };
                 self.point[i] = self.point[i].clamp(self.lower[i], self.upper[i]);
-                self.hold_at_bound(i);
+                self.fix_at_bound(i);
             }
             if fraction >= 1.0 {
                 return;
@@ -97,17 +99,17 @@ impl<'a> ActiveSet<'a> {
         }
     }
 
-    /// Frees bound variables one at a time while that lowers the objective.
-    fn free_while_it_helps(&mut self) {
+    /// Frees variables at bounds, one at a time, while that lowers the objective.
+    fn free_bound_variables(&mut self) {
         let n = self.point.len();
         let mut tried = vec![false; n];
-        // In exact arithmetic each success reaches a new face of the box; this many of them are never needed in
-        // practice, and end the search should rounding make it wander among equal points.
-        for _ in 0..SWEEPS * (n + 1) * (n + 1) {
-            let Some(i) = self.hardest_pull(&tried) else { return };
+        // In exact arithmetic each success reaches a new face of the box. The limit is far above what is needed in
+        // practice; it ends the search if rounding makes it move among equal points.
+        for _ in 0..ATTEMPTS * (n + 1) * (n + 1) {
+            let Some(i) = self.steepest_at_bound(&tried) else { return };
             let (point, states, pull) = (self.point.clone(), self.states.clone(), self.descent());
             self.states[i] = BoundState::Free;
-            self.settle();
+            self.minimise_free();
             if self.decrease_since(&point, &pull) > 0.0 {
                 tried.fill(false);
             } else {
@@ -117,7 +119,7 @@ impl<'a> ActiveSet<'a> {
         }
     }
 
-    /// The unconstrained step to the minimum over the free variables; 0 for the others.
+    /// The unconstrained step to the minimum over the free variables; 0 for all others.
     fn free_step(&self) -> Vec<f64> {
         let free: Vec<usize> = (0..self.point.len()).filter(|&i| self.states[i] == BoundState::Free).collect();
         let descent = self.descent();
@@ -129,8 +131,8 @@ impl<'a> ActiveSet<'a> {
         step
     }
 
-    /// The fraction of `step` that variable `i` can take before it meets its bound; more than 1 if it does not.
-    fn room(&self, i: usize, step: f64) -> f64 {
+    /// The fraction of `step` after which variable `i` reaches its bound; above 1 if it does not reach it.
+    fn fraction_to_bound(&self, i: usize, step: f64) -> f64 {
         if step == 0.0 {
             return f64::INFINITY;
         }
@@ -144,10 +146,10 @@ impl<'a> ActiveSet<'a> {
         product.into_iter().enumerate().map(|(i, product)| self.normal.vector(i) - product).collect()
     }
 
-    /// The untried bound variable with the largest descent into the box, in units of its own column, if any is above
-    /// the rounding of its gradient.
-    fn hardest_pull(&self, tried: &[bool]) -> Option<usize> {
-        let mut hardest = None;
+    /// The variable at a bound, not yet tried, with the steepest descent into the box, in units of its column. `None`
+    /// if no descent exceeds the rounding error of the gradient.
+    fn steepest_at_bound(&self, tried: &[bool]) -> Option<usize> {
+        let mut steepest = None;
         let mut largest = 0.0;
         for (i, descent) in self.descent().into_iter().enumerate().filter(|&(i, _)| !tried[i]) {
             let inwards = match self.states[i] {
@@ -157,10 +159,10 @@ impl<'a> ActiveSet<'a> {
             };
             let pull = inwards / self.normal.matrix(i, i).sqrt();
             if inwards > self.rounding(i) && pull > largest {
-                (hardest, largest) = (Some(i), pull);
+                (steepest, largest) = (Some(i), pull);
             }
         }
-        hardest
+        steepest
     }
 
     /// A bound on the rounding error of component `i` of the gradient.
@@ -170,14 +172,14 @@ impl<'a> ActiveSet<'a> {
         (n + 1) as f64 * f64::EPSILON * (self.normal.vector(i).abs() + terms)
     }
 
-    /// How much lower the objective is here than at `point`, where the negative gradient was `descent`.
+    /// The decrease of the objective since `point`, where the negative gradient was `descent`.
     fn decrease_since(&self, point: &[f64], descent: &[f64]) -> f64 {
         let step: Vec<f64> = self.point.iter().zip(point).map(|(new, old)| new - old).collect();
         let curved = self.normal.times(&step);
         (0..step.len()).map(|i| step[i] * (descent[i] - 0.5 * curved[i])).sum()
     }
 
-    fn hold_at_bound(&mut self, i: usize) {
+    fn fix_at_bound(&mut self, i: usize) {
         if self.point[i] == self.lower[i] {
             self.states[i] = BoundState::AtLower;
         } else if self.point[i] == self.upper[i] {
@@ -186,8 +188,8 @@ impl<'a> ActiveSet<'a> {
     }
 }
 
-/// Attempts to free a variable, per square of the number of variables.
-const SWEEPS: usize = 10;
+/// The limit of attempts to free a variable, per square of the number of variables plus one.
+const ATTEMPTS: usize = 10;
 
 #[cfg(test)]
 mod tests;

@@ -1,31 +1,31 @@
-//! Checks of analytic derivatives against differences, for tests.
+//! Checks of analytic derivatives against finite differences, for tests.
 //!
-//! Central differences at steps h and h/2, extrapolated to remove the h^2 term (Richardson): the error is of order h^4
-//! plus rounding of order 1e-16 / h. With h a thousandth of the scale on which a function bends, ten digits or so.
+//! Central differences at steps h and h/2, extrapolated to remove the h^2 term (Richardson). The error is of order h^4
+//! plus rounding of order 1e-16 / h: about ten digits if h is a thousandth of the scale on which the slope changes.
 
 use super::least_squares::LeastSquaresProblem;
 use super::normal_equations::NormalEquations;
 
-/// The worst disagreement between an analytic and a numeric derivative.
+/// The largest difference between an analytic and a numeric derivative.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct DerivativeCheck {
-    /// Which function: a residual's index, or 0.
+    /// Index of the function (the residual), or 0.
     pub(crate) row: usize,
-    /// Which parameter.
+    /// Index of the parameter.
     pub(crate) column: usize,
-    /// The derivative as given.
+    /// The analytic derivative.
     pub(crate) analytic: f64,
-    /// The derivative by differences.
+    /// The derivative by finite differences.
     pub(crate) numeric: f64,
-    /// Their difference in units of the largest derivative by this parameter; NaN when either is not a number.
+    /// Their difference in units of the largest derivative by this parameter; NaN if either is NaN.
     pub(crate) error: f64,
 }
 
-/// Compares a Jacobian, row-major m x n at `point`, with differences of `functions` (n values to m), with step
-/// `steps[i]` > 0 in parameter i. Every point within the steps must be in the functions' domain.
+/// Compares a Jacobian (row-major m x n at `point`) with finite differences of `functions` (n values to m), with step
+/// `steps[i]` > 0 in parameter i. Every point within the steps must be in the domain of the functions.
 ///
 /// # Panics
-/// When lengths do not fit.
+/// If lengths do not match.
 #[must_use]
 pub(crate) fn check_jacobian(
     mut functions: impl FnMut(&[f64]) -> Vec<f64>,
@@ -44,7 +44,7 @@ pub(crate) fn check_jacobian(
         for (row, &numeric) in numeric.iter().enumerate() {
             let difference = (analytic(row) - numeric).abs();
             let error = if difference == 0.0 { 0.0 } else { difference / largest };
-            // NaN is worse than anything, and stays.
+            // NaN counts as the largest error.
             if !worst.error.is_nan() && (error.is_nan() || error > worst.error) {
                 worst = DerivativeCheck { row, column, analytic: analytic(row), numeric, error };
             }
@@ -56,7 +56,7 @@ pub(crate) fn check_jacobian(
 /// Compares a problem's `J^T r` at `point` with half the differences of its cost, as [`check_jacobian`] does.
 ///
 /// # Panics
-/// When lengths do not fit.
+/// If lengths do not match.
 #[must_use]
 pub(crate) fn check_gradient(problem: &mut dyn LeastSquaresProblem, point: &[f64], steps: &[f64]) -> DerivativeCheck {
     let mut normal = NormalEquations::new(problem.dimension());
@@ -87,7 +87,7 @@ mod tests {
     }
 
     #[test]
-    fn right_jacobian_agrees_to_ten_digits() {
+    fn a_correct_jacobian_agrees_to_ten_digits() {
         let (x, y) = (1.3, -0.4);
         let jacobian = [2.0 * x * y, x * x, 0.0, crate::math::elementary::exp(y), 1.0, 0.0];
         let check = check_jacobian(functions, &jacobian, &[x, y], &[1e-3, 1e-3]);
@@ -95,7 +95,7 @@ mod tests {
     }
 
     #[test]
-    fn wrong_or_missing_derivative_is_found_where_it_is() {
+    fn a_wrong_or_missing_derivative_is_located() {
         let (x, y) = (1.3, -0.4);
         let mut jacobian = [2.0 * x * y, x * x, 0.0, crate::math::elementary::exp(y), 1.0, 0.0];
         jacobian[3] *= 1.001;
@@ -107,7 +107,7 @@ mod tests {
     }
 
     #[test]
-    fn gradients_of_the_test_problems_are_right() {
+    fn gradients_of_the_test_problems_are_correct() {
         assert!(check_gradient(&mut Rosenbrock, &[-1.2, 1.0], &[1e-3, 1e-3]).error < 1e-9);
         assert!(check_gradient(&mut Exponential, &[2.0, -0.7, 0.4], &[1e-3; 3]).error < 1e-9);
     }

@@ -1,6 +1,6 @@
-//! What can be wrong with the inputs of a search.
+//! Errors in the inputs of a search.
 
-/// A search that cannot start, or bounds that make no box.
+/// Inputs with which a search cannot start.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SearchError {
@@ -15,12 +15,12 @@ pub enum SearchError {
         found: usize,
     },
     /// A box without parameters.
-    #[error("the bounds have no coordinates, expected at least one parameter to search")]
+    #[error("the bounds have no coordinates, expected at least one: give bounds for each parameter")]
     NoParameters,
     /// A lower bound above its upper bound, or not a number.
     #[error("bounds of parameter {index} are [{lower}, {upper}], expected lower <= upper: swap or correct them")]
     EmptyRange {
-        /// Which parameter, from 0.
+        /// Index of the parameter, from 0.
         index: usize,
         /// Its lower bound.
         lower: f64,
@@ -28,21 +28,23 @@ pub enum SearchError {
         upper: f64,
     },
     /// A range that its scale cannot map to the unit interval.
-    #[error("bounds of parameter {index} are [{lower}, {upper}], expected {expected} for its scale")]
+    #[error(
+        "bounds of parameter {index} are [{lower}, {upper}], expected {expected}: correct them or choose another scale"
+    )]
     UnscalableRange {
-        /// Which parameter, from 0.
+        /// Index of the parameter, from 0.
         index: usize,
         /// Its lower bound.
         lower: f64,
         /// Its upper bound.
         upper: f64,
-        /// What the scale needs.
+        /// The bounds that the scale requires.
         expected: &'static str,
     },
     /// A start outside the box, or not a number.
-    #[error("start of parameter {index} is {value}, expected a value in [{lower}, {upper}]: move it inside")]
+    #[error("start of parameter {index} is {value}, expected a value in [{lower}, {upper}]: start inside the bounds")]
     StartOutside {
-        /// Which parameter, from 0.
+        /// Index of the parameter, from 0.
         index: usize,
         /// Its value.
         value: f64,
@@ -51,16 +53,18 @@ pub enum SearchError {
         /// Its upper bound.
         upper: f64,
     },
-    /// The objective, or its derivative, is not finite where the search starts.
-    #[error("{what} at the start {point:?} is not finite, expected a number: start elsewhere")]
+    /// The objective or its derivative is not finite at the start.
+    #[error("{what} at the start {point:?} is not finite, expected a finite number: choose another start")]
     NotFinite {
         /// The quantity.
         what: &'static str,
-        /// Where.
+        /// The start.
         point: Vec<f64>,
     },
-    /// Normal equations with NaN or infinity.
-    #[error("the normal equations hold a value that is not finite, expected numbers: look for NaN among the residuals")]
+    /// Normal equations that contain NaN or infinity.
+    #[error(
+        "the normal equations contain a value that is not finite: check the residuals and their derivatives for NaN"
+    )]
     NormalNotFinite,
     /// An option outside its range.
     #[error("search option {name} is {found}, expected {expected}")]
@@ -74,12 +78,12 @@ pub enum SearchError {
     },
 }
 
-/// The error for `found` coordinates of `what` where the box has `expected`.
+/// Returns an error if `what` has a number of coordinates other than that of the box, `expected`.
 pub(super) fn check_dimension(what: &'static str, expected: usize, found: usize) -> Result<(), SearchError> {
     if expected == found { Ok(()) } else { Err(SearchError::Dimension { what, expected, found }) }
 }
 
-/// The error for an option whose value is not `valid`.
+/// Returns an error if an option's value is not `valid`.
 pub(super) fn check_option(
     name: &'static str,
     found: f64,

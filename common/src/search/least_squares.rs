@@ -1,27 +1,27 @@
-//! Levenberg-Marquardt for residuals r(x) in R^m over a box, m up to hundreds of thousands, n a handful.
+//! Levenberg-Marquardt for residuals r(x) in R^m over a box, with m up to hundreds of thousands and a few parameters n.
 //!
 //! Minimises `|r(x)|^2`. With J the Jacobian, each iteration takes the step d that minimises the damped linear model
-//! `|r + J d|^2 + mu |D d|^2` *over the box itself*: a bounded linear least-squares problem that [`bvls`] solves
-//! exactly. So a coordinate that belongs at its bound gets there in one step and equals it to the bit, one that wants
-//! to leave does, and no step is cut short or projected. The step vanishes exactly where the Karush-Kuhn-Tucker
-//! conditions of the box hold.
+//! `|r + J d|^2 + mu |D d|^2` *over the box*: a bounded linear least-squares problem that [`bvls`] solves exactly. So a
+//! coordinate whose minimum is at a bound reaches it in one step and is equal to it to the bit, a coordinate at a bound
+//! can leave it, and no step is shortened or projected. The step is 0 if and only if the Karush-Kuhn-Tucker conditions
+//! of the box hold.
 //!
-//! - Damping mu: Nielsen, *Damping Parameter in Marquardt's Method* (IMM-REP-1999-05), the rule of Madsen,
-//!   Nielsen & Tingleff, *Methods for Non-Linear Least Squares Problems* (2004). It stays above a floor, so that a
-//!   singular `J^T J` (two parameters that the residuals cannot tell apart) still gives a bounded step: the
-//!   undetermined combination stays put.
-//! - D^2: the largest diagonal of `J^T J` seen so far (More 1978), which makes the path independent of units.
+//! - Damping mu: Nielsen, *Damping Parameter in Marquardt's Method* (IMM-REP-1999-05), the rule of Madsen, Nielsen &
+//!   Tingleff, *Methods for Non-Linear Least Squares Problems* (2004). It has a minimum above 0, so that a singular
+//!   `J^T J` (two parameters that the residuals do not distinguish) gives a bounded step, which does not change the
+//!   undetermined combination.
+//! - D^2: the largest diagonal of `J^T J` so far (More 1978), which makes the path independent of units.
 //! - Bounds: Kanzow, Yamashita & Fukushima, *Levenberg-Marquardt Methods with Strong Local Convergence Properties for
-//!   Solving Nonlinear Equations with Convex Constraints* (J. Comput. Appl. Math. 172, 2004) show local quadratic
-//!   convergence of this constrained step; they damp by the residual, we by Nielsen's rule.
+//!   Solving Nonlinear Equations with Convex Constraints* (J. Comput. Appl. Math. 172, 2004) prove local quadratic
+//!   convergence of this constrained step. They damp by the residual, this code by Nielsen's rule.
 //!
 //! Coordinates are scaled by the box (see [`bounds`](super::bounds)), so a logarithmic parameter is searched in its
-//! logarithm; problems are stated in natural parameters and the chain rule is applied here.
+//! logarithm. Problems use natural parameters; the chain rule is applied here.
 //!
 //! Why not a crate: `levenberg-marquardt` 0.13 (MINPACK's `lmder`) has no bounds and stores J; `argmin` 0.10 has
-//! Gauss-Newton without bounds; `basin` has bounded variants on a stored J and a linear-algebra backend. None takes
-//! normal equations, which is what keeps 200,000 rows out of memory, and the same bits on every platform need an
-//! elimination whose order is ours.
+//! Gauss-Newton without bounds; `basin` has bounded variants on a stored J and a linear-algebra backend. They do not
+//! accept normal equations, which avoid storing 200,000 rows. And equal bits on every platform need a fixed order of
+//! elimination.
 
 use super::bounds::Bounds;
 use super::bvls::{self, BoundState};
@@ -30,7 +30,7 @@ use super::normal_equations::NormalEquations;
 use super::termination::{Progress, Termination};
 use std::ops::ControlFlow;
 
-/// Residuals r(x) of a few parameters, seen through their sum of squares and their normal equations.
+/// Residuals r(x) of a few parameters, given by their sum of squares and their normal equations.
 pub trait LeastSquaresProblem {
     /// Number of parameters n.
     fn dimension(&self) -> usize;
@@ -38,8 +38,8 @@ pub trait LeastSquaresProblem {
     /// The sum of squares `|r(x)|^2` at a natural point of the box. A value that is not finite rejects the point.
     fn cost(&mut self, point: &[f64]) -> f64;
 
-    /// Adds `J^T J` and `J^T r` at a natural point to `normal`, which is zero: by
-    /// [`add_row`](NormalEquations::add_row) per residual, or by blocks. Called only where the cost is finite.
+    /// Adds `J^T J` and `J^T r` at a natural point to `normal`, which is zero, with one
+    /// [`add_row`](NormalEquations::add_row) per residual or in blocks. It is called only where the cost is finite.
     /// Values that are not finite reject the point.
     fn linearise(&mut self, point: &[f64], normal: &mut NormalEquations);
 }
@@ -47,14 +47,14 @@ pub trait LeastSquaresProblem {
 /// Settings of a least-squares search.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LeastSquaresOptions {
-    /// The search ends when the cosine of the angle between the residuals and every column of J that can be followed
-    /// inside the box is at most this (MINPACK's gtol). At least 0.
+    /// The search ends when the cosine of the angle between the residuals and each column of J with descent inside the
+    /// box is at most this (MINPACK's gtol). At least 0.
     pub gradient_tolerance: f64,
-    /// The search ends when a step, in scaled coordinates, is at most this fraction of the point's length plus this. At
+    /// The search ends when a step, in scaled coordinates, is at most this times (the length of the point + this). At
     /// least 0.
     pub step_tolerance: f64,
-    /// The search ends when both the actual and the predicted change of the cost are at most this fraction of it. At
-    /// least 0.
+    /// The search ends when both the actual and the predicted change of the cost are at most this fraction of the cost.
+    /// At least 0.
     pub cost_tolerance: f64,
     /// First damping mu, in units of the squared column lengths, above 0.
     pub initial_damping: f64,
@@ -63,8 +63,8 @@ pub struct LeastSquaresOptions {
 }
 
 impl Default for LeastSquaresOptions {
-    /// Tolerances at the level where doubling the digits would change no figure that is reported; damping as
-    /// recommended by Madsen, Nielsen & Tingleff for a start of moderate quality.
+    /// The tolerances are so small that tighter ones change no reported figure. The damping is what Madsen, Nielsen &
+    /// Tingleff recommend for a start of moderate quality.
     fn default() -> Self {
         Self {
             gradient_tolerance: 1e-10,
@@ -88,13 +88,13 @@ impl LeastSquaresOptions {
     }
 }
 
-/// What a least-squares search found.
+/// The result of a least-squares search.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Minimum {
     /// The best point, natural, inside the box.
     pub point: Vec<f64>,
-    /// The sum of squares there: what [`LeastSquaresProblem::cost`] returned for exactly this point, at most that at
-    /// the start.
+    /// The sum of squares that [`LeastSquaresProblem::cost`] returned for exactly this point; at most that at the
+    /// start.
     pub value: f64,
     /// Calls of `cost`.
     pub evaluations: usize,
@@ -102,17 +102,17 @@ pub struct Minimum {
     pub iterations: usize,
     /// Why the search ended.
     pub termination: Termination,
-    /// Which coordinates equal a bound.
+    /// Whether each coordinate is equal to a bound.
     pub states: Vec<BoundState>,
-    /// `J^T J` and `J^T r` at the point, in natural parameters. [`NormalEquations::variances`] of the free parameters,
-    /// times the variance of the residuals, predicts the variances of the parameters.
+    /// `J^T J` and `J^T r` at the point, in natural parameters. Its [`NormalEquations::variances`] over the free
+    /// parameters, times the variance of the residuals, are the predicted variances of the parameters.
     pub normal: NormalEquations,
 }
 
 /// Minimises the problem's sum of squares over the box from `start`, a point of the box.
 ///
 /// # Errors
-/// When the problem or the start do not fit the box, the cost or its linearisation are not finite at the start, or an
+/// If the problem or the start does not fit the box, the cost or its linearisation is not finite at the start, or an
 /// option is out of range.
 pub fn minimise(
     problem: &mut dyn LeastSquaresProblem,
@@ -123,7 +123,7 @@ pub fn minimise(
     minimise_observed(problem, start, bounds, options, &mut |_| ControlFlow::Continue(()))
 }
 
-/// [`minimise`], showing its progress to `observe` after every evaluation; `Break` ends the search with the incumbent.
+/// [`minimise`] that calls `observe` after every evaluation. `Break` ends the search with the incumbent.
 ///
 /// # Errors
 /// As [`minimise`].
@@ -175,7 +175,7 @@ struct Incumbent {
     normal: NormalEquations,
 }
 
-/// A step of the damped model and what it promises.
+/// A step of the damped model with its predicted decrease.
 #[derive(Debug)]
 struct Step {
     scaled: Vec<f64>,
@@ -193,7 +193,7 @@ struct Damping {
 
 impl Search<'_> {
     fn run(&mut self) -> Result<Termination, SearchError> {
-        if self.tell().is_break() {
+        if self.report().is_break() {
             return Ok(Termination::Stopped);
         }
         loop {
@@ -204,14 +204,14 @@ impl Search<'_> {
             if step.scaled == self.incumbent.scaled {
                 return Ok(Termination::StepTolerance);
             }
-            // Not positive only by rounding: the model has nothing left to gain.
+            // The model predicts no decrease; a negative value is rounding.
             if step.predicted <= 0.0 {
                 return Ok(Termination::FunctionTolerance);
             }
             if self.evaluations >= self.options.max_evaluations {
                 return Ok(Termination::MaxEvaluations);
             }
-            if let Some(termination) = self.attempt(&step) {
+            if let Some(termination) = self.try_step(&step) {
                 return Ok(termination);
             }
         }
@@ -228,7 +228,7 @@ impl Search<'_> {
         let mut damped = normal.clone();
         let (mut lower, mut upper) = (vec![0.0; n], vec![0.0; n]);
         for i in 0..n {
-            // A column that was always empty is damped like a weak one, so that its coordinate stays put.
+            // A column that was always 0 is damped like a weak one, so that its coordinate does not change.
             let square = self.column_squares[i].max(largest * f64::EPSILON);
             damped.set_matrix(i, i, normal.matrix(i, i) + self.damping.mu * square);
             damped.set_vector(i, -normal.vector(i));
@@ -247,8 +247,8 @@ impl Search<'_> {
         Ok(self.incumbent.step_to(landing.collect()))
     }
 
-    /// Evaluates a step, takes it if it is better, and says whether the search is over.
-    fn attempt(&mut self, step: &Step) -> Option<Termination> {
+    /// Evaluates a step and takes it if it is better. Returns a reason if the search is over.
+    fn try_step(&mut self, step: &Step) -> Option<Termination> {
         let point: Vec<f64> = (0..step.scaled.len())
             .map(|i| match step.scaled[i] == self.incumbent.scaled[i] {
                 true => self.incumbent.point[i],
@@ -259,8 +259,8 @@ impl Search<'_> {
         self.evaluations += 1;
         let previous = self.incumbent.value;
         let decrease = previous - value;
-        let better = value.is_finite() && decrease > 0.0;
-        let next = if better { Incumbent::at(self.problem, self.bounds, point, value) } else { None };
+        let is_better = value.is_finite() && decrease > 0.0;
+        let next = if is_better { Incumbent::at(self.problem, self.bounds, point, value) } else { None };
         let length = norm(&self.incumbent.scaled);
         if let Some(mut next) = next {
             next.scaled.clone_from(&step.scaled);
@@ -270,7 +270,7 @@ impl Search<'_> {
         } else {
             self.damping.tighten();
         }
-        if self.tell().is_break() {
+        if self.report().is_break() {
             return Some(Termination::Stopped);
         }
         let negligible = self.options.cost_tolerance * previous;
@@ -281,7 +281,7 @@ impl Search<'_> {
         (step.length <= tolerance * (length + tolerance)).then_some(Termination::StepTolerance)
     }
 
-    fn tell(&mut self) -> ControlFlow<()> {
+    fn report(&mut self) -> ControlFlow<()> {
         let Incumbent { ref point, value, .. } = self.incumbent;
         (self.observe)(&Progress { evaluations: self.evaluations, iterations: self.iterations, value, point })
     }
@@ -306,7 +306,7 @@ impl Search<'_> {
 }
 
 impl Incumbent {
-    /// Linearises at a point of known, finite cost; none where the linearisation is not finite.
+    /// Linearises at a point of known, finite cost; `None` if the linearisation is not finite.
     fn at(problem: &mut dyn LeastSquaresProblem, bounds: &Bounds, point: Vec<f64>, value: f64) -> Option<Self> {
         let mut natural_normal = NormalEquations::new(point.len());
         problem.linearise(&point, &mut natural_normal);
@@ -322,15 +322,16 @@ impl Incumbent {
         })
     }
 
-    /// The largest cosine of the angle between the residuals and a column of J, among the coordinates that can descend.
+    /// The largest cosine of the angle between the residuals and a column of J, over the coordinates with descent
+    /// inside the box.
     fn largest_cosine(&self, bounds: &Bounds) -> f64 {
         let mut largest = 0.0;
         for (i, &t) in self.scaled.iter().enumerate() {
             let (first, last) = bounds.scaled_range(i);
             let gradient = self.normal.vector(i);
-            let blocked = (t <= first && gradient >= 0.0) || (t >= last && gradient <= 0.0);
+            let is_blocked = (t <= first && gradient >= 0.0) || (t >= last && gradient <= 0.0);
             let square = self.normal.matrix(i, i) * self.value;
-            if !blocked && square > 0.0 {
+            if !is_blocked && square > 0.0 {
                 largest = f64::max(largest, gradient.abs() / square.sqrt());
             }
         }
@@ -355,7 +356,8 @@ impl Damping {
 
     /// After a failure.
     fn tighten(&mut self) {
-        // Capped far above any useful damping, so that a hopeless neighbourhood ends in a tolerance, not in infinity.
+        // The cap is far above any useful damping. Without it repeated failures would lead to infinity, not to a
+        // tolerance.
         self.mu = (self.mu * self.growth).min(1e60);
         self.growth *= 2.0;
     }
@@ -365,8 +367,8 @@ fn norm(x: &[f64]) -> f64 {
     x.iter().map(|x| x * x).sum::<f64>().sqrt()
 }
 
-/// The floor of the damping: a hundred times what the elimination takes for rounding, so that a dependent column is
-/// never taken for an empty one, and too small to slow the last, quadratic steps.
+/// The minimum of the damping: a hundred times the rank tolerance of the elimination, so that a dependent column keeps
+/// a pivot, and too small to slow the last, quadratic steps.
 const MIN_DAMPING: f64 = 1e-12;
 
 #[cfg(test)]

@@ -1,17 +1,17 @@
-//! Minimisers of a function over a box. They know a closure and its bounds, and nothing about light.
+//! Minimisers of a function over a box. They take a closure and bounds, and know nothing of rendering.
 //!
-//! | module | minimises | where it comes from |
+//! | module | minimises | method |
 //! |---|---|---|
 //! | [`pattern`] | any function, no derivatives | generalised pattern search, settings of MATLAB's `patternsearch` |
-//! | [`quasi_newton`] | a smooth function, no derivatives | BFGS projected onto the box, differences |
+//! | [`quasi_newton`] | a smooth function, no derivatives | BFGS projected onto the box, finite differences |
 //! | [`least_squares`] | a sum of squares with a Jacobian | Levenberg-Marquardt with the box inside the step |
 //! | [`bvls`] | a linear sum of squares | bounded-variable least squares, Stark & Parker 1995 |
-//! | [`multi_start`] | whatever one of the above does | the best few of many starts, equal minima merged |
+//! | [`multi_start`] | any function, by a search above | the best few of many starts, equal minima merged |
 //!
-//! Everything is `f64` in a fixed order, on one thread or with its values collected in order: equal inputs give equal bits. Every search counts the calls of
-//! its objective, can be watched and stopped ([`Progress`]), and says why it ended ([`Termination`]). A search never
-//! returns a point outside its box, nor one worse than its start. An objective that is not finite at the start is an
-//! error; elsewhere it is a rejected point.
+//! Equal inputs give equal bits: all sums are `f64` in a fixed order, on one thread or over values collected in order.
+//! Every search counts the calls of its objective, reports its progress to an observer that may stop it ([`Progress`]),
+//! and returns the reason why it ended ([`Termination`]). The result lies in the box and is no worse than the start. An
+//! objective that is not finite is an error at the start; elsewhere the point is rejected.
 //!
 //! ```
 //! use lookalike::search::{Bounds, pattern};

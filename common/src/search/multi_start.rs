@@ -1,8 +1,8 @@
-//! From many starts to a few minima: the cheapest starts that are not alike are refined, and equal minima merged.
+//! From many starts to a few minima: the starts of lowest cost that are not close to each other are refined, and close
+//! minima are merged.
 //!
 //! Distances are the largest difference in any scaled coordinate of the box, so 0.01 is a hundredth of a (linear or
-//! logarithmic) range. Selection, refinement and merging are also there one by one, for callers that refine in
-//! parallel.
+//! logarithmic) range. Selection and merging are also functions of their own, for callers that refine in parallel.
 
 use super::bounds::Bounds;
 use super::{least_squares, pattern};
@@ -12,24 +12,24 @@ use super::{least_squares, pattern};
 pub struct Start {
     /// A natural point of the box.
     pub point: Vec<f64>,
-    /// The objective there; a start whose cost is not finite is never selected.
+    /// The objective at the point. A start whose cost is not finite is not selected.
     pub cost: f64,
 }
 
-/// How many starts to refine, and which points are alike.
+/// The number of starts to refine, and the distances below which points count as the same.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MultiStartOptions {
     /// Largest number of starts to refine.
     pub refine: usize,
-    /// A start nearer than this to a cheaper, selected one is passed over. 0 passes over equal points only.
+    /// A start closer than this to a selected start of lower cost is skipped. 0 skips only equal points.
     pub start_distance: f64,
-    /// A minimum nearer than this to a lower one is merged into it. 0 merges equal points only.
+    /// A minimum closer than this to a lower one is merged into it. 0 merges only equal points.
     pub merge_distance: f64,
 }
 
 impl Default for MultiStartOptions {
-    /// Six starts, as the scan that precedes them is dense; starts a twentieth of a range apart share their basin more
-    /// often than not; minima are reproduced by least squares to far better than a thousandth of a range.
+    /// Six starts, because the scan before them is dense. Starts closer than a twentieth of a range usually lead to the
+    /// same minimum. Least squares reproduces a minimum to much better than a thousandth of a range.
     fn default() -> Self {
         Self { refine: 6, start_distance: 0.05, merge_distance: 1e-3 }
     }
@@ -39,7 +39,7 @@ impl Default for MultiStartOptions {
 pub trait Refined {
     /// The natural point.
     fn point(&self) -> &[f64];
-    /// The objective there.
+    /// The objective at the point.
     fn value(&self) -> f64;
 }
 
@@ -64,7 +64,7 @@ impl Refined for least_squares::Minimum {
 /// Refines the best distinct starts in order of cost and returns their distinct minima, the lowest first.
 ///
 /// # Errors
-/// The first error of `refine`, when it fails for every start.
+/// The first error of `refine`, if it fails for every start.
 pub fn refine_best<M: Refined, E>(
     starts: &[Start],
     bounds: &Bounds,
@@ -86,10 +86,10 @@ pub fn refine_best<M: Refined, E>(
     }
 }
 
-/// Indices of the starts to refine: by ascending cost, equal costs in their order, alike ones passed over.
+/// Indices of the starts to refine, by ascending cost; equal costs keep their order, and close starts are skipped.
 ///
 /// # Panics
-/// When a start has fewer coordinates than the box.
+/// If a start has fewer coordinates than the box.
 #[must_use]
 pub fn select_starts(starts: &[Start], bounds: &Bounds, options: &MultiStartOptions) -> Vec<usize> {
     let mut order: Vec<usize> = (0..starts.len()).filter(|&i| starts[i].cost.is_finite()).collect();
@@ -99,18 +99,18 @@ pub fn select_starts(starts: &[Start], bounds: &Bounds, options: &MultiStartOpti
         if selected.len() == options.refine {
             break;
         }
-        let alike = |&other: &usize| is_near(&starts[i].point, &starts[other].point, bounds, options.start_distance);
-        if !selected.iter().any(alike) {
+        let is_close = |&other: &usize| is_near(&starts[i].point, &starts[other].point, bounds, options.start_distance);
+        if !selected.iter().any(is_close) {
             selected.push(i);
         }
     }
     selected
 }
 
-/// Sorts minima by their value, equal values in their order, and drops each that is alike to a lower one.
+/// Sorts minima by value (equal values keep their order) and drops each that is close to a lower one.
 ///
 /// # Panics
-/// When a minimum has fewer coordinates than the box.
+/// If a minimum has fewer coordinates than the box.
 #[must_use]
 pub fn merge_minima<M: Refined>(mut minima: Vec<M>, bounds: &Bounds, distance: f64) -> Vec<M> {
     minima.sort_by(|a, b| a.value().total_cmp(&b.value()));
@@ -138,7 +138,7 @@ mod tests {
     }
 
     #[test]
-    fn cheapest_starts_are_selected_and_alike_or_unusable_ones_passed_over() {
+    fn starts_of_lowest_cost_are_selected_and_close_or_unusable_ones_skipped() {
         let bounds = Bounds::linear(&[0.0, 0.0], &[1.0, 10.0]).unwrap();
         let starts = [
             start(&[0.5, 5.0], 3.0),
@@ -155,8 +155,8 @@ mod tests {
     }
 
     #[test]
-    fn two_basins_give_two_minima_the_deeper_first() {
-        // Basins at -1 (value 0.1) and 2 (value 0).
+    fn two_basins_give_two_minima_the_lower_first() {
+        // Minima at -1 (value 0.1) and 2 (value 0).
         let f = |x: &[f64]| ((x[0] + 1.0) * (x[0] + 1.0) + 0.1).min((x[0] - 2.0) * (x[0] - 2.0));
         let bounds = Bounds::linear(&[-5.0], &[5.0]).unwrap();
         let starts: Vec<Start> = [-4.0, -1.5, 0.1, 1.0, 4.5].map(|x| start(&[x], f(&[x]))).to_vec();

@@ -1,7 +1,7 @@
 //! The normal equations of a small least-squares problem with many residuals.
 //!
-//! Residuals are added one row at a time and the Jacobian is never stored: n (n + 3) / 2 numbers stand for 200,000
-//! rows. The price is the squared condition number, which the few, scaled parameters of a BRDF can afford.
+//! Residuals are added one row at a time and the Jacobian is not stored: n (n + 3) / 2 numbers replace 200,000 rows.
+//! The condition number is squared by this, which is acceptable for the few, scaled parameters of a BRDF.
 
 use super::semidefinite::Factor;
 
@@ -15,7 +15,7 @@ pub struct NormalEquations {
 }
 
 impl NormalEquations {
-    /// No residuals yet: all zero, for `dimension` parameters.
+    /// No residuals: all elements 0, for `dimension` parameters.
     #[must_use]
     pub fn new(dimension: usize) -> Self {
         Self { triangle: vec![0.0; dimension * (dimension + 1) / 2], vector: vec![0.0; dimension] }
@@ -27,7 +27,7 @@ impl NormalEquations {
         self.vector.len()
     }
 
-    /// Back to no residuals.
+    /// Removes all residuals.
     pub fn clear(&mut self) {
         self.triangle.fill(0.0);
         self.vector.fill(0.0);
@@ -36,7 +36,7 @@ impl NormalEquations {
     /// Adds one residual with its derivatives by the parameters, `row`, n long.
     ///
     /// # Panics
-    /// When `row` is not n long.
+    /// If `row` is not n long.
     pub fn add_row(&mut self, row: &[f64], residual: f64) {
         assert_eq!(row.len(), self.dimension(), "a row has one derivative per parameter");
         let mut cells = self.triangle.iter_mut();
@@ -48,10 +48,10 @@ impl NormalEquations {
         }
     }
 
-    /// Adds the residuals summed elsewhere, e.g. those of the next block of rows.
+    /// Adds the residuals summed in `other`, for example those of another block of rows.
     ///
     /// # Panics
-    /// When the dimensions differ.
+    /// If the dimensions differ.
     pub fn add(&mut self, other: &Self) {
         assert_eq!(self.dimension(), other.dimension(), "blocks have the same parameters");
         self.triangle.iter_mut().zip(&other.triangle).for_each(|(a, b)| *a += b);
@@ -61,7 +61,7 @@ impl NormalEquations {
     /// Element (i, j) of `J^T J`; symmetric.
     ///
     /// # Panics
-    /// When an index is not below n.
+    /// If an index is not below n.
     #[must_use]
     pub fn matrix(&self, i: usize, j: usize) -> f64 {
         self.triangle[self.cell(i, j)]
@@ -70,16 +70,16 @@ impl NormalEquations {
     /// Element i of `J^T r`.
     ///
     /// # Panics
-    /// When the index is not below n.
+    /// If the index is not below n.
     #[must_use]
     pub fn vector(&self, i: usize) -> f64 {
         self.vector[i]
     }
 
-    /// Sets element (i, j) of the matrix, and so (j, i).
+    /// Sets elements (i, j) and (j, i) of the matrix.
     ///
     /// # Panics
-    /// When an index is not below n.
+    /// If an index is not below n.
     pub fn set_matrix(&mut self, i: usize, j: usize, value: f64) {
         let cell = self.cell(i, j);
         self.triangle[cell] = value;
@@ -88,7 +88,7 @@ impl NormalEquations {
     /// Sets element i of the vector.
     ///
     /// # Panics
-    /// When the index is not below n.
+    /// If the index is not below n.
     pub fn set_vector(&mut self, i: usize, value: f64) {
         self.vector[i] = value;
     }
@@ -99,7 +99,7 @@ impl NormalEquations {
         self.triangle.iter().chain(&self.vector).all(|x| x.is_finite())
     }
 
-    /// The same residuals seen by the parameters t with dx_i/dt_i = `derivative[i]`.
+    /// The normal equations of the same residuals for the parameters t with dx_i/dt_i = `derivative[i]`.
     #[must_use]
     pub fn reparametrised(&self, derivative: &[f64]) -> Self {
         let mut scaled = self.clone();
@@ -112,18 +112,18 @@ impl NormalEquations {
         scaled
     }
 
-    /// The matrix times a vector, plus nothing: `(J^T J) x`, n long.
+    /// The matrix times a vector: `(J^T J) x`, n long.
     #[must_use]
     pub fn times(&self, x: &[f64]) -> Vec<f64> {
         (0..self.dimension()).map(|i| (0..self.dimension()).map(|j| self.matrix(i, j) * x[j]).sum()).collect()
     }
 
     /// The diagonal of the inverse of `J^T J` over the parameters marked `free`: the variance of each parameter for
-    /// residuals of variance 1. Zero where not free (held at a bound); infinite where the residuals do not determine
-    /// the parameter, alone or in combination with others.
+    /// residuals of variance 1. It is 0 for a parameter that is not free (fixed at a bound), and infinite for one that
+    /// the residuals do not determine, alone or in combination with others.
     ///
     /// # Panics
-    /// When `free` is not n long.
+    /// If `free` is not n long.
     #[must_use]
     pub fn variances(&self, free: &[bool]) -> Vec<f64> {
         assert_eq!(free.len(), self.dimension(), "one mark per parameter");
@@ -186,14 +186,14 @@ mod tests {
 
     #[test]
     fn variances_are_those_of_the_inverse_and_infinite_where_undetermined() {
-        // One parameter alone: 1 / sum of squares. Two: the textbook inverse of a 2 x 2 matrix.
+        // For one parameter 1 / sum of squares; for two the inverse of a 2 x 2 matrix.
         let normal = of_rows(&ROWS);
         assert!((normal.variances(&[true, false, false])[0] - 1.0 / 6.0).abs() < 1e-15);
         let two = normal.variances(&[true, false, true]);
         let determinant = 6.0 * 15.0 - 3.0 * 3.0;
         assert!((two[0] - 15.0 / determinant).abs() < 1e-15 && (two[2] - 6.0 / determinant).abs() < 1e-15);
         assert_eq!(two[1], 0.0);
-        // The first two columns are parallel: neither is determined, the third is.
+        // The first two columns are parallel and not determined; the third is determined.
         let parallel = of_rows(&[([1.0, 2.0, 0.0], 0.0), ([3.0, 6.0, 1.0], 0.0), ([0.5, 1.0, -1.0], 0.0)]);
         let variances = parallel.variances(&[true; 3]);
         assert!(variances[0].is_infinite() && variances[1].is_infinite() && variances[2].is_finite());

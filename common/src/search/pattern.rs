@@ -1,29 +1,29 @@
-//! Generalised pattern search with the settings of MATLAB's `patternsearch`: the search of \[BP20b\].
+//! Generalised pattern search with the settings of MATLAB's `patternsearch`, the search of \[BP20b\].
 //!
-//! From the incumbent x the poll tries x + m e_1, ..., x + m e_n, x - m e_1, ..., x - m e_n, in this order, m being the
-//! mesh size in the box's scaled coordinates. The first point that is better becomes the incumbent (no complete poll)
-//! and the mesh size doubles, without limit; the next poll starts from e_1 again. If none is better the mesh size
-//! halves. There is no search step, no accelerator, no cache of visited points. Source: the Global Optimization Toolbox
-//! pages "How Pattern Search Polling Works", "Set Mesh Options", "Set Options" (its table of defaults) and the exit
-//! flags of `patternsearch`; Torczon, *On the Convergence of Pattern Search Algorithms* (SIAM J. Optim. 7(1), 1997).
+//! From the incumbent x the poll tries x + m e_1, ..., x + m e_n, x - m e_1, ..., x - m e_n, in this order, where m is
+//! the mesh size in the box's scaled coordinates. The first better point becomes the incumbent (no complete poll) and
+//! the mesh size doubles, without limit. The next poll starts from e_1 again. If no point is better, the mesh size
+//! halves. There is no search step, no accelerator and no cache of visited points. Source: the Global Optimization
+//! Toolbox pages "How Pattern Search Polling Works", "Set Mesh Options", "Set Options" (its table of defaults) and the
+//! exit flags of `patternsearch`; Torczon, *On the Convergence of Pattern Search Algorithms* (SIAM J. Optim. 7(1),
+//! 1997).
 //!
-//! It ends, tested in this order after each iteration, when
+//! The search ends when one of these holds, tested in this order after each iteration:
 //! 1. the mesh size is below the mesh tolerance;
-//! 2. the mesh size is below the step tolerance and so was the change in x of a successful poll, in x's own units;
+//! 2. the mesh size and, in units of x, the change in x of a successful poll are below the step tolerance;
 //! 3. the mesh size is below the step tolerance and the decrease of a successful poll was below the function tolerance;
 //! 4. 100 n iterations or 2000 n evaluations are used up.
 //!
-//! 2 and 3 are MATLAB's exit flags 2 and 3 ("the change in x", or in the function, "and the mesh size are both less
-//! than the specified tolerance"; the page "Setting Solver Tolerances" leaves the mesh out). As the three default
-//! tolerances are equal, 1 always comes first: they only act when a caller sets a step tolerance above the mesh
-//! tolerance.
+//! Rules 2 and 3 are MATLAB's exit flags 2 and 3 ("the change in x", or in the function, "and the mesh size are both
+//! less than the specified tolerance"; the page "Setting Solver Tolerances" does not mention the mesh). With the
+//! default tolerances, which are equal, rule 1 always applies first. Rules 2 and 3 apply only if a caller sets a step
+//! tolerance above the mesh tolerance.
 //!
-//! Where ours differs, or MATLAB's documentation is silent:
-//! - Scaling is by the bounds (see [`bounds`](super::bounds)), not `ScaleMesh`.
-//! - A point outside the box is skipped and not counted. MATLAB "modifies poll points to be feasible", in a way it does
-//!   not describe for bounds. Skipping means that a bound which no step lands on is approached to within the final mesh
-//!   size.
-//! - The evaluation limit is exact, even within a poll.
+//! Differences from MATLAB, and points that its documentation leaves open:
+//! - Scaling is by the bounds (see [`bounds`](super::bounds)), not by `ScaleMesh`.
+//! - A point outside the box is skipped and not counted. MATLAB "modifies poll points to be feasible", but does not
+//!   describe how for bounds. With skipping, the search may end up to the final mesh size away from a bound.
+//! - The evaluation limit is exact, also within a poll.
 //! - A point whose value is not finite is rejected like a worse one; at the start it is an error.
 
 use super::bounds::Bounds;
@@ -42,7 +42,7 @@ pub struct PatternOptions {
     pub contraction: f64,
     /// The search ends when the mesh size is below this, above 0.
     pub mesh_tolerance: f64,
-    /// The search ends when the mesh size and the change in x, in its own units, are below this, at least 0.
+    /// The search ends when the mesh size and, in units of x, the change in x are below this, at least 0.
     pub step_tolerance: f64,
     /// The search ends when the decrease is below this and the mesh size below the step tolerance, at least 0.
     pub function_tolerance: f64,
@@ -83,16 +83,16 @@ impl PatternOptions {
     }
 }
 
-/// What a pattern search found.
+/// The result of a pattern search.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Minimum {
     /// The best point, inside the box.
     pub point: Vec<f64>,
-    /// The objective there: what the closure returned for exactly this point, at most its value at the start.
+    /// The value that the objective returned for exactly this point; at most its value at the start.
     pub value: f64,
-    /// Calls of the objective.
+    /// Number of calls of the objective.
     pub evaluations: usize,
-    /// Polls.
+    /// Number of polls.
     pub iterations: usize,
     /// Why the search ended.
     pub termination: Termination,
@@ -103,7 +103,7 @@ pub struct Minimum {
 /// Minimises `objective` over the box from `start`, a point of the box.
 ///
 /// # Errors
-/// When the start is outside the box or the objective is not finite there, or an option is out of range.
+/// If the start is outside the box, the objective is not finite at the start, or an option is out of range.
 pub fn minimise(
     objective: impl FnMut(&[f64]) -> f64,
     start: &[f64],
@@ -113,7 +113,7 @@ pub fn minimise(
     minimise_observed(objective, start, bounds, options, &mut |_| ControlFlow::Continue(()))
 }
 
-/// [`minimise`], showing its progress to `observe` after every evaluation; `Break` ends the search with the incumbent.
+/// [`minimise`] that calls `observe` after every evaluation. `Break` ends the search with the incumbent.
 ///
 /// # Errors
 /// As [`minimise`].
@@ -156,7 +156,7 @@ struct Search<'a, F> {
     minimum: Minimum,
 }
 
-/// How a poll ended.
+/// The outcome of a poll.
 enum Poll {
     Success { step: f64, decrease: f64 },
     Failure,
@@ -171,7 +171,7 @@ impl<F: FnMut(&[f64]) -> f64> Search<'_, F> {
         if !self.minimum.value.is_finite() {
             return Err(SearchError::NotFinite { what: "the objective", point: start });
         }
-        if self.tell().is_break() {
+        if self.report().is_break() {
             return Ok(Termination::Stopped);
         }
         loop {
@@ -211,7 +211,7 @@ impl<F: FnMut(&[f64]) -> f64> Search<'_, F> {
                 self.minimum.point[axis] = trial[axis];
                 self.minimum.value = value;
             }
-            if self.tell().is_break() {
+            if self.report().is_break() {
                 return Poll::Ended(Termination::Stopped);
             }
             if success {
@@ -222,7 +222,7 @@ impl<F: FnMut(&[f64]) -> f64> Search<'_, F> {
         Poll::Failure
     }
 
-    /// Resizes the mesh after a poll and says whether the search is over.
+    /// Resizes the mesh after a poll. Returns a reason if the search is over.
     fn update(&mut self, poll: &Poll) -> Option<Termination> {
         let options = self.options;
         match poll {
@@ -247,7 +247,7 @@ impl<F: FnMut(&[f64]) -> f64> Search<'_, F> {
         (self.minimum.evaluations >= options.max_evaluations).then_some(Termination::MaxEvaluations)
     }
 
-    fn tell(&mut self) -> ControlFlow<()> {
+    fn report(&mut self) -> ControlFlow<()> {
         let Minimum { evaluations, iterations, value, ref point, .. } = self.minimum;
         (self.observe)(&Progress { evaluations, iterations, value, point })
     }

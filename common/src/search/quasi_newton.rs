@@ -1,13 +1,14 @@
-//! A projected quasi-Newton search for a smooth function over a box, when only its values are known.
+//! A projected quasi-Newton search for a smooth function over a box, without derivatives.
 //!
-//! BFGS (Nocedal & Wright, *Numerical Optimization*, 2nd ed. 2006, section 6.1) on the free coordinates, in the box's scaled
-//! coordinates, in which a step of the same length means about as much in every parameter. A coordinate at a bound is not free while the
-//! function falls towards the outside (Bertsekas, *Projected Newton Methods*, SIAM J. Control Optim. 20(2), 1982). Steps are
-//! projected onto the box and shortened, along a parabola, until they decrease the function enough (Armijo). Derivatives are one-sided differences, whose
-//! values may be computed at the same time; once nothing decreases along them any more, they are central ones.
+//! BFGS (Nocedal & Wright, *Numerical Optimization*, 2nd ed. 2006, section 6.1) on the free coordinates, in the box's
+//! scaled coordinates, where equal steps have about equal effect in every parameter. A coordinate at a bound is not
+//! free while the function decreases towards the outside (Bertsekas, *Projected Newton Methods*, SIAM J. Control Optim.
+//! 20(2), 1982). Steps are projected onto the box and shortened, by a parabola, until they decrease the function enough
+//! (Armijo). Derivatives are one-sided differences, evaluated in parallel. When no step along them decreases the
+//! function, the search continues with central differences.
 //!
-//! It takes a few iterations of one evaluation per parameter each, where a pattern search creeps along the narrow valleys that
-//! colours and width of a BRDF make.
+//! It needs a few iterations of one evaluation per parameter. A pattern search advances slowly in the narrow valleys
+//! that colours and width of a BRDF form.
 
 use super::bounds::Bounds;
 use super::error::{SearchError, check_option};
@@ -45,32 +46,32 @@ impl QuasiNewtonOptions {
     }
 }
 
-/// What a quasi-Newton search found.
+/// The result of a quasi-Newton search.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Minimum {
     /// The best point, inside the box.
     pub point: Vec<f64>,
-    /// The objective there, at most its value at the start.
+    /// The objective at the point, at most its value at the start.
     pub value: f64,
-    /// Calls of the objective.
+    /// Number of calls of the objective.
     pub evaluations: usize,
-    /// Steps taken.
+    /// Number of steps taken.
     pub iterations: usize,
     /// Why the search ended.
     pub termination: Termination,
 }
 
-/// Share of the decrease that the slope promises which a step has to bring (Armijo).
-const ENOUGH: f64 = 1e-4;
+/// The fraction of the decrease predicted by the slope that a step must achieve (Armijo).
+const ARMIJO: f64 = 1e-4;
 
-/// A step is shortened at most this often.
-const MOST_CUTS: usize = 8;
+/// The most times that a step is shortened.
+const MAX_SHORTENINGS: usize = 8;
 
-/// Minimises `objective` over the box from `start`, showing its progress to `observe` after every iteration; `Break` ends the search
-/// with the incumbent. Values that are not finite count as worse than any.
+/// Minimises `objective` over the box from `start`, a point of the box. It calls `observe` after every iteration;
+/// `Break` ends the search with the incumbent. A point whose value is not finite is rejected.
 ///
 /// # Errors
-/// When the start is outside the box or the objective is not finite there, or an option is out of range.
+/// If the start is outside the box, the objective is not finite at the start, or an option is out of range.
 pub fn minimise(
     objective: impl Fn(&[f64]) -> f64 + Sync,
     start: &[f64],
@@ -112,15 +113,15 @@ struct Search<'a, F> {
     at: Vec<f64>,
     /// Approximation of the inverse Hessian, rows of `n`.
     inverse: Vec<f64>,
-    /// Whether it has learnt nothing yet.
+    /// Whether `inverse` is the identity, with no curvature measured yet.
     is_fresh: bool,
     minimum: Minimum,
 }
 
-/// How derivatives are taken.
+/// The kind of differences that approximate derivatives.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Differences {
-    /// From one value beside the point: cheap, off by half a step's curvature.
+    /// From the point and one value beside it: cheap, with an error of half the step times the second derivative.
     Forward,
     /// From two values around the point.
     Central,
@@ -131,15 +132,15 @@ impl<F: Fn(&[f64]) -> f64 + Sync> Search<'_, F> {
         let (mut kind, mut small_steps) = (Differences::Forward, 0);
         let Some(mut gradient) = self.gradient(kind) else { return Termination::MaxEvaluations };
         loop {
-            if self.tell(observe).is_break() {
+            if self.report(observe).is_break() {
                 return Termination::Stopped;
             }
             let before = (self.at.clone(), self.minimum.value);
             match self.step(&gradient) {
                 Step::Taken => {}
                 Step::OutOfEvaluations => return Termination::MaxEvaluations,
-                // What was learnt may mislead; then the differences may.
-                Step::None if !self.is_fresh => self.forget(),
+                // First suspect the approximate Hessian, then the one-sided differences.
+                Step::None if !self.is_fresh => self.reset_inverse(),
                 Step::None if kind == Differences::Forward => kind = Differences::Central,
                 Step::None => return Termination::StepTolerance,
             }
@@ -152,13 +153,13 @@ impl<F: Fn(&[f64]) -> f64 + Sync> Search<'_, F> {
             }
             let Some(next) = self.gradient(kind) else { return Termination::MaxEvaluations };
             if decrease > 0.0 {
-                self.learn(&before.0, &gradient, &next);
+                self.update_inverse(&before.0, &gradient, &next);
             }
             gradient = next;
         }
     }
 
-    fn tell(&self, observe: &mut dyn FnMut(&Progress<'_>) -> ControlFlow<()>) -> ControlFlow<()> {
+    fn report(&self, observe: &mut dyn FnMut(&Progress<'_>) -> ControlFlow<()>) -> ControlFlow<()> {
         observe(&Progress {
             evaluations: self.minimum.evaluations,
             iterations: self.minimum.iterations,
@@ -196,17 +197,17 @@ impl<F: Fn(&[f64]) -> f64 + Sync> Search<'_, F> {
         };
         let slope = |(i, &[low, high]): (usize, &[f64; 2])| {
             let slope = (at(i, high) - at(i, low)) / (high - low);
-            // No slope is known where there is no value: leave the coordinate alone.
+            // The slope is unknown where a value is not finite: do not move the coordinate.
             if slope.is_finite() { slope } else { 0.0 }
         };
         Some(steps.iter().enumerate().map(slope).collect())
     }
 
-    /// How far below and above the point a coordinate's difference reaches, inside the box; 0 is the point itself.
+    /// The steps of a coordinate's difference below and above the point, inside the box; 0 stands for the point.
     fn difference(&self, i: usize, kind: Differences) -> [f64; 2] {
         let ((first, last), h) = (self.bounds.scaled_range(i), self.options.difference);
         let (below, above) = (h.min(self.at[i] - first), h.min(last - self.at[i]));
-        // Too near to a bound for a difference that way.
+        // A step of less than half the difference is too short to use.
         let [below, above] = [below, above].map(|step| if step < 0.5 * h { 0.0 } else { step });
         match kind {
             Differences::Central => [-below, above],
@@ -215,7 +216,7 @@ impl<F: Fn(&[f64]) -> f64 + Sync> Search<'_, F> {
         }
     }
 
-    /// Whether each coordinate may move: those at a bound towards which the function falls may not.
+    /// Whether each coordinate is free: not at a bound beyond which the function decreases.
     fn free(&self, gradient: &[f64]) -> Vec<bool> {
         let is_free = |i: usize| {
             let (first, last) = self.bounds.scaled_range(i);
@@ -231,10 +232,10 @@ impl<F: Fn(&[f64]) -> f64 + Sync> Search<'_, F> {
         if longest == 0.0 {
             return Step::None;
         }
-        // Without knowledge of the curvature the first step is a short one.
+        // The first step is short, because the curvature is unknown.
         let reach = if self.is_fresh { 0.25 * self.options.longest_step } else { self.options.longest_step };
         let mut length = if self.is_fresh { reach / longest } else { (reach / longest).min(1.0) };
-        for _ in 0..MOST_CUTS {
+        for _ in 0..MAX_SHORTENINGS {
             if self.minimum.evaluations >= self.options.max_evaluations {
                 return Step::OutOfEvaluations;
             }
@@ -243,25 +244,26 @@ impl<F: Fn(&[f64]) -> f64 + Sync> Search<'_, F> {
                 (self.at[i] + length * direction[i]).clamp(first, last)
             };
             let scaled: Vec<f64> = (0..self.at.len()).map(to).collect();
-            let promised: f64 = scaled.iter().zip(&self.at).zip(gradient).map(|((to, at), g)| (to - at) * g).sum();
+            let predicted: f64 = scaled.iter().zip(&self.at).zip(gradient).map(|((to, at), g)| (to - at) * g).sum();
             let point = self.natural(&scaled);
             let value = (self.objective)(&point);
             self.minimum.evaluations += 1;
-            if value < self.minimum.value + ENOUGH * promised.min(0.0) {
+            if value < self.minimum.value + ARMIJO * predicted.min(0.0) {
                 self.at = scaled;
                 self.minimum.point = point;
                 self.minimum.value = value;
                 return Step::Taken;
             }
-            // The parabola through value and slope here and the value there.
-            let excess = value - self.minimum.value - promised;
-            let best = if excess > 0.0 && excess.is_finite() { -0.5 * promised / excess } else { 0.1 };
+            // The minimum of the parabola through the value and slope at the incumbent and the value at the trial
+            // point.
+            let excess = value - self.minimum.value - predicted;
+            let best = if excess > 0.0 && excess.is_finite() { -0.5 * predicted / excess } else { 0.1 };
             length *= best.clamp(0.1, 0.5);
         }
         Step::None
     }
 
-    /// `-H g` on the free coordinates; `-g` where that does not lead down.
+    /// `-H g` on the free coordinates, or `-g` if that is not a descent direction.
     fn direction(&mut self, gradient: &[f64]) -> Vec<f64> {
         let (n, free) = (gradient.len(), self.free(gradient));
         let newton = |i: usize| {
@@ -273,23 +275,23 @@ impl<F: Fn(&[f64]) -> f64 + Sync> Search<'_, F> {
         if slope < 0.0 {
             return direction;
         }
-        self.forget();
+        self.reset_inverse();
         (0..n).map(|i| if free[i] { -gradient[i] } else { 0.0 }).collect()
     }
 
-    fn forget(&mut self) {
+    fn reset_inverse(&mut self) {
         self.inverse = identity(self.at.len());
         self.is_fresh = true;
     }
 
     /// The BFGS update by the last step.
-    fn learn(&mut self, before: &[f64], gradient: &[f64], next: &[f64]) {
+    fn update_inverse(&mut self, before: &[f64], gradient: &[f64], next: &[f64]) {
         let n = before.len();
         let step: Vec<f64> = self.at.iter().zip(before).map(|(a, b)| a - b).collect();
-        let turn: Vec<f64> = next.iter().zip(gradient).map(|(a, b)| a - b).collect();
+        let gradient_change: Vec<f64> = next.iter().zip(gradient).map(|(a, b)| a - b).collect();
         let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-        let (curvature, size) = (dot(&step, &turn), dot(&turn, &turn));
-        // Only what keeps the matrix positive definite is learnt.
+        let (curvature, size) = (dot(&step, &gradient_change), dot(&gradient_change, &gradient_change));
+        // Skip an update that would not keep the matrix positive definite.
         if curvature <= 1e-8 * (dot(&step, &step) * size).sqrt() {
             return;
         }
@@ -298,18 +300,18 @@ impl<F: Fn(&[f64]) -> f64 + Sync> Search<'_, F> {
             self.inverse = identity(n).iter().map(|x| x * curvature / size).collect();
             self.is_fresh = false;
         }
-        let turned: Vec<f64> = (0..n).map(|i| dot(&self.inverse[i * n..][..n], &turn)).collect();
-        let factor = (1.0 + dot(&turn, &turned) / curvature) / curvature;
+        let scaled_change: Vec<f64> = (0..n).map(|i| dot(&self.inverse[i * n..][..n], &gradient_change)).collect();
+        let factor = (1.0 + dot(&gradient_change, &scaled_change) / curvature) / curvature;
         for i in 0..n {
             for j in 0..n {
                 self.inverse[i * n + j] +=
-                    factor * step[i] * step[j] - (turned[i] * step[j] + step[i] * turned[j]) / curvature;
+                    factor * step[i] * step[j] - (scaled_change[i] * step[j] + step[i] * scaled_change[j]) / curvature;
             }
         }
     }
 }
 
-/// What became of an iteration.
+/// The outcome of a step.
 enum Step {
     Taken,
     None,
@@ -337,18 +339,18 @@ mod tests {
     }
 
     #[test]
-    fn a_curved_valley_is_followed_to_its_end_in_far_fewer_evaluations_than_by_pattern_search() {
+    fn a_curved_valley_takes_far_fewer_evaluations_than_with_pattern_search() {
         let bounds = Bounds::linear(&[-2.0, -2.0], &[2.0, 2.0]).unwrap();
         let minimum = found(rosenbrock, &[-1.2, 1.0], &bounds, 1000).unwrap();
         assert!(minimum.value < 1e-5, "{minimum:?}");
         let budget =
             pattern::PatternOptions { max_evaluations: minimum.evaluations, ..pattern::PatternOptions::matlab(2) };
-        let rival = pattern::minimise(rosenbrock, &[-1.2, 1.0], &bounds, &budget).unwrap();
-        assert!(rival.value > 100.0 * minimum.value, "{rival:?} {minimum:?}");
+        let other = pattern::minimise(rosenbrock, &[-1.2, 1.0], &bounds, &budget).unwrap();
+        assert!(other.value > 100.0 * minimum.value, "{other:?} {minimum:?}");
     }
 
     #[test]
-    fn a_minimum_at_a_bound_is_found_there_and_one_behind_a_bound_on_it() {
+    fn a_minimum_outside_the_box_is_found_on_the_bound() {
         let bounds = Bounds::linear(&[0.0, 0.0], &[1.0, 1.0]).unwrap();
         let bowl = |x: &[f64]| (x[0] + 0.5).powi(2) + (x[1] - 0.3).powi(2) + 0.5 * x[0] * x[1];
         let minimum = found(bowl, &[0.8, 0.9], &bounds, 500).unwrap();
@@ -357,7 +359,7 @@ mod tests {
     }
 
     #[test]
-    fn a_start_at_a_bound_leaves_it_where_the_function_falls_inwards() {
+    fn a_start_at_a_bound_leaves_it_if_the_function_decreases_inwards() {
         let bounds = Bounds::new(vec![0.0; 2], vec![1.0; 2], vec![Scale::OffsetLogarithmic; 2]).unwrap();
         let bowl = |x: &[f64]| (x[0] - 0.02).powi(2) + (x[1] - 0.4).powi(2);
         let minimum = found(bowl, &[0.0, 1.0], &bounds, 500).unwrap();
@@ -365,7 +367,7 @@ mod tests {
     }
 
     #[test]
-    fn limits_are_kept_and_the_end_is_never_worse_than_the_start() {
+    fn limits_are_kept_and_the_result_is_no_worse_than_the_start() {
         let bounds = Bounds::linear(&[-2.0, -2.0], &[2.0, 2.0]).unwrap();
         for limit in [1, 2, 3, 7, 20, 50] {
             let minimum = found(rosenbrock, &[-1.2, 1.0], &bounds, limit).unwrap();
@@ -384,7 +386,7 @@ mod tests {
     }
 
     #[test]
-    fn values_that_are_not_finite_are_rejected_points_and_an_error_at_the_start() {
+    fn a_point_that_is_not_finite_is_rejected_and_a_start_that_is_not_finite_is_an_error() {
         let bounds = Bounds::linear(&[0.0], &[1.0]).unwrap();
         let cliff = |x: &[f64]| if x[0] < 0.3 { f64::NAN } else { x[0] };
         let minimum = found(cliff, &[0.9], &bounds, 200).unwrap();

@@ -1,23 +1,24 @@
-//! How far least-squares estimates scatter when residuals are not alike.
+//! The variance of least-squares estimates when residuals have different variances: the sandwich estimator.
 //!
-//! Where every residual has the same variance, `s^2 (J^T J)^-1` is the covariance of the parameters. Rows weighted by how they
-//! were *sampled*, not by how precise they are, break that, and so do residuals that come from a model that is not quite right:
-//! what then holds is the sandwich `(J^T J)^-1 (sum_k g_k g_k^T) (J^T J)^-1` (Huber 1967; White 1980), `g_k` the sum of
-//! `residual x row` over the rows k that belong together and may err together.
+//! If every residual has the same variance, `s^2 (J^T J)^-1` is the covariance of the parameters. That does not hold
+//! for rows weighted by how they were *sampled* rather than by their precision, nor for residuals of an imperfect
+//! model. The covariance is then the sandwich `(J^T J)^-1 (sum_k g_k g_k^T) (J^T J)^-1` (Huber 1967; White 1980), where
+//! `g_k` is the sum of `residual x row` over group k of rows whose errors may be correlated.
 //!
-//! A row that pulls the fit towards itself has a residual that is too small: it is divided by 1 - h, h the row's leverage
-//! (the estimator HC3 of MacKinnon & White, *Some Heteroskedasticity-Consistent Covariance Matrix Estimators with Improved Finite
-//! Sample Properties*, Journal of Econometrics 29(3), 1985). A highlight of few pixels is such a place.
+//! A row of high leverage h draws the fit towards itself, which makes its residual too small. So the residual is
+//! divided by 1 - h (the estimator HC3 of MacKinnon & White, *Some Heteroskedasticity-Consistent Covariance Matrix
+//! Estimators with Improved Finite Sample Properties*, Journal of Econometrics 29(3), 1985). The pixels of a small
+//! highlight are such rows.
 
 use super::normal_equations::NormalEquations;
 use super::semidefinite::Factor;
 
-/// The sandwich over the free parameters of a problem, filled row by row.
+/// The sandwich estimator over the free parameters of a problem. Rows are added one by one.
 #[derive(Debug)]
 pub struct Sandwich {
     free: Vec<usize>,
-    bread: Factor,
-    filling: NormalEquations,
+    inverse: Factor,
+    middle: NormalEquations,
     /// The sum over the open group.
     influence: Vec<f64>,
     scratch: Vec<f64>,
@@ -27,15 +28,15 @@ impl Sandwich {
     /// For the normal equations at a minimum, over the parameters marked `free`.
     ///
     /// # Panics
-    /// When `free` has another length than there are parameters.
+    /// If `free` does not have one entry per parameter.
     #[must_use]
     pub fn new(normal: &NormalEquations, free: &[bool]) -> Self {
         assert_eq!(free.len(), normal.dimension(), "one mark per parameter");
         let free: Vec<usize> = (0..free.len()).filter(|&i| free[i]).collect();
         let count = free.len();
         Self {
-            bread: normal.factor(&free),
-            filling: NormalEquations::new(count),
+            inverse: normal.factor(&free),
+            middle: NormalEquations::new(count),
             influence: vec![0.0; count],
             scratch: vec![0.0; count],
             free,
@@ -47,37 +48,38 @@ impl Sandwich {
         for (x, &i) in self.scratch.iter_mut().zip(&self.free) {
             *x = row[i];
         }
-        let pull = self.bread.solve(&self.scratch);
-        let leverage: f64 = pull.iter().zip(&self.scratch).map(|(a, b)| a * b).sum();
-        let left_out = residual / (1.0 - leverage).max(LEAST_SHARE);
-        self.influence.iter_mut().zip(&self.scratch).for_each(|(sum, x)| *sum += left_out * x);
+        let weights = self.inverse.solve(&self.scratch);
+        let leverage: f64 = weights.iter().zip(&self.scratch).map(|(a, b)| a * b).sum();
+        let corrected = residual / (1.0 - leverage).max(MIN_COMPLEMENT);
+        self.influence.iter_mut().zip(&self.scratch).for_each(|(sum, x)| *sum += corrected * x);
     }
 
-    /// Closes the open group: the rows to come err on their own.
+    /// Closes the open group. Later rows are independent of it.
     pub fn close_group(&mut self) {
-        self.filling.add_row(&self.influence, 0.0);
+        self.middle.add_row(&self.influence, 0.0);
         self.influence.fill(0.0);
     }
 
-    /// The variance of every free parameter, in the order of the parameters; infinite where the rows do not determine it, alone
-    /// or in combination with others.
+    /// The variance of each free parameter, in the order of the parameters; infinite if the rows do not determine it,
+    /// alone or in combination with others.
     #[must_use]
     pub fn variances(&self) -> Vec<f64> {
-        let alone = self.bread.inverse_diagonal();
+        let alone = self.inverse.inverse_diagonal();
         let variance = |i: usize| {
             if alone[i].is_infinite() {
                 return f64::INFINITY;
             }
             let unit: Vec<f64> = (0..self.free.len()).map(|j| f64::from(u8::from(i == j))).collect();
-            let side = self.bread.solve(&unit);
-            self.filling.times(&side).iter().zip(&side).map(|(a, b)| a * b).sum()
+            let side = self.inverse.solve(&unit);
+            self.middle.times(&side).iter().zip(&side).map(|(a, b)| a * b).sum()
         };
         (0..self.free.len()).map(variance).collect()
     }
 }
 
-/// The least of 1 - leverage: a row that determines a parameter alone has a residual of nothing but rounding.
-const LEAST_SHARE: f64 = 1e-6;
+/// The minimum of 1 - leverage. A row that determines a parameter alone has leverage 1 and a residual of rounding
+/// errors.
+const MIN_COMPLEMENT: f64 = 1e-6;
 
 #[cfg(test)]
 mod tests {
@@ -88,7 +90,7 @@ mod tests {
         (0..12).map(|k| uniform(key(&[seed, row, k]))).sum::<f64>() - 6.0
     }
 
-    /// A straight line through `rows` points whose errors grow along it; each point is weighted by `weight`.
+    /// A straight line through `rows` points. The errors grow along the line; `weight` is the weight of a point.
     fn line(seed: u64, rows: u64, weight: impl Fn(f64) -> f64) -> (Vec<([f64; 2], f64)>, NormalEquations) {
         let observed: Vec<([f64; 2], f64)> = (0..rows)
             .map(|row| {
@@ -107,7 +109,7 @@ mod tests {
     }
 
     #[test]
-    fn predicted_scatter_is_the_scatter_of_many_fits() {
+    fn the_predicted_variance_is_that_of_many_fits() {
         for weight in [(|_| 1.0) as fn(f64) -> f64, |x| 1.0 / (0.2 + x)] {
             let (runs, rows) = (2000_u64, 40);
             let (mut predicted, mut squares) = ([0.0; 2], [0.0; 2]);
@@ -126,14 +128,14 @@ mod tests {
             }
             for i in 0..2 {
                 let ratio = predicted[i] / squares[i];
-                // 2000 runs know a variance to 3 %; HC3 is a little too cautious with 40 rows.
+                // 2000 runs determine a variance to 3 %; with 40 rows HC3 overestimates slightly.
                 assert!((0.9..1.25).contains(&ratio), "{i}: {predicted:?} {squares:?}");
             }
         }
     }
 
     #[test]
-    fn parameters_that_no_row_tells_apart_are_not_determined() {
+    fn parameters_that_the_rows_do_not_distinguish_are_not_determined() {
         let rows = [[1.0, 1.0, 0.5, 0.0], [2.0, 2.0, -1.0, 0.0], [0.5, 0.5, 3.0, 0.0], [-1.0, -1.0, 0.2, 0.0]];
         let mut normal = NormalEquations::new(4);
         rows.iter().for_each(|row| normal.add_row(row, 0.0));
@@ -145,7 +147,7 @@ mod tests {
         let variances = sandwich.variances();
         assert!(variances[0].is_infinite() && variances[1].is_infinite() && variances[3].is_infinite());
         assert!(variances[2].is_finite() && variances[2] > 0.0, "{variances:?}");
-        // Held where it is, the second parameter leaves the first one determined.
+        // With the second parameter fixed, the first one is determined.
         assert!(Sandwich::new(&normal, &[true, false, true, false]).variances().iter().all(|v| v.is_finite()));
     }
 }

@@ -2,21 +2,22 @@
 //! (Higham, *Accuracy and Stability of Numerical Algorithms*, section 10.3).
 //!
 //! The matrix is first scaled to unit diagonal, so that a pivot is the fraction of a column's square that the columns
-//! before it do not explain (1 - R^2). Columns below [`RANK_TOLERANCE`] are dependent and get the solution 0.
+//! before it do not explain (1 - R^2). Columns with a pivot of at most [`RANK_TOLERANCE`] are dependent; their solution
+//! is 0.
 
-/// A fraction of a column's square that is rounding: 50 units in the last place, some ten times what ten eliminations
-/// leave of an exactly dependent column, and five orders below what damping adds to one.
+/// The largest pivot that counts as rounding: 50 units in the last place. That is about ten times what ten eliminations
+/// leave of an exactly dependent column, and a hundredth of what the least damping adds to one.
 const RANK_TOLERANCE: f64 = 1e-14;
 
-/// A component of a null vector, in units of scaled columns, that is rounding.
+/// The largest component of a null vector, in units of scaled columns, that counts as rounding.
 const NULL_TOLERANCE: f64 = 1e-6;
 
 /// The factor of a k x k matrix: `P S A S P^T = L L^T`, with S the scale to unit diagonal and P the pivoting.
 #[derive(Debug)]
 pub(super) struct Factor {
-    /// L, row-major k x k; rows beyond the rank hold their part of the leading columns.
+    /// L, row-major k x k. Rows beyond the rank are filled only in the leading columns.
     lower: Vec<f64>,
-    /// Which parameter each pivot is.
+    /// The parameter of each pivot.
     order: Vec<usize>,
     /// 1 / sqrt(A_ii), or 0 for an empty column.
     scale: Vec<f64>,
@@ -43,7 +44,7 @@ impl Factor {
         factor
     }
 
-    /// A solution of `A x = rhs`: the basic one, 0 in the dependent columns.
+    /// The basic solution of `A x = rhs`, which is 0 in the dependent columns.
     pub(super) fn solve(&self, rhs: &[f64]) -> Vec<f64> {
         let size = self.order.len();
         let mut y: Vec<f64> = (0..self.rank).map(|p| rhs[self.order[p]] * self.scale[self.order[p]]).collect();
@@ -59,7 +60,7 @@ impl Factor {
         x
     }
 
-    /// The diagonal of the inverse, infinite for every parameter that takes part in a null vector.
+    /// The diagonal of the inverse; infinite for each parameter with a component in a null vector.
     pub(super) fn inverse_diagonal(&self) -> Vec<f64> {
         let size = self.order.len();
         let mut diagonal: Vec<f64> = (0..size)
@@ -81,7 +82,7 @@ impl Factor {
         diagonal
     }
 
-    /// Eliminates the largest remaining pivot from `work`; false when all that remain are dependent.
+    /// Eliminates the largest remaining pivot from `work`. Returns false if all remaining columns are dependent.
     fn eliminate(&mut self, work: &mut [f64]) -> bool {
         let (size, p) = (self.order.len(), self.rank);
         let mut pivot = p;
@@ -134,7 +135,7 @@ mod tests {
     }
 
     #[test]
-    fn full_rank_solution_satisfies_the_equations_whatever_the_units() {
+    fn the_solution_of_full_rank_satisfies_the_equations_in_any_units() {
         let columns = vec![vec![1e-6, 2e-6, 0.0], vec![0.0, 3e4, 1e4], vec![1.0, 0.0, -1.0]];
         let factor = Factor::new(3, gram(&columns));
         let rhs = [3e-6, -2e4, 0.5];
@@ -146,7 +147,7 @@ mod tests {
     }
 
     #[test]
-    fn dependent_columns_get_zero_and_the_rest_still_solves() {
+    fn dependent_columns_are_zero_and_the_others_solve_the_equations() {
         // The third column is the sum of the first two, the fourth is empty.
         let columns = vec![vec![1.0, 2.0, 0.3], vec![0.1, -1.0, 1.0], vec![1.1, 1.0, 1.3], vec![0.0; 3]];
         let factor = Factor::new(4, gram(&columns));
@@ -163,7 +164,7 @@ mod tests {
     }
 
     #[test]
-    fn rounding_is_never_taken_for_information() {
+    fn rounding_does_not_raise_the_rank() {
         use crate::math::sampling::{key, uniform};
         for seed in 0..200 {
             let number = |i: u64, j: u64| 2.0 * uniform(key(&[seed, i, j])) - 1.0;

@@ -1,8 +1,8 @@
-//! Why a search ended, and what it tells while it runs.
+//! The reason why a search ended, and its progress reports.
 
 use std::fmt;
 
-/// Why a search ended.
+/// The reason why a search ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Termination {
@@ -12,18 +12,18 @@ pub enum Termination {
     StepTolerance,
     /// The objective changes by less than its tolerance.
     FunctionTolerance,
-    /// The gradient, where it can be followed inside the box, is below its tolerance.
+    /// The gradient, in directions with descent inside the box, is below its tolerance.
     GradientTolerance,
     /// The iteration limit was reached.
     MaxIterations,
     /// The evaluation limit was reached.
     MaxEvaluations,
-    /// The observer asked to stop.
+    /// The observer stopped the search.
     Stopped,
 }
 
 impl Termination {
-    /// The name that result files carry.
+    /// The name in result files.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -37,7 +37,7 @@ impl Termination {
         }
     }
 
-    /// The reason with this [`name`](Self::name), if there is one.
+    /// The reason with this [`name`](Self::name), or `None`.
     #[must_use]
     pub fn from_name(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|reason| reason.name() == name)
@@ -61,7 +61,7 @@ impl fmt::Display for Termination {
     }
 }
 
-/// The state of a running search, shown to its observer after every evaluation of the objective. The observer answers
+/// The state of a running search, passed to its observer. The observer returns
 /// [`ControlFlow::Break`](std::ops::ControlFlow::Break) to end the search with the incumbent.
 #[derive(Debug, Clone, Copy)]
 pub struct Progress<'a> {
@@ -80,10 +80,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_lead_back_to_their_reason() {
+    fn names_round_trip() {
         for reason in Termination::ALL {
             assert_eq!(Termination::from_name(reason.name()), Some(reason));
         }
-        assert_eq!(Termination::from_name("tired"), None);
+        assert_eq!(Termination::from_name("unknown"), None);
     }
 }

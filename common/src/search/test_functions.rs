@@ -7,7 +7,7 @@ use super::normal_equations::NormalEquations;
 use crate::math::elementary::exp;
 
 impl Bounds {
-    /// A box whose coordinates are searched as they are.
+    /// A box without scaling.
     pub(super) fn unscaled(lower: &[f64], upper: &[f64]) -> Result<Self, SearchError> {
         Self::new(lower.to_vec(), upper.to_vec(), vec![Scale::Unscaled; lower.len()])
     }
@@ -23,7 +23,7 @@ pub(super) fn rosenbrock(x: &[f64]) -> f64 {
         .sum()
 }
 
-/// A problem given by its rows: each residual with its derivatives.
+/// A problem given by its rows, each a residual with its derivatives.
 pub(super) trait Rows {
     const DIMENSION: usize;
     fn rows(&self, x: &[f64]) -> Vec<(Vec<f64>, f64)>;
@@ -88,7 +88,8 @@ impl Rows for Exponential {
     }
 }
 
-/// A product `ks f0` and a sum `kd + f0 / 100` that together barely, or with `weak` = 0 not at all, tell ks from f0.
+/// Residuals of `kd` and of the product `ks f0`, which do not determine ks and f0 alone. A last residual, of weight
+/// `weak`, determines f0 weakly, or not at all if `weak` is 0.
 pub(super) struct Degenerate {
     pub(super) weak: f64,
 }

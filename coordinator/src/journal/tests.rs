@@ -238,7 +238,7 @@ fn file_that_does_not_fit_is_refused_by_name() {
     let error = Journal::open(&other, NAME, None).unwrap_err().to_string();
     assert!(error.contains("--seed is 0 there and 3 here"), "{error}");
     sql(&folder, "PRAGMA user_version = 99");
-    refused("has journal format 99, expected 2");
+    refused("has journal format 99, expected 3");
     sql(&folder, "PRAGMA user_version = 3; DELETE FROM run");
     refused("is not the journal of a run");
 }

@@ -10,11 +10,10 @@ use crate::{
     text,
     verdict::Verdict,
 };
+use lookalike::brdf::PAPER_MODEL;
 use std::collections::BTreeSet;
 
 const METHODS: [Method; 3] = [Method::OursPolished, Method::Brute, Method::L2];
-/// The paper's model.
-const PAPER_MODEL: &str = "cook-torrance";
 
 /// A material under a light.
 type Cell<'a> = (&'a str, &'a str);
@@ -146,8 +145,8 @@ fn nearest(study: &Study<'_>, section: &mut Section) {
     let mut rivals: Vec<Rival<'_>> = vec![
         (CSSIM, Method::Ours, model),
         (CSSIM, Method::OursPolished, model),
-        (CSSIM, Method::Ours, PAPER_MODEL),
-        (CSSIM, Method::Paper, PAPER_MODEL),
+        (CSSIM, Method::Ours, PAPER_MODEL.name()),
+        (CSSIM, Method::Paper, PAPER_MODEL.name()),
     ];
     rivals.dedup();
     rivals.extend(named(study).into_iter().map(|metric| (metric, Method::OursPolished, model)));
@@ -166,7 +165,7 @@ fn nearest(study: &Study<'_>, section: &mut Section) {
         table.row(names.chain(means.iter().map(|mean| text::score(*mean))).chain([text::score(off)]));
     };
     let paper: Vec<Option<f64>> = lights.iter().map(|(_, score)| Some(*score)).collect();
-    add(["cssim", "the paper's", PAPER_MODEL], 6 * lights.len(), &paper, None);
+    add(["cssim", "the paper's", PAPER_MODEL.name()], 6 * lights.len(), &paper, None);
     let mut found: Vec<(Rival<'_>, f64)> = Vec::new();
     for rival in rivals {
         let (cells, means) = by_light(study, rival, &lights);

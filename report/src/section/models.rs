@@ -8,7 +8,7 @@ use crate::{
     text,
     verdict::{self, Verdict},
 };
-use lookalike::brdf::MODELS;
+use lookalike::brdf::DEFAULT_MODEL;
 use std::collections::BTreeSet;
 
 /// The model of the paper's results.
@@ -197,7 +197,7 @@ fn compared(study: &Study<'_>, pairs: &Pairs<'_>, how: &str) -> Option<String> {
     Some(format!(
         "{} {} {verb} {PAPER} by {} in mean CSSIM ({} against {}; {how}): it is the better one in {} cells, and \
          does worst against it at {} ({} against {}).",
-        if study.model == MODELS[0].name() { "The default model" } else { "The model" },
+        if study.model == DEFAULT_MODEL.name() { "The default model" } else { "The model" },
         study.model,
         text::score(Some((rival - ours).abs())),
         text::score(Some(ours)),

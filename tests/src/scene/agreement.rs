@@ -16,8 +16,8 @@ use lookalike::{
 };
 
 /// Deviations of one term of one lobe at one width. All are shares of the mean radiance over the whole object: of the term's own, but
-/// for what no surface shows alone. That is the `F5` part, which is held to a dielectric's with F0 = 0.04 and no diffuse part; and what
-/// shapes a lobe by the roughness, which is held to its sum with the lobe that it shapes.
+/// for what no surface shows alone. The share of the `F5` part is that of a dielectric with F0 = 0.04 and no diffuse part; the share of a
+/// lobe that adjusts another one ([`Expected::adjusts`](lookalike::brdf::Expected::adjusts)) is that of their sum.
 #[derive(Debug, Clone, Copy)]
 pub struct Agreement {
     /// Lobe of the model.
@@ -91,11 +91,11 @@ impl References {
                 let split = SplitLobe { lobe: basis.lobe, width };
                 let [rest, fresnel, whole] = [0, 1, 2].map(|c| mean(&part(model, &coarse, lobe, width, c)));
                 let darkest = if lobe_terms(basis.lobe) == 1 { fresnel } else { DIELECTRIC_F0 * rest + fresnel };
-                let beside = BESIDE.iter().find(|(name, _)| *name == basis.lobe.name()).map_or(0.0, |(_, beside)| {
-                    let beside = model.lobes().iter().position(|other| other.lobe.name() == *beside);
-                    mean(&part(model, &coarse, beside.expect("the lobe beside is one of the model"), 0.0, 0))
+                let adjusted = basis.lobe.expected().adjusts.map_or(0.0, |adjusted| {
+                    let adjusted = model.lobes().iter().position(|other| other.lobe.name() == adjusted);
+                    mean(&part(model, &coarse, adjusted.expect("a lobe adjusts one of its model"), 0.0, 0))
                 });
-                let level = Rgb::new(rest, darkest, whole) + Rgb::splat(beside);
+                let level = Rgb::new(rest, darkest, whole) + Rgb::splat(adjusted);
                 let seed = 1_000 + 100 * lobe as u64 + w as u64;
                 let effort = Effort { level, ..effort };
                 entries.push(Entry {
@@ -169,14 +169,6 @@ fn coarse_table(scene: &Scene, model: &'static dyn Model) -> TransportTable {
     let small = Geometry::sphere(COARSE, COARSE, circle, scene.geometry.camera()).expect("a coarse sphere is valid");
     plan.integrate(&small, &scene.pyramid, &covered(&small, |coverage| coverage >= 0.5))
 }
-
-/// Parts of a lobe that a surface shows with the lobe alone: the coefficients of a polynomial in the roughness.
-const BESIDE: [(&str, &str); 4] = [
-    ("disney diffuse, by roughness", "disney diffuse"),
-    ("disney diffuse, by its square", "disney diffuse"),
-    ("disney subsurface, by roughness", "disney subsurface"),
-    ("disney subsurface, by its square", "disney subsurface"),
-];
 
 /// Reflectance at normal incidence of the darkest common surface.
 const DIELECTRIC_F0: f64 = 0.04;

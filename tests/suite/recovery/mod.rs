@@ -5,7 +5,7 @@ mod probes;
 mod targets;
 
 use lookalike::{
-    brdf::{Material, Model, flat_names, offset_of},
+    brdf::{Channels, Material, Model, flat_names, offset_of},
     fit::{Candidate, Method, SearchKind, Start, search_gamma},
     metric::cost::Compression,
     render::{
@@ -94,7 +94,7 @@ struct Quantity {
 impl Quantity {
     /// The largest error that counts as recovered (issue point 4).
     fn tolerance(&self, model: &dyn Model) -> f64 {
-        let has_scalar_f0 = model.name() == "cook-torrance";
+        let has_scalar_f0 = model.parameters().iter().any(|p| p.name == "f0" && p.channels == Channels::Scalar);
         let three = 3.0 * self.deviation;
         match self.name.split('.').next().unwrap_or_default() {
             "alpha" | "m" => 0.02 * self.truth,

@@ -1,5 +1,6 @@
 //! The sources as the rules see them: text without comments, string contents and test items.
 
+use super::paths::Found;
 use std::{
     collections::BTreeSet,
     fs,
@@ -84,6 +85,18 @@ fn read(root: &Path, path: String, test_modules: &mut BTreeSet<String>) -> Sourc
 /// Whether a file is `module.rs` or lies in the folder `module`.
 fn is_of_module(path: &str, module: &str) -> bool {
     path.strip_prefix(module).is_some_and(|rest| rest == ".rs" || rest.starts_with('/'))
+}
+
+/// The contents of the string literals outside comments and test items, each with its closing quote.
+pub(super) fn literals(source: &Source) -> Vec<Found> {
+    // Blanking keeps the opening quotes of literals and the place of every byte.
+    let text = source.text.as_bytes();
+    let literal = |place: usize| {
+        let raw = source.text[..place].trim_end_matches('#').strip_suffix('r').map(str::len);
+        let (from, to) = raw.and_then(|start| opaque(text, start)).or_else(|| opaque(text, place))?;
+        Some(Found { line: Source::line(&source.text, place), name: source.text[from..to].to_owned() })
+    };
+    source.code.match_indices('"').filter_map(|(place, _)| literal(place)).collect()
 }
 
 /// Blanks comments and the contents of string and character literals.

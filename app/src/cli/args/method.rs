@@ -13,11 +13,12 @@ use std::num::NonZeroU32;
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Method")]
 pub(crate) struct MethodArgs {
-    /// Bundle of settings; flags that are given as well override it
+    /// Bundle of settings; flags that are given as well override it. paper: the papers' model, 256 samples, pattern search
+    /// from the papers' one start, 21 gammas, no polish
     #[arg(long, value_name = "PRESET", value_enum)]
     pub(crate) preset: Option<Preset>,
-    /// BRDF model: ggx, ggx-f90, cook-torrance, ward, blinn-phong, ashikhmin-shirley, disney
-    #[arg(long, value_name = "NAME", default_value_t)]
+    /// BRDF model
+    #[arg(long, value_name = "NAME", value_enum, default_value_t)]
     model: ModelName,
     /// Gammas of the cost to try, one search each: START:STOP:STEP, or one number
     #[arg(long, value_name = "A:B:STEP", default_value_t, allow_negative_numbers = true)]

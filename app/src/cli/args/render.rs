@@ -27,8 +27,8 @@ struct MaterialArgs {
     /// Measured material in the file format of the MERL database, instead of --model
     #[arg(long, value_name = "FILE.binary")]
     brdf: Option<PathBuf>,
-    /// BRDF model: ggx, ggx-f90, cook-torrance, ward, blinn-phong, ashikhmin-shirley or disney; needs --params
-    #[arg(long, value_name = "NAME")]
+    /// BRDF model; needs --params
+    #[arg(long, value_name = "NAME", value_enum)]
     model: Option<ModelName>,
     /// Parameters of the model: NAME=VALUE with one number, or three for a colour, such as kd=.5,.4,.3,f0=.04,alpha=.1
     #[arg(long, value_name = "K=V,...")]

@@ -5,7 +5,7 @@ use crate::{
     settings,
 };
 use anyhow::Context;
-use lookalike::brdf::{self, Material, Reflectance, flat_names};
+use lookalike::brdf::{Material, Reflectance, flat_names};
 
 /// A material with what names it in metadata.
 #[derive(Debug)]
@@ -27,7 +27,7 @@ impl LoadedMaterial {
                 Ok(Self { reflectance: Box::new(table), model: "merl", parameters: None, file: Some(source) })
             }
             settings::Material::Analytic { model, params } => {
-                let model = brdf::model(model.as_str())?;
+                let model = model.model();
                 let flat = flat_parameters(model, params).context("--params")?;
                 let pairs = flat_names(model.parameters()).into_iter().zip(&flat);
                 let parameters = pairs.map(|(name, value)| format!("{name}={value}")).collect::<Vec<_>>().join(",");

@@ -1,12 +1,12 @@
-//! What of `disney` has no width: the diffuse lobe, the one of light below the surface, and the sheen.
+//! The lobes of `disney` without a width: diffuse, subsurface and sheen.
 //!
 //! With `FL = (1 - n.l)^5`, `FV = (1 - n.v)^5`, `c = v.h` and the roughness `r`
 //! - `f_d = 1/pi (1 + (F90 - 1) FL) (1 + (F90 - 1) FV)`, `F90 = 0.5 + 2 c^2 r`,
 //! - `f_ss = 1.25/pi (F (1/(n.l + n.v) - 0.5) + 0.5)`, `F` as above with `F90 = c^2 r`
 //!
-//! (Burley 2012, section 5.3). Each factor is `(1 - s FL) + e r FL`, so that either lobe is a polynomial in `r`.
+//! (Burley 2012, section 5.3). Each factor is `(1 - s FL) + e r FL`, so both lobes are polynomials in `r`.
 
-use super::super::{Angles, Incident, Lobe, Split, Spread, lobe::accumulate};
+use super::super::{Angles, Expected, Lobe, Split, Spread};
 use crate::math::elementary::fifth_power;
 use std::f64::consts::FRAC_1_PI;
 
@@ -14,11 +14,11 @@ use std::f64::consts::FRAC_1_PI;
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Diffuse<const POWER: u8>;
 
-/// The coefficient of `roughness^POWER` in the lobe of light below the surface.
+/// The coefficient of `roughness^POWER` in the subsurface lobe.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Subsurface<const POWER: u8>;
 
-/// `F5`: a rim.
+/// The sheen, `F5`.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Sheen;
 
@@ -39,36 +39,21 @@ fn rims(g: &Angles) -> (f64, f64, f64) {
     (cos_i, fifth_power(1.0 - cos_i.min(1.0)), fifth_power(1.0 - g.cos_o.min(1.0)))
 }
 
-#[inline(always)]
-fn diffuse<const POWER: u8>(g: &Angles, _spread: &Spread, _width: f64) -> f64 {
-    let (cos_i, fl, fv) = rims(g);
-    FRAC_1_PI * coefficient::<POWER>(fl, fv, 0.5, 2.0 * g.cos_d * g.cos_d) * cos_i
-}
+/// Names of the lobes at roughness 0; the others of each family adjust them.
+const DIFFUSE: &str = "disney diffuse";
+const SUBSURFACE: &str = "disney subsurface";
 
-#[inline(always)]
-fn subsurface<const POWER: u8>(g: &Angles, _spread: &Spread, _width: f64) -> f64 {
-    let (cos_i, fl, fv) = rims(g);
-    let scale = 1.0 / (cos_i + g.cos_o) - 0.5;
-    let constant = if POWER == 0 { 0.5 } else { 0.0 };
-    1.25 * FRAC_1_PI * (coefficient::<POWER>(fl, fv, 1.0, g.cos_d * g.cos_d) * scale + constant) * cos_i
-}
-
-#[inline(always)]
-fn sheen(g: &Angles, _spread: &Spread, _width: f64) -> f64 {
-    g.f5() * g.cos_i.max(0.0)
-}
-
-/// Errors of a cut have one sign from the normal to the rim, and add up.
+/// The errors of a cut have one sign from the normal to the rim, so they add up.
 const CARE: f64 = 4.0;
 
-/// `(1 - x)^5` changes within a fifth at the rim, and hardly at the centre.
+/// `(1 - x)^5` changes over a fifth of the range at the rim, and hardly at the centre.
 fn rim_footprint(width: f64, cos_o: f64) -> f64 {
     width.min(0.2 + cos_o)
 }
 
 impl<const POWER: u8> Lobe for Diffuse<POWER> {
     fn name(&self) -> &'static str {
-        ["disney diffuse", "disney diffuse, by roughness", "disney diffuse, by its square"][usize::from(POWER)]
+        [DIFFUSE, "disney diffuse, by roughness", "disney diffuse, by its square"][usize::from(POWER)]
     }
 
     fn split(&self) -> Split {
@@ -83,7 +68,7 @@ impl<const POWER: u8> Lobe for Diffuse<POWER> {
         CARE
     }
 
-    /// `g(x) x` is bent by `2 g'` at the horizon: 5 for `1 - FL/2`, 10 for `FL`.
+    /// The second derivative of `g(x) x` at the horizon is `2 g'`: 5 for `1 - FL/2`, 10 for `FL`.
     fn bend(&self) -> f64 {
         [5.0, 20.0, 40.0][usize::from(POWER)]
     }
@@ -92,18 +77,20 @@ impl<const POWER: u8> Lobe for Diffuse<POWER> {
         rim_footprint(width, cos_o)
     }
 
-    fn eval(&self, angles: &Angles, width: f64) -> f64 {
-        diffuse::<POWER>(angles, &Spread::default(), width)
+    fn expected(&self) -> Expected {
+        Expected { adjusts: (POWER > 0).then_some(DIFFUSE), ..Expected::default() }
     }
 
-    fn accumulate(&self, incident: &[Incident], cos_o: f64, widths: &[f64], sums: &mut [f64]) {
-        accumulate(self.split(), incident, cos_o, widths, sums, diffuse::<POWER>);
+    #[inline(always)]
+    fn kernel(&self, g: &Angles, _spread: &Spread, _width: f64) -> f64 {
+        let (cos_i, fl, fv) = rims(g);
+        FRAC_1_PI * coefficient::<POWER>(fl, fv, 0.5, 2.0 * g.cos_d * g.cos_d) * cos_i
     }
 }
 
 impl<const POWER: u8> Lobe for Subsurface<POWER> {
     fn name(&self) -> &'static str {
-        ["disney subsurface", "disney subsurface, by roughness", "disney subsurface, by its square"][usize::from(POWER)]
+        [SUBSURFACE, "disney subsurface, by roughness", "disney subsurface, by its square"][usize::from(POWER)]
     }
 
     fn split(&self) -> Split {
@@ -118,7 +105,7 @@ impl<const POWER: u8> Lobe for Subsurface<POWER> {
         CARE
     }
 
-    /// At grazing views `1/(n.l + n.v)` bends it, over a few times `n.v`.
+    /// At grazing views it is that of `1/(n.l + n.v)`, over a few times `n.v`.
     fn bend(&self) -> f64 {
         60.0
     }
@@ -127,12 +114,18 @@ impl<const POWER: u8> Lobe for Subsurface<POWER> {
         width.min(cos_o)
     }
 
-    fn eval(&self, angles: &Angles, width: f64) -> f64 {
-        subsurface::<POWER>(angles, &Spread::default(), width)
+    /// The formula has an albedo of up to 1.205 (computed in NumPy).
+    fn expected(&self) -> Expected {
+        let most_albedo = if POWER == 0 { 1.21 } else { 1.0 };
+        Expected { most_albedo, adjusts: (POWER > 0).then_some(SUBSURFACE), ..Expected::default() }
     }
 
-    fn accumulate(&self, incident: &[Incident], cos_o: f64, widths: &[f64], sums: &mut [f64]) {
-        accumulate(self.split(), incident, cos_o, widths, sums, subsurface::<POWER>);
+    #[inline(always)]
+    fn kernel(&self, g: &Angles, _spread: &Spread, _width: f64) -> f64 {
+        let (cos_i, fl, fv) = rims(g);
+        let scale = 1.0 / (cos_i + g.cos_o) - 0.5;
+        let constant = if POWER == 0 { 0.5 } else { 0.0 };
+        1.25 * FRAC_1_PI * (coefficient::<POWER>(fl, fv, 1.0, g.cos_d * g.cos_d) * scale + constant) * cos_i
     }
 }
 
@@ -161,11 +154,8 @@ impl Lobe for Sheen {
         rim_footprint(width, cos_o)
     }
 
-    fn eval(&self, angles: &Angles, width: f64) -> f64 {
-        sheen(angles, &Spread::default(), width)
-    }
-
-    fn accumulate(&self, incident: &[Incident], cos_o: f64, widths: &[f64], sums: &mut [f64]) {
-        accumulate(self.split(), incident, cos_o, widths, sums, sheen);
+    #[inline(always)]
+    fn kernel(&self, g: &Angles, _spread: &Spread, _width: f64) -> f64 {
+        g.f5() * g.cos_i.max(0.0)
     }
 }

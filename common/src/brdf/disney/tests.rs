@@ -62,7 +62,7 @@ fn both_lobes_end_at_the_same_width() {
     let (lower, upper) = flat_bounds(Disney.parameters());
     let widths: Vec<Width> = LOBES.iter().filter_map(|basis| basis.width).collect();
     let [roughness, gloss] = widths[..] else { panic!("{widths:?}") };
-    // 0.005, but for the rounding of the bounds.
+    // 0.005 up to the rounding of the bounds.
     assert!((roughness.at(&lower) - 0.005_041).abs() < 1e-15 && (gloss.at(&upper) - 0.005_009_5).abs() < 1e-15);
     for (width, x) in [(roughness, 0.3), (gloss, 0.7)] {
         assert!(((width.inverse)((width.of)(x)) - x).abs() < 1e-14);
@@ -71,12 +71,12 @@ fn both_lobes_end_at_the_same_width() {
     }
 }
 
-/// The distribution of the coat shines with all of its light: the integral of `D n.h` over the hemisphere is 1.
+/// The integral of `D n.h` over the hemisphere is 1.
 #[test]
 fn the_distribution_of_the_coat_is_normalised() {
     for a in [0.005_f64, 0.03, 0.1] {
         let n = 200_000;
-        // Evenly in the logarithm of a^2 + u.
+        // Steps are even in the logarithm of a^2 + u.
         let span = ((1.0 + a * a) / (a * a)).ln();
         let sum: f64 = (0..n)
             .map(|i| {

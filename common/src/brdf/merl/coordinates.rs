@@ -12,7 +12,7 @@ pub(super) struct HalfDifference {
     pub(super) theta_h: f64,
     /// Between half vector and either direction, in \[0, pi/2\].
     pub(super) theta_d: f64,
-    /// Of the light around the half vector, from the plane of normal and half vector; in \[0, pi\], as exchanging the
+    /// Of the light around the half vector, from the plane of normal and half vector. In \[0, pi\], because exchanging the
     /// directions turns it by pi.
     pub(super) phi_d: f64,
 }
@@ -26,7 +26,7 @@ impl HalfDifference {
         let (sum, difference) = (wi + wo, wi - wo);
         let length = sum.length();
         let across = (sum.x * sum.x + sum.y * sum.y).sqrt();
-        // Over the normal the plane of normal and half vector is any plane.
+        // With the half vector along the normal any plane contains both.
         let (cos_phi, sin_phi) = if across > 0.0 { (sum.x / across, sum.y / across) } else { (1.0, 0.0) };
         let (cos_h, sin_h) = (sum.z / length, across / length);
         let x = (difference.x * cos_phi + difference.y * sin_phi) * cos_h - difference.z * sin_h;
@@ -64,7 +64,7 @@ impl Neighbours {
             (start + below + beside, h_part * d_part),
         ];
         let position = angles.phi_d * (phi_cells as f64 / PI) + 0.5;
-        // Position k + 1/2 is the centre of cell k; below the first one comes the last.
+        // Position k + 1/2 is the centre of cell k; the axis is periodic, so the last cell precedes the first.
         let above = cell(position, phi_cells + 1);
         let part = position - above as f64;
         let first = if above == 0 { phi_cells - 1 } else { above - 1 };
@@ -73,7 +73,7 @@ impl Neighbours {
     }
 }
 
-/// The cell before `x` in \[0, 1\] and how far `x` lies from its centre to the next one's; the ends continue as they are.
+/// The cell before `x` in \[0, 1\] and how far `x` lies from its centre to the next one's; constant beyond the outermost centres.
 #[inline]
 fn between(x: f64, cells: usize) -> (usize, f64) {
     let position = (x * cells as f64 - 0.5).clamp(0.0, (cells - 1) as f64);

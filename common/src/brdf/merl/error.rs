@@ -1,6 +1,6 @@
-//! What can be wrong with a measured table.
+//! Errors of reading a measured table.
 
-/// A file that is no usable MERL table.
+/// The file is not a usable MERL table.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum MerlError {
@@ -23,7 +23,7 @@ pub enum MerlError {
         name: String,
         /// Bytes of a whole table.
         expected: usize,
-        /// Bytes there are.
+        /// Bytes found.
         found: usize,
     },
     /// A value is infinite, not a number, or beyond single precision.
@@ -47,7 +47,7 @@ pub enum MerlError {
     },
     /// All cells are negative.
     #[error(
-        "{name}: expected measurements, found only negative cells, which stand for none; check how the file was written"
+        "{name}: expected measurements, found only negative cells, which mean no measurement; check how the file was written"
     )]
     Empty {
         /// The file, as named by the caller.

@@ -1,11 +1,11 @@
-//! How wide the lobes of a table are, for importance sampling.
+//! The widths of a table's lobes, for importance sampling.
 //!
 //! The profile is the mean luminance over `theta_d` below 45 degrees and all `phi_d`, as a function of `theta_h`, above its
 //! minimum (the diffuse part). Two widths of GGX are read off it: that of the core, at half of the peak, and that of the tails, inside
-//! which lie seven eighths of the energy `profile cos(theta_h) d(omega_h)`. For a GGX material they are one; for others a few
-//! log-spaced widths run from the one to the other. Both ends matter (noise of a typical pixel at 64 x 64, 1024 samples, under
-//! Uffizi): gold-metallic-paint3 without its tails 2.3 % instead of 1.4 %, as a thousandth of its peak holds most of its energy;
-//! blue-acrylic without its core 2.3 % instead of 1.2 %.
+//! which lie seven eighths of the energy `profile cos(theta_h) d(omega_h)`. For a GGX material they are equal; for others a few
+//! log-spaced widths run from one to the other. Both ends matter (noise of a typical pixel at 64 x 64, 1024 samples, under Uffizi):
+//! gold-metallic-paint3 has 2.3 % without its tails and 1.4 % with them, because most of its energy lies at a thousandth of the
+//! peak; blue-acrylic has 2.3 % without its core and 1.2 % with it.
 
 use super::{DIMENSIONS, cell_of};
 use crate::math::{
@@ -53,7 +53,7 @@ fn energy(rows: &[Row]) -> f64 {
     rows.iter().map(Row::energy).sum()
 }
 
-/// The rows from the normal outwards; those that the horizon cuts by more than half are left out, as what is left is grazing.
+/// The rows from the normal outwards; those of which the horizon cuts more than half are left out, because the rest is grazing.
 fn profile(cells: &[[f32; 3]]) -> Vec<Row> {
     let [h_cells, d_cells, phi_cells] = DIMENSIONS;
     let mut sums = vec![(0.0, 0.0); h_cells];
@@ -99,15 +99,15 @@ fn tan2_around(rows: &[Row], part: f64) -> f64 {
     1.0
 }
 
-/// The part of the energy that the widest lobe reaches around.
+/// The part of the energy inside the widest lobe.
 const TAILS: f64 = 7.0 / 8.0;
-/// A smaller share of the energy above the diffuse part is not worth a technique.
+/// Below this share of the energy the specular part gets no sampling technique.
 const LEAST_SPECULAR: f64 = 0.01;
 /// A tenth of the sharpest lobe of a fitted model.
 const LEAST_ALPHA: f64 = 5e-4;
-/// What is wider is left to the last entry.
+/// Wider parts are left to the last entry.
 const MOST_ALPHA: f64 = 0.35;
-/// Core and tails that differ by less are one lobe.
+/// Core and tails whose ratio is smaller are one lobe.
 const ONE_LOBE: f64 = 1.6;
 /// Largest ratio between neighbouring widths.
 const STEP: f64 = 6.5;

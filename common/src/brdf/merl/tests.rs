@@ -1,4 +1,4 @@
-//! Tables written here, from functions whose values are known.
+//! Tables written by the test from functions whose values are known.
 
 use super::*;
 use crate::{
@@ -81,7 +81,7 @@ fn a_constant_is_constant_everywhere_above_the_horizon() {
     for (wi, wo) in pairs(20_000, 1e-3) {
         let f = lambert.eval(wi, wo);
         assert!(f == Rgb::ZERO || (f - Rgb::new(0.1, 0.2, 0.3)).abs().max_element() < 1e-7, "{wi} {wo} {f}");
-        // Within half a cell of the horizon there may be no neighbour left.
+        // Within half a cell of the horizon all neighbours may be outside.
         assert!(f != Rgb::ZERO || wi.z.min(wo.z) < 0.02, "{wi} {wo}");
     }
     assert_eq!(lambert.eval(Vec3::new(0.6, 0.0, -0.8), Vec3::Z), Rgb::ZERO);
@@ -174,7 +174,7 @@ fn phi_d_is_periodic_by_pi_without_a_seam() {
 
 #[test]
 fn negative_neighbours_are_dropped_and_a_hole_is_black() {
-    // A checkerboard of holes, and a band where nothing was measured.
+    // A checkerboard of holes, and a band without measurements.
     let bytes = file(|[h, d, phi]| ((h + d + phi) % 2 == 0 && !(40..44).contains(&d)).then_some([0.5; 3]));
     let table = MerlTable::read("test", &bytes).unwrap();
     for (wi, wo) in pairs(20_000, 0.01) {

@@ -1,24 +1,30 @@
 //! Scan and least squares find the material that a photo was rendered with.
 
 use super::scene::{StageOne, method};
-use crate::fit::{Candidate, Method, SearchKind, Start, search_gamma};
+use crate::{
+    brdf::{Channels, DEFAULT_MODEL, MODELS, Model},
+    fit::{Candidate, Method, SearchKind, Start, search_gamma},
+};
 
-/// Materials in the inside of the models' boxes.
-const KNOWN: [(&str, &[f64]); 13] = [
-    ("ggx", &[0.3, 0.2, 0.1, 0.05, 0.05, 0.05, 0.15]),
-    ("ggx", &[0.05, 0.1, 0.2, 0.6, 0.5, 0.3, 0.35]),
-    ("ggx-f90", &[0.3, 0.2, 0.1, 0.05, 0.05, 0.05, 0.3, 0.15]),
-    ("ggx-f90", &[0.05, 0.1, 0.2, 0.6, 0.5, 0.3, 0.7, 0.35]),
-    ("cook-torrance", &[0.2, 0.3, 0.1, 0.5, 0.4, 0.6, 0.3, 0.2]),
-    ("ward", &[0.3, 0.2, 0.1, 0.05, 0.05, 0.05, 0.15]),
-    ("ward", &[0.05, 0.1, 0.2, 0.6, 0.5, 0.3, 0.35]),
-    ("blinn-phong", &[0.3, 0.2, 0.1, 0.05, 0.05, 0.05, 90.0]),
-    ("blinn-phong", &[0.05, 0.1, 0.2, 0.6, 0.5, 0.3, 15.0]),
-    ("ashikhmin-shirley", &[0.3, 0.2, 0.1, 0.05, 0.05, 0.05, 90.0]),
-    ("ashikhmin-shirley", &[0.15, 0.1, 0.2, 0.6, 0.5, 0.3, 15.0]),
-    ("disney", &[0.5, 0.2, 0.1, 0.3, 0.2, 0.6, 0.4, 0.3, 0.5, 0.7]),
-    ("disney", &[0.7, 0.5, 0.3, 0.2, 0.8, 0.5, 0.5, 0.2, 0.8, 0.3]),
-];
+/// Two materials in the inside of a model's box: the values of its colours in their order, the place of every scalar between its bounds,
+/// and the width of the main lobe.
+const KNOWN: [([[f64; 3]; 2], f64, f64); 2] =
+    [([[0.3, 0.2, 0.1], [0.05, 0.05, 0.05]], 0.3, 0.15), ([[0.05, 0.1, 0.2], [0.6, 0.5, 0.3]], 0.7, 0.35)];
+
+/// The flat parameter vector of one of [`KNOWN`].
+fn known(model: &dyn Model, (colours, scalar, width): ([[f64; 3]; 2], f64, f64)) -> Vec<f64> {
+    let mut colours = colours.into_iter();
+    let mut flat: Vec<f64> = Vec::new();
+    for p in model.parameters() {
+        match p.channels {
+            Channels::Rgb => flat.extend(colours.next().expect("a model has at most two colours")),
+            Channels::Scalar => flat.push(p.lower + scalar * (p.upper - p.lower)),
+        }
+    }
+    let main = model.lobes().iter().find_map(|basis| basis.width).expect("a model has a lobe with a width");
+    flat[main.entry] = (main.inverse)(width);
+    flat
+}
 
 fn search(method: &Method, scene: &StageOne, gamma: f64) -> Candidate {
     search_gamma(method, gamma, &scene.table, &scene.subset, &scene.photo, 0.5, None).unwrap()
@@ -26,7 +32,8 @@ fn search(method: &Method, scene: &StageOne, gamma: f64) -> Candidate {
 
 #[test]
 fn scan_and_least_squares_recover_the_material_of_a_photo() {
-    for (name, known) in KNOWN {
+    for (model, known) in MODELS.iter().flat_map(|model| KNOWN.map(|material| (model, known(*model, material)))) {
+        let (name, known) = (model.name(), &known[..]);
         let (method, scene) = (method(name), StageOne::new(name, known));
         for gamma in [1.0, 2.2] {
             let found = search(&method, &scene, gamma);
@@ -40,8 +47,8 @@ fn scan_and_least_squares_recover_the_material_of_a_photo() {
 
 #[test]
 fn a_start_counts_as_one_evaluation() {
-    let (name, known) = KNOWN[0];
-    let scene = StageOne::new(name, known);
+    let name = DEFAULT_MODEL.name();
+    let scene = StageOne::new(name, &known(DEFAULT_MODEL, KNOWN[0]));
     let paper = Method { search: SearchKind::Pattern, start: Start::Paper, ..method(name) };
     let counted = search(&paper, &scene, 1.0).evaluations;
     let mut calls = 0;

@@ -1,6 +1,7 @@
-//! Decompressing one block without trusting it. Fuzzing `exr` 1.74.2 found two ways for a broken block to end the
-//! process, which are closed here: counters of a DWA block that are allocated before they are checked, and arithmetic on
-//! numbers from the file that overflows (`b44`: attempt to subtract with overflow), which panics in builds with checks.
+//! Decompression of one untrusted block. Fuzzing `exr` 1.74.2 found two ways in which a broken block ends the process,
+//! and this file prevents both. First, the counters of a DWA block are allocated before they are checked. Second,
+//! arithmetic on numbers from the file overflows (`b44`: attempt to subtract with overflow), which panics in builds
+//! with overflow checks.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
@@ -17,12 +18,12 @@ pub(super) fn decompress(chunk: Chunk, meta: &MetaData) -> Result<UncompressedBl
     if matches!(header.compression, Compression::DWAA(_) | Compression::DWAB(_)) {
         check_dwa_counters(&chunk, header)?;
     }
-    // The closure owns all that it changes, so nothing half-changed outlives a panic.
+    // The closure owns everything that it changes, so a panic leaves no inconsistent state behind.
     let attempt = AssertUnwindSafe(|| UncompressedBlock::decompress_chunk(chunk, meta, false));
     catch_unwind(attempt).unwrap_or_else(|_| Err(broken()))
 }
 
-/// The bytes of the largest block after decompression.
+/// The size in bytes of the largest block after decompression.
 pub(super) fn largest(header: &Header) -> usize {
     let (width, height) = (header.layer_size.width(), header.layer_size.height());
     let (block_width, block_height) = match header.blocks {
@@ -33,9 +34,9 @@ pub(super) fn largest(header: &Header) -> usize {
     pixels.saturating_mul(header.channels.bytes_per_pixel)
 }
 
-/// A DWA block starts with eleven 64-bit counters (`DataSizesSingle` of the reference implementation); those of
-/// uncompressed sizes become allocations. None of them can exceed what the largest block, its sides rounded up to whole
-/// 8 x 8 blocks and with four bytes per sample, holds twice over.
+/// Checks the eleven 64-bit counters at the start of a DWA block (`DataSizesSingle` of the reference implementation).
+/// The counters of uncompressed sizes become allocations. The bound is twice the size of the block, with its sides
+/// rounded up to multiples of 8 and four bytes per sample.
 fn check_dwa_counters(chunk: &Chunk, header: &Header) -> Result<()> {
     let bytes = match &chunk.compressed_block {
         CompressedBlock::ScanLine(block) => &block.compressed_pixels_le,
@@ -45,7 +46,7 @@ fn check_dwa_counters(chunk: &Chunk, header: &Header) -> Result<()> {
     let location = header.get_block_data_indices(&chunk.compressed_block)?;
     let size = header.get_absolute_block_pixel_coordinates(location)?.size;
     if bytes.len() == size.area() * header.channels.bytes_per_pixel {
-        // Stored as it is, since compression would not have made it smaller.
+        // Stored uncompressed, because compression would not have made it smaller.
         return Ok(());
     }
     let padded = size.width().next_multiple_of(8) * size.height().next_multiple_of(8);
@@ -59,5 +60,6 @@ fn broken() -> Error {
     Error::Invalid("compressed pixels".into())
 }
 
-/// Of the counters: unknown data, run-length tokens, run-length data, AC and DC coefficients.
+/// Indices of the counters of uncompressed sizes: unknown data, run-length tokens, run-length data, AC and DC
+/// coefficients.
 const UNCOMPRESSED_SIZES: [usize; 5] = [1, 6, 7, 8, 9];

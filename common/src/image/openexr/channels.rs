@@ -1,20 +1,20 @@
-//! Which channels of which part are the ones asked for.
+//! The choice of part and channels.
 
 use std::collections::BTreeMap;
 
-/// What is looked for.
+/// The kind of image to read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Wanted {
     /// `R G B`, else `Y`.
     Colours,
-    /// `R G B`, else `Y`, else a lone channel or `A`.
+    /// `R G B`, else `Y`, else `A`, else a single channel.
     Mask,
     /// `X Y Z`, else `R G B`.
     Normals,
 }
 
 impl Wanted {
-    /// For errors.
+    /// The wanted channels, for error messages.
     pub(super) fn describe(self) -> &'static str {
         match self {
             Self::Colours => "channels R, G and B, or Y",
@@ -31,15 +31,15 @@ pub(super) struct Layer {
     /// One (grey) or three channel indices of the part.
     pub(super) colours: Vec<usize>,
     pub(super) alpha: Option<usize>,
-    /// What was passed over.
+    /// The layers that are not read, as a warning.
     pub(super) warning: Option<String>,
 }
 
-/// Chooses among the channel names of all parts. The first choice of names in any part goes before the second one;
-/// within a part the unnamed layer goes before the named ones in alphabetical order.
+/// Chooses among the channel names of all parts. The first choice of names, in any part, is preferred to the second.
+/// Within a part the unnamed layer comes first, then the named ones in alphabetical order.
 ///
 /// # Errors
-/// With what was expected if there are no such channels.
+/// The expected channels, if there are none of them.
 pub(super) fn select(parts: &[Vec<String>], wanted: Wanted) -> Result<Layer, &'static str> {
     let choices: &[&[&str]] = match wanted {
         Wanted::Colours => &[&["r", "g", "b"], &["y"]],
@@ -55,12 +55,12 @@ pub(super) fn select(parts: &[Vec<String>], wanted: Wanted) -> Result<Layer, &'s
         let is_main = layer.part == 0 && prefix.is_empty();
         if !is_main && !others.is_empty() {
             let title = title(layer.part, prefix);
-            layer.warning = Some(format!("of several layers {title} is read, not {}", others.join(", ")));
+            layer.warning = Some(format!("{title} is read; other layers are ignored: {}", others.join(", ")));
         }
         return Ok(layer);
     }
-    let lone = parts.iter().position(|channels| channels.len() == 1).filter(|_| wanted == Wanted::Mask);
-    lone.map(|part| Layer { part, colours: vec![0], alpha: None, warning: None }).ok_or(wanted.describe())
+    let single = parts.iter().position(|channels| channels.len() == 1).filter(|_| wanted == Wanted::Mask);
+    single.map(|part| Layer { part, colours: vec![0], alpha: None, warning: None }).ok_or(wanted.describe())
 }
 
 fn title(part: usize, prefix: &str) -> String {
@@ -90,7 +90,7 @@ fn layers(channels: &[String]) -> BTreeMap<&str, Names> {
 
 impl Names {
     fn choose(&self, part: usize, names: &[&str]) -> Option<Layer> {
-        // The Y of a normal map or of chroma channels is no grey.
+        // A `Y` beside other axes or chroma channels is not grey.
         if names == ["y"] && ["x", "z", "ry", "by"].iter().any(|other| self.0.contains_key(*other)) {
             return None;
         }
@@ -109,7 +109,7 @@ mod tests {
     }
 
     #[test]
-    fn the_unnamed_layer_goes_first() {
+    fn the_unnamed_layer_is_preferred() {
         let layer = select(
             &parts(&[&["A", "B", "G", "N.X", "N.Y", "N.Z", "R", "diffuse.B", "diffuse.G", "diffuse.R"]]),
             Wanted::Colours,
@@ -119,15 +119,15 @@ mod tests {
     }
 
     #[test]
-    fn a_named_layer_or_a_later_part_is_found_and_said() {
+    fn a_named_layer_of_a_later_part_is_found_and_reported() {
         let file = parts(&[&["Z"], &["beauty.B", "beauty.G", "beauty.R", "sss.B", "sss.G", "sss.R"]]);
         let layer = select(&file, Wanted::Colours).unwrap();
         assert_eq!((layer.part, layer.colours), (1, vec![2, 1, 0]));
-        assert_eq!(layer.warning.unwrap(), "of several layers `beauty` of part 1 is read, not `sss` of part 1");
+        assert_eq!(layer.warning.unwrap(), "`beauty` of part 1 is read; other layers are ignored: `sss` of part 1");
     }
 
     #[test]
-    fn normals_are_not_taken_for_grey_nor_depth_for_colour() {
+    fn normals_are_not_read_as_grey_nor_depth_as_colour() {
         assert!(select(&parts(&[&["N.X", "N.Y", "N.Z"], &["Z"]]), Wanted::Colours).is_err());
         assert_eq!(select(&parts(&[&["N.X", "N.Y", "N.Z"]]), Wanted::Normals).unwrap().colours, [0, 1, 2]);
         assert_eq!(select(&parts(&[&["A", "Y"]]), Wanted::Colours).unwrap().alpha, Some(0));
@@ -135,7 +135,7 @@ mod tests {
     }
 
     #[test]
-    fn a_mask_may_be_alpha_alone_or_any_lone_channel() {
+    fn a_mask_may_be_alpha_or_any_single_channel() {
         assert_eq!(select(&parts(&[&["A", "Z"]]), Wanted::Mask).unwrap().colours, [0]);
         assert_eq!(select(&parts(&[&["coverage"]]), Wanted::Mask).unwrap().colours, [0]);
         assert!(select(&parts(&[&["u", "v"]]), Wanted::Mask).is_err());

@@ -1,15 +1,15 @@
-//! A first look at the header by hand, before the `exr` crate reads it: names the compressions it does not know, and
-//! bounds what it would allocate. Also puts a written header into one order.
+//! A check of the header before the `exr` crate reads it: reports compressions that the crate does not support, by
+//! name, and limits what it would allocate. Also sorts the attributes of a written header.
 
 use std::ops::Range;
 
-use super::FORMAT;
+use crate::image::decoded::Format;
 use crate::image::error::ImageError;
 use crate::image::source::Source;
 
 /// Checks versions, windows, tiles and compressions of all parts.
 pub(super) fn check(source: &Source<'_>) -> Result<(), ImageError> {
-    let cut = || source.malformed(FORMAT, "its header is cut off or broken");
+    let cut = || source.malformed(FORMAT, "its header is truncated or broken");
     let flags = u32_at(source.bytes, 4).ok_or_else(cut)?;
     if flags & DEEP != 0 {
         return Err(source.unsupported(FORMAT, "deep data", "flatten it in the program that rendered it"));
@@ -22,9 +22,13 @@ pub(super) fn check(source: &Source<'_>) -> Result<(), ImageError> {
             rest.start = attribute.whole.end;
         }
         if samples.pixels.saturating_mul(samples.channels) > source.limits.max_pixels.saturating_mul(MAX_CHANNELS) {
-            return Err(source.unsupported(FORMAT, format!("{} channels at this size", samples.channels), "drop some"));
+            return Err(source.unsupported(
+                FORMAT,
+                format!("{} channels at this size", samples.channels),
+                "remove channels that are not needed",
+            ));
         }
-        // One empty name ends a part; in a file of several parts, another one ends the list.
+        // An empty name ends a part. In a multi-part file, a second one ends the list of parts.
         rest.start += 1;
         if flags & MULTI_PART == 0 || source.bytes.get(rest.start) == Some(&0) {
             return Ok(());
@@ -32,7 +36,7 @@ pub(super) fn check(source: &Source<'_>) -> Result<(), ImageError> {
     }
 }
 
-/// How much a part may hold.
+/// The size of a part.
 #[derive(Debug, Default)]
 struct Samples {
     pixels: usize,
@@ -42,7 +46,7 @@ struct Samples {
 fn check_attribute(source: &Source<'_>, attribute: &Attribute, samples: &mut Samples) -> Result<(), ImageError> {
     let bytes = source.bytes;
     let value = &bytes[attribute.value.clone()];
-    let broken = || source.malformed(FORMAT, "its header holds a broken attribute");
+    let broken = || source.malformed(FORMAT, "its header has a broken attribute");
     match &bytes[attribute.name.clone()] {
         b"compression" => match value.first() {
             Some(0..=9) => Ok(()),
@@ -82,7 +86,7 @@ fn unknown_compression(source: &Source<'_>, number: u8) -> ImageError {
     source.unsupported(FORMAT, format!("compression {name}"), advice)
 }
 
-/// Where an attribute and its fields lie in the file.
+/// The byte ranges of an attribute and its fields in the file.
 #[derive(Debug, Clone)]
 struct Attribute {
     name: Range<usize>,
@@ -90,7 +94,7 @@ struct Attribute {
     whole: Range<usize>,
 }
 
-/// The attribute at the start of `rest`; `Some(None)` at the end of a header, `None` if it is cut off.
+/// The attribute at the start of `rest`; `Some(None)` at the end of a header, `None` if it is truncated.
 fn attribute(bytes: &[u8], rest: Range<usize>) -> Option<Option<Attribute>> {
     let text = |start: usize| {
         let length = bytes.get(start..rest.end)?.iter().take(MAX_NAME).position(|&byte| byte == 0)?;
@@ -107,8 +111,8 @@ fn attribute(bytes: &[u8], rest: Range<usize>) -> Option<Option<Attribute>> {
     Some(Some(Attribute { whole: rest.start..value.end, name, value }))
 }
 
-/// Sorts the attributes of a single-part file by name. The `exr` crate writes custom ones in the order of a hash map;
-/// sorted, equal content has equal bytes. Lengths stay, so offsets do.
+/// Sorts the attributes of a single-part file by name, so that equal content has equal bytes. The `exr` crate writes
+/// custom attributes in the order of a hash map. Sorting does not change lengths, so offsets stay valid.
 pub(super) fn sort_attributes(bytes: &mut [u8]) {
     let mut attributes = Vec::new();
     let mut end = 8;
@@ -129,12 +133,15 @@ fn i32_at(bytes: &[u8], at: usize) -> Option<i32> {
     Some(i32::from_le_bytes(*bytes.get(at..)?.first_chunk()?))
 }
 
+/// The format, for errors.
+pub(super) const FORMAT: Format = Format::OpenExr;
+
 /// Flags of the version field.
 const DEEP: u32 = 1 << 11;
 const MULTI_PART: u32 = 1 << 12;
 
-/// Long names have up to 255 bytes.
+/// The limit of a name with its terminating 0; long names have up to 255 bytes.
 const MAX_NAME: usize = 256;
 
-/// Channels per pixel that are let pass at the largest size; more where the image is smaller.
+/// The limit of channels per pixel at the largest size; smaller images may have more.
 const MAX_CHANNELS: usize = 64;

@@ -1,11 +1,12 @@
-//! OpenEXR (*OpenEXR File Layout*), through the `exr` crate: half, float and unsigned-integer channels (integers above
-//! 2^24 round), scan lines or tiles, one or more parts, every compression but the JPEG 2000 and Zstandard ones.
+//! OpenEXR (*OpenEXR File Layout*), by the `exr` crate: half, float and unsigned-integer channels (integers above 2^24
+//! are rounded), scan lines or tiles, one or more parts, all compressions except JPEG 2000 and Zstandard.
 //!
-//! - The image is the display window. The data window is placed in it: outside it is 0, and pixels beyond the display
-//!   window are dropped; both are warnings.
-//! - The first part with `R G B` is read, its unnamed layer before named ones; without any, the first `Y` as grey.
+//! - The image is the display window. The data window is placed in it. Pixels outside the data window are 0, and pixels
+//!   outside the display window are dropped; both are warnings.
+//! - The first part with `R G B` is read, its unnamed layer before named ones. If there is none, the first `Y` is read
+//!   as grey.
 //! - `chromaticities` other than Rec. 709 are converted.
-//! - Colours with alpha are premultiplied, as the format demands, and stay so.
+//! - Colours with alpha are premultiplied, as the format requires, and are kept so.
 //! - Of several resolution levels the largest is read. Deep data and chroma-subsampled channels are refused.
 
 mod block;
@@ -19,12 +20,13 @@ mod write;
 pub use write::write;
 
 use channels::{Layer, Wanted};
+use header::FORMAT;
 use raster::Raster;
 
 use super::Image;
-use super::decoded::{Decoded, Encoding, Format};
+use super::decoded::{Decoded, Encoding};
 use super::error::ImageError;
-use super::mask::Channels;
+use super::mask_channels::Channels;
 use super::primaries::{Primaries, convert};
 use super::source::Source;
 use crate::math::Mat3;
@@ -50,7 +52,7 @@ pub(super) fn decode(source: &Source<'_>) -> Result<Decoded, ImageError> {
     })
 }
 
-/// What an OpenEXR file offers for a mask: its colours, else its only channel.
+/// The channels of an OpenEXR file that may hold a mask: its colours, else its only channel.
 pub(super) fn mask_channels(source: &Source<'_>) -> Result<Channels, ImageError> {
     let (layer, mut raster) = Raster::read(source, |parts| channels::select(parts, Wanted::Mask))?;
     let colours = raster.pixels(&layer);
@@ -58,22 +60,22 @@ pub(super) fn mask_channels(source: &Source<'_>) -> Result<Channels, ImageError>
     Ok(Channels { width: raster.width, height: raster.height, alpha, colours })
 }
 
-/// The normals of an OpenEXR file, as they are.
+/// The normals of an OpenEXR file, unchecked.
 pub(super) fn normal_channels(source: &Source<'_>) -> Result<Image, ImageError> {
     let (layer, raster) = Raster::read(source, |parts| channels::select(parts, Wanted::Normals))?;
     Ok(Image::from_pixels(raster.width, raster.height, raster.pixels(&layer)))
 }
 
-/// The conversion that the file's chromaticities call for.
+/// The conversion from the file's chromaticities to Rec. 709; `None` if they are those of Rec. 709 or missing.
 fn to_rec709(source: &Source<'_>, raster: &Raster) -> Result<Option<Mat3>, ImageError> {
     let Some(numbers) = raster.chromaticities else { return Ok(None) };
     Primaries::from_array(numbers)
         .to_rec709()
-        .map_err(|_| source.malformed(FORMAT, format!("chromaticities {numbers:?} are no colour primaries")))
+        .map_err(|_| source.malformed(FORMAT, format!("chromaticities {numbers:?} are not colour primaries")))
 }
 
 impl Raster {
-    /// The planes of a layer as pixels, one plane as grey.
+    /// The planes of a layer as pixels; a single plane is grey.
     fn pixels(&self, layer: &Layer) -> Vec<[f32; 3]> {
         let [first, rest @ ..] = self.planes.as_slice() else { return Vec::new() };
         match (layer.colours.len(), rest) {
@@ -82,5 +84,3 @@ impl Raster {
         }
     }
 }
-
-const FORMAT: Format = Format::OpenExr;

@@ -1,4 +1,4 @@
-//! Blocks of the chosen channels, decompressed and placed into the display window.
+//! Decompression of the chosen channels' blocks, and their placement in the display window.
 
 use std::collections::BTreeSet;
 use std::io::Cursor;
@@ -13,7 +13,8 @@ use exr::prelude::f16;
 use rayon::prelude::*;
 
 use super::channels::Layer;
-use super::{FORMAT, block, header};
+use super::header::FORMAT;
+use super::{block, header};
 use crate::image::error::ImageError;
 use crate::image::source::Source;
 
@@ -40,7 +41,7 @@ impl Raster {
         header::check(source)?;
         let fault = |error: exr::error::Error| match error {
             exr::error::Error::NotSupported(feature) => {
-                source.unsupported(FORMAT, feature, "convert it to plain scan lines with zip compression")
+                source.unsupported(FORMAT, feature, "convert it to scan lines with zip compression")
             }
             other => source.malformed(FORMAT, other.to_string()),
         };
@@ -59,7 +60,7 @@ impl Raster {
         Ok((layer, raster))
     }
 
-    /// An empty raster of the display window.
+    /// An empty raster of the size of the display window.
     fn prepare(source: &Source<'_>, header: &Header, layer: &Layer) -> Result<Self, ImageError> {
         let (display, data) = (header.shared_attributes.display_window, header.data_window());
         let (width, height) = (display.size.width(), display.size.height());
@@ -72,14 +73,14 @@ impl Raster {
         }
         let mut warnings = Vec::new();
         let (ours, theirs) = (Window::of(display), Window::of(data));
-        if !ours.meets(theirs) {
+        if !ours.overlaps(theirs) {
             return Err(source.malformed(FORMAT, "its data window lies outside its display window"));
         }
         if !theirs.contains(ours) {
-            warnings.push("the data window does not fill the display window: the rest is black".to_owned());
+            warnings.push("the data window does not cover the display window: the rest is black".to_owned());
         }
         if !ours.contains(theirs) {
-            warnings.push("the data window exceeds the display window: what is outside is dropped".to_owned());
+            warnings.push("the data window exceeds the display window: pixels outside it are dropped".to_owned());
         }
         let chromaticities = header
             .shared_attributes
@@ -138,15 +139,15 @@ impl From<exr::error::Error> for Fill {
     }
 }
 
-/// A block of the largest level is known by its corner.
+/// The position of a block, which identifies it within a part.
 fn position(block: &BlockIndex) -> (usize, usize, usize, usize) {
     (block.level.x(), block.level.y(), block.pixel_position.y(), block.pixel_position.x())
 }
 
-/// Where samples lie in a block, and where they go.
+/// The places of samples in a block and in the planes.
 #[derive(Debug)]
 struct Placement {
-    /// Of each plane: bytes before the channel in one pixel's worth of a block's line, and its type.
+    /// For each plane: the bytes per pixel of the channels before its channel, and its type.
     sources: Vec<(usize, SampleType)>,
     bytes_per_pixel: usize,
     /// Data window relative to the display window.
@@ -170,7 +171,7 @@ impl Placement {
         }
     }
 
-    /// Copies a block, in which each line holds all samples of the first channel, then of the next.
+    /// Copies a block to the planes. Each line of a block has all samples of the first channel, then of the next.
     fn place(&self, block: &UncompressedBlock, planes: &mut [Vec<f32>]) {
         let line_width = block.index.pixel_size.width();
         let line_bytes = line_width * self.bytes_per_pixel;
@@ -193,12 +194,12 @@ impl Placement {
     }
 }
 
-/// A coordinate of the data window in the display window, unless it lies above or left of it.
+/// Converts a coordinate from the data window to the display window; `None` if it is above or left of it.
 fn shifted(at: usize, offset: i64) -> Option<usize> {
     usize::try_from(i64::try_from(at).ok()? + offset).ok()
 }
 
-/// A sample in the machine's byte order. Bytes beyond a type's size are not there.
+/// The value of a sample in the machine's byte order, of as many bytes as its type has.
 #[allow(clippy::cast_precision_loss, reason = "integers above 2^24 round, as the module says")]
 fn value(sample: &[u8], kind: SampleType) -> f32 {
     let mut bytes = [0; 4];
@@ -214,7 +215,7 @@ fn channel_names(header: &Header) -> Vec<String> {
     header.channels.list.iter().map(|channel| channel.name.to_string()).collect()
 }
 
-/// Text and numbers among the attributes, by name: the crate keeps them in hash maps.
+/// Text and number attributes, sorted by name, because the crate stores them in hash maps.
 fn metadata(header: &Header) -> Vec<(String, String)> {
     let mut found: Vec<(String, String)> = header
         .all_named_attributes()
@@ -234,7 +235,7 @@ fn metadata(header: &Header) -> Vec<(String, String)> {
     found
 }
 
-/// Text is UTF-8 by today's custom; the crate itself takes it for Latin-1.
+/// Text is usually UTF-8 today; the crate decodes it as Latin-1, which is the fallback here.
 fn decode_text(bytes: &[u8]) -> String {
     String::from_utf8(bytes.to_vec()).unwrap_or_else(|_| bytes.iter().copied().map(char::from).collect())
 }
@@ -263,7 +264,7 @@ impl Window {
         self.left <= other.left && self.top <= other.top && self.right >= other.right && self.bottom >= other.bottom
     }
 
-    fn meets(self, other: Self) -> bool {
+    fn overlaps(self, other: Self) -> bool {
         self.left < other.right && other.left < self.right && self.top < other.bottom && other.top < self.bottom
     }
 }
@@ -271,9 +272,10 @@ impl Window {
 /// Attributes that describe the file's layout, not its content.
 const LAYOUT: [&str; 5] = ["type", "chunkCount", "version", "screenWindowWidth", "maxSamplesPerPixel"];
 
-/// Blocks decompressed at a time: enough for all cores, of little memory.
+/// Limits of the blocks that are decompressed at a time, by number and by bytes: enough for all cores, with little
+/// memory.
 const MAX_BATCH: usize = 64;
 const BATCH_BYTES: usize = 1 << 28;
 
-/// The largest block that is let pass, after decompression: a tile of 16384 x 16384 pixels of four half floats.
+/// The largest accepted block after decompression: a tile of 16384 x 16384 pixels of four half floats.
 const MAX_BLOCK_BYTES: usize = 1 << 31;

@@ -1,4 +1,4 @@
-//! Files written by the `exr` crate, by the reference implementation (`fixtures/make.py`) and by ourselves.
+//! Files written by the `exr` crate, by the reference implementation (`fixtures/make.py`) and by this crate.
 
 use exr::math::RoundingMode;
 use exr::prelude::*;
@@ -61,7 +61,7 @@ fn deviation(image: &Picture) -> f32 {
     differences.fold(0.0, f32::max)
 }
 
-/// Half floats up to 4 are within 2^-10 of what was meant.
+/// Half floats up to 4 are within 2^-10 of the exact value.
 const HALF: f32 = 1.0 / 1024.0;
 
 #[test]
@@ -74,7 +74,7 @@ fn every_compression_of_the_crate_is_read() {
         (ZIP16, HALF),
         (PIZ, HALF),
         (PXR24, HALF),
-        // 14 bytes for 16 pixels: six bits for differences within a block.
+        // 14 bytes for 16 pixels leave six bits for differences within a block.
         (B44, 0.05),
         (B44A, 0.05),
     ] {
@@ -100,7 +100,7 @@ fn files_of_the_reference_implementation_are_read() {
 }
 
 #[test]
-fn an_unreadable_compression_is_named_with_a_way_out() {
+fn an_unsupported_compression_is_named_with_advice() {
     for (bytes, name) in [(&fixture!("htj2k32.exr")[..], "HTJ2K32"), (fixture!("zstd.exr"), "ZSTD")] {
         let error = decode("photo.exr", bytes).unwrap_err().to_string();
         assert!(
@@ -171,7 +171,7 @@ fn grey_alpha_and_integers_are_read() {
 }
 
 #[test]
-fn other_chromaticities_are_converted_and_said() {
+fn other_chromaticities_are_converted_with_a_warning() {
     let rec_2020 = attribute::Chromaticities {
         red: Vec2(0.708, 0.292),
         green: Vec2(0.170, 0.797),
@@ -210,7 +210,7 @@ fn missing_channels_and_blocks_are_errors() {
     assert!(matches!(decode("photo.exr", &bytes), Err(ImageError::Malformed { .. })));
 }
 
-/// Found by fuzzing: where overflow is checked, the decompressor of the `exr` crate panics on differences below zero.
+/// Found by fuzzing: with overflow checks, the decompressor of the `exr` crate panics on differences below zero.
 #[test]
 fn a_broken_b44_block_never_panics() {
     let mut bytes = fixture!("b44a.exr").to_vec();
@@ -221,12 +221,12 @@ fn a_broken_b44_block_never_panics() {
     }
 }
 
-/// Found by fuzzing: the `exr` crate allocates what the counters of a DWA block say.
+/// Found by fuzzing: the `exr` crate allocates the sizes in the counters of a DWA block.
 #[test]
-fn a_dwa_block_that_claims_too_much_is_an_error() {
+fn a_dwa_block_with_too_large_counters_is_an_error() {
     let whole = fixture!("dwab.exr");
     let mut found = 0;
-    // The block starts with version 2 and ends the file; its counters follow.
+    // The block is the last of the file and starts with version 2; the other counters follow.
     let start = whole.windows(8).rposition(|w| w == 2u64.to_le_bytes()).unwrap();
     for counter in [1, 6, 7, 8, 9] {
         let mut bytes = whole.to_vec();
@@ -255,7 +255,7 @@ fn normals_are_read_from_xyz() {
     assert!((normals.value(1, 5).length() - 1.0).abs() < 1e-15);
 }
 
-/// An image with every kind of value.
+/// An image with small, large, negative and infinite values.
 fn results() -> Picture {
     let mut image = Picture::new(5, 3);
     for (at, pixel) in image.pixels_mut().iter_mut().enumerate() {
@@ -277,7 +277,7 @@ fn notes() -> Vec<(String, String)> {
 }
 
 #[test]
-fn what_is_written_is_read_bit_for_bit() {
+fn written_files_are_read_bit_for_bit() {
     let image = results();
     let coverage: Vec<f32> = (0..15).map(|at| at as f32 / 14.0).collect();
     let bytes = super::write(&image, Some(&coverage), &notes()).unwrap();
@@ -298,14 +298,14 @@ fn the_same_input_gives_the_same_bytes() {
     let bytes = super::write(&results(), None, &notes()).unwrap();
     let mut reversed = notes();
     reversed.reverse();
-    // Every hash map has its own order: eight files agree by chance once in 6^7.
+    // Every hash map has its own order; without sorting, eight files would agree by chance once in 6^7.
     for _ in 0..8 {
         assert_eq!(super::write(&results(), None, &reversed).unwrap(), bytes);
     }
 }
 
 #[test]
-fn what_cannot_be_written_is_refused() {
+fn content_that_openexr_cannot_represent_is_refused() {
     let image = results();
     let note = |key: &str| vec![(key.to_owned(), "x".to_owned())];
     for notes in [note(""), note(&"k".repeat(32)), note("compression"), [note("a"), note("a")].concat()] {

@@ -9,18 +9,18 @@ use exr::prelude::{
     AnyChannel, AnyChannels, Blocks, Compression, Encoding, FlatSamples, Image as ExrImage, Layer, WritableImage,
 };
 
-use super::{FORMAT, header};
+use super::header::{self, FORMAT};
 use crate::image::error::ImageError;
 use crate::image::{Image, metadata as keys};
 
-/// The bytes of an OpenEXR file of `image`: channels `R G B` and, with `coverage` (one value per pixel, row-major), `A`,
-/// all as 32-bit floats. Colours with coverage are premultiplied by it, as the format demands; that is the caller's part.
+/// The bytes of an OpenEXR file of `image`: channels `R G B` and, with `coverage` (one value per pixel, row-major),
+/// `A`, all as 32-bit floats. With coverage the caller must premultiply the colours by it, as the format requires.
 /// `metadata` becomes string attributes, sorted by key; keys as in [`crate::image::metadata`]. The same input gives the
 /// same bytes. NaN and infinities are kept.
 ///
 /// # Errors
-/// If the image is empty, `coverage` has another size, or a key is empty, given twice, longer than 31 bytes, or one of
-/// the format's own attributes.
+/// If the image is empty, `coverage` has another size, or a key is empty, given twice, longer than 31 bytes, or the
+/// name of one of the format's own attributes.
 pub fn write(image: &Image, coverage: Option<&[f32]>, metadata: &[(String, String)]) -> Result<Vec<u8>, ImageError> {
     let pixels = image.pixels();
     if pixels.is_empty() {
@@ -50,7 +50,7 @@ pub fn write(image: &Image, coverage: Option<&[f32]>, metadata: &[(String, Strin
     Ok(bytes)
 }
 
-/// The metadata as attributes: the format's own where it has one, else custom ones.
+/// The metadata as attributes: the format's own attribute if there is one, else a custom attribute.
 fn attributes(metadata: &[(String, String)]) -> Result<LayerAttributes, ImageError> {
     let mut attributes = LayerAttributes::default();
     for (key, value) in metadata {
@@ -69,7 +69,7 @@ fn attributes(metadata: &[(String, String)]) -> Result<LayerAttributes, ImageErr
     Ok(attributes)
 }
 
-/// UTF-8 as it is: `Text::from` panics beyond Latin-1.
+/// Stores UTF-8, because `Text::from` panics on characters outside Latin-1.
 fn encode(value: &str) -> Text {
     Text::from_slice_unchecked(value.as_bytes())
 }

@@ -1,4 +1,4 @@
-//! Cut-off, altered, random and oversized files: an error each time, never a panic, never a large allocation.
+//! Truncated, altered, random and oversized files must give an error, without a panic or a large allocation.
 
 use image::ExtendedColorType as Colour;
 use proptest::prelude::*;
@@ -32,12 +32,12 @@ fn read_all(bytes: &[u8]) {
 }
 
 #[test]
-fn a_file_cut_off_anywhere_is_an_error() {
+fn a_file_truncated_anywhere_is_an_error() {
     for (name, bytes) in samples() {
         assert!(decode(name, &bytes).is_ok(), "{name}: {:?}", decode(name, &bytes));
         for length in 0..bytes.len() {
             let result = decode(name, &bytes[..length]);
-            assert!(result.is_err(), "{name} cut off at {length} of {}: {result:?}", bytes.len());
+            assert!(result.is_err(), "{name} truncated to {length} of {} bytes: {result:?}", bytes.len());
         }
     }
     for fixture in [
@@ -97,7 +97,7 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 512, ..ProptestConfig::default() })]
 
     #[test]
-    fn random_bytes_behind_a_magic_number_never_panic(
+    fn random_bytes_after_a_magic_number_never_panic(
         magic in prop::sample::select(vec![
             &b"\x76\x2f\x31\x01\x02\0\0\0"[..], b"#?RADIANCE\n", b"#?RGBE\n\n-Y 4 +X 9\n", b"PF\n", b"Pf\n3 3\n-1\n",
             b"\x89PNG\r\n\x1a\n\0\0\0\x0dIHDR", b"\xff\xd8\xff", b"",

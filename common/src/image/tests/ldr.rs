@@ -21,6 +21,10 @@ pub(super) fn jpeg_of(data: &[u8], width: u32, height: u32, colour: Colour) -> V
 
 /// `bytes` with a chunk after the header chunk.
 fn with_chunk(bytes: &[u8], kind: &[u8; 4], data: &[u8]) -> Vec<u8> {
+    with_chunk_at(bytes, 33, kind, data)
+}
+
+fn with_chunk_at(bytes: &[u8], at: usize, kind: &[u8; 4], data: &[u8]) -> Vec<u8> {
     let body = [&kind[..], data].concat();
     let mut crc = u32::MAX;
     for byte in &body {
@@ -30,7 +34,7 @@ fn with_chunk(bytes: &[u8], kind: &[u8; 4], data: &[u8]) -> Vec<u8> {
         }
     }
     let length = u32::try_from(data.len()).unwrap().to_be_bytes();
-    [&bytes[..33], &length, &body, &(!crc).to_be_bytes(), &bytes[33..]].concat()
+    [&bytes[..at], &length, &body, &(!crc).to_be_bytes(), &bytes[at..]].concat()
 }
 
 fn linear(code: u8) -> f32 {
@@ -60,7 +64,7 @@ fn grey_alpha_and_sixteen_bits_are_decoded() {
 
 #[test]
 fn a_palette_of_four_bits_with_transparency_is_decoded() {
-    // 3 x 1 pixels of indices 0 1 2; entry 1 is transparent. Scan line: filter 0, then 0x01 0x20, stored uncompressed.
+    // 3 x 1 pixels of indices 0, 1, 2; entry 1 is transparent. The scan line is filter 0, then 0x01 0x20, uncompressed.
     let header = [0, 0, 0, 3, 0, 0, 0, 1, 4, 3, 0, 0, 0];
     let zlib = [0x78, 0x01, 1, 3, 0, 0xfc, 0xff, 0, 0x01, 0x20, 0x00, 0x25, 0x00, 0x22];
     let empty = [b"\x89PNG\r\n\x1a\n".as_slice(), &[0; 25]].concat();
@@ -80,7 +84,7 @@ fn a_palette_of_four_bits_with_transparency_is_decoded() {
 }
 
 #[test]
-fn contradictions_of_srgb_are_warnings() {
+fn declarations_of_other_colours_are_warnings() {
     let plain = png_of(&[10; 3], 1, 1, Colour::Rgb8);
     let warnings = |bytes: &[u8]| decode("a.png", bytes).unwrap().warnings;
     let gamma = |value: u32| with_chunk(&plain, b"gAMA", &value.to_be_bytes());
@@ -94,18 +98,18 @@ fn contradictions_of_srgb_are_warnings() {
 }
 
 #[test]
-fn a_photo_lying_on_its_side_is_turned_and_said() {
-    // Orientation 6: to be turned clockwise. Exif: big-endian TIFF with one entry.
+fn exif_orientation_is_applied_with_a_warning() {
+    // Orientation 6: to be rotated clockwise. Exif: big-endian TIFF with one entry.
     let exif = [b"MM\0\x2a\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0\x06\0\0\0\0\0\0".as_slice()].concat();
-    let lying = with_chunk(&png_of(&[0, 10, 20, 30, 40, 50], 3, 2, Colour::L8), b"eXIf", &exif);
-    let decoded = decode("a.png", &lying).unwrap();
+    let rotated = with_chunk(&png_of(&[0, 10, 20, 30, 40, 50], 3, 2, Colour::L8), b"eXIf", &exif);
+    let decoded = decode("a.png", &rotated).unwrap();
     assert_eq!((decoded.image.width(), decoded.image.height()), (2, 3));
     assert_eq!(decoded.image.pixel(0, 0)[0], linear(30));
     assert_eq!(decoded.warnings.len(), 1);
     let photo = jpeg_of(&[100; 3 * 16 * 8], 16, 8, Colour::Rgb8);
     let app1 = [&[0xff, 0xe1, 0, 34][..], b"Exif\0\0", &exif].concat();
-    let lying = [&photo[..2], &app1, &photo[2..]].concat();
-    let image = decode("a.jpg", &lying).unwrap().image;
+    let rotated = [&photo[..2], &app1, &photo[2..]].concat();
+    let image = decode("a.jpg", &rotated).unwrap().image;
     assert_eq!((image.width(), image.height()), (8, 16));
 }
 
@@ -114,7 +118,7 @@ fn jpeg_colours_and_greys_are_decoded_from_srgb() {
     let pixels: Vec<u8> = [200, 100, 50].repeat(16 * 16);
     let decoded = decode("a.jpg", &jpeg_of(&pixels, 16, 16, Colour::Rgb8)).unwrap();
     let [r, g, b] = decoded.image.pixel(8, 8);
-    // Quality 95 quantises flat colours to two codes.
+    // Quality 95 quantises flat colours in steps of two codes.
     assert!(
         linear(197) < r && r < linear(203) && linear(97) < g && g < linear(103) && linear(46) < b && b < linear(54)
     );
@@ -125,7 +129,7 @@ fn jpeg_colours_and_greys_are_decoded_from_srgb() {
 }
 
 #[test]
-fn print_colours_and_cut_off_photos_are_refused() {
+fn print_colours_and_truncated_photos_are_refused() {
     let mut bytes = jpeg_of(&[100; 64], 8, 8, Colour::L8);
     let frame = bytes.windows(2).position(|w| w == [0xff, 0xc0]).unwrap();
     bytes[frame + 9] = 4;
@@ -136,7 +140,7 @@ fn print_colours_and_cut_off_photos_are_refused() {
 }
 
 #[test]
-fn written_codes_are_the_nearest_and_metadata_comes_back() {
+fn written_codes_are_the_nearest_and_metadata_is_read_back() {
     let middle = srgb::to_linear(100.5 / 255.0);
     let values = [[middle * 0.999, middle * 1.001, 0.5], [2.0, -1.0, f64::INFINITY]];
     let image = Image::from_pixels(2, 1, values.map(|pixel| pixel.map(to_f32)).to_vec());
@@ -155,10 +159,23 @@ fn written_codes_are_the_nearest_and_metadata_comes_back() {
 }
 
 #[test]
-fn what_png_cannot_hold_is_refused() {
+fn content_that_png_cannot_represent_is_refused() {
     let nan = Image::from_pixels(2, 1, vec![[0.0; 3], [0.0, f32::NAN, 0.0]]);
     assert!(png::write(&nan, &[]).unwrap_err().to_string().contains("column 1, row 0"));
-    let image = Image::new(1, 1);
-    assert!(png::write(&image, &[(String::new(), String::new())]).is_err());
+    let with_text = |key: &str, value: &str| png::write(&Image::new(1, 1), &[(key.to_owned(), value.to_owned())]);
+    for (key, value) in [("", "x"), (" key", "x"), ("\u{e9}", "x"), (&"k".repeat(80), "x"), ("key", "a\0b")] {
+        assert!(with_text(key, value).is_err(), "{key:?} {value:?}");
+    }
+    assert!(with_text("key", "").is_ok());
     assert!(png::write(&Image::new(0, 1), &[]).is_err());
+}
+
+#[test]
+fn text_after_the_pixels_is_read_and_compressed_text_is_not() {
+    let plain = png_of(&[10; 3], 1, 1, Colour::Rgb8);
+    let end = plain.len() - 12;
+    let bytes = with_chunk_at(&plain, end, b"tEXt", b"Comment\0after the pixels");
+    let bytes = with_chunk_at(&bytes, end, b"iTXt", b"note\0\x01\0\0\0not a zlib stream");
+    let text = ("comments".to_owned(), "after the pixels".to_owned());
+    assert_eq!(decode("a.png", &bytes).unwrap().metadata, [text]);
 }

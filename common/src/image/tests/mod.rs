@@ -1,4 +1,4 @@
-//! Tests of the entry points, by format and by fault. OpenEXR has its own beside the reader.
+//! Tests of the entry points, by format and by fault. The tests of OpenEXR are beside its reader.
 
 mod hostile;
 mod ldr;

@@ -1,6 +1,6 @@
 use crate::image::{Image, ImageError, decode, pfm};
 
-/// A map of `samples`, bottom row first.
+/// A file of `samples`, bottom row first.
 pub(super) fn map(header: &str, samples: &[f32], little_endian: bool) -> Vec<u8> {
     let raster = samples.iter().flat_map(|x| if little_endian { x.to_le_bytes() } else { x.to_be_bytes() });
     header.bytes().chain(raster).collect()
@@ -20,14 +20,14 @@ fn colour_and_grey_of_both_byte_orders_are_read_bottom_up() {
 }
 
 #[test]
-fn the_scale_is_applied_and_said() {
+fn the_scale_is_applied_with_a_warning() {
     let decoded = decode("a.pfm", &map("Pf\n1 1\n-2.5\n", &[2.0], true)).unwrap();
     assert_eq!((decoded.image.pixel(0, 0), decoded.warnings.len()), ([5.0; 3], 1));
 }
 
 #[test]
-fn lines_ended_by_return_and_line_feed_are_read() {
-    // The first sample's lowest byte is that of a line feed, where a second one would be taken for data.
+fn headers_with_carriage_returns_are_read() {
+    // The lowest byte of the first sample is a line feed, which must not be taken for the end of the header.
     let sample = f32::from_le_bytes([b'\n', 0, 0x80, 0x3f]);
     for header in ["Pf\r\n1 1\r\n-1.0\r\n", "Pf\r1 1\r-1.0\r"] {
         let decoded = decode("a.pfm", &map(header, &[sample], true)).unwrap();

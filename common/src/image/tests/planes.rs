@@ -14,7 +14,7 @@ fn a_grey_mask_is_linear_in_its_codes() {
 }
 
 #[test]
-fn alpha_goes_before_colours_unless_it_says_nothing() {
+fn alpha_is_preferred_to_colours_unless_it_is_one_everywhere() {
     let mask = decode_mask("m.png", &png_of(&[9, 9, 9, 255, 7, 8, 9, 51], 2, 1, Colour::Rgba8)).unwrap();
     assert_eq!(mask.values(), [1.0, 0.2]);
     let mask = decode_mask("m.png", &png_of(&[51, 51, 51, 255, 0, 0, 0, 255], 2, 1, Colour::Rgba8)).unwrap();
@@ -22,7 +22,7 @@ fn alpha_goes_before_colours_unless_it_says_nothing() {
 }
 
 #[test]
-fn a_coloured_mask_and_values_beyond_one_are_refused_with_coordinates() {
+fn a_coloured_mask_and_values_outside_the_range_are_refused_with_coordinates() {
     let error = decode_mask("m.png", &png_of(&[0, 0, 0, 0, 0, 1], 2, 1, Colour::Rgb8)).unwrap_err();
     assert_eq!(error, ImageError::ColouredMask { name: "m.png".to_owned(), column: 1, row: 0 });
     for bad in [1.01, -0.1, f32::NAN, f32::INFINITY] {
@@ -32,7 +32,7 @@ fn a_coloured_mask_and_values_beyond_one_are_refused_with_coordinates() {
 }
 
 #[test]
-fn normals_are_renormalised_and_the_background_is_zero() {
+fn normals_are_normalised_and_the_background_is_zero() {
     let samples = [0.0, 0.0, 0.0, 0.0, 0.0, 1.009, -0.6, 0.0, 0.8];
     let normals = decode_normals("n.pfm", &map("PF\n3 1\n-1\n", &samples, true)).unwrap();
     assert_eq!(normals.value(0, 0).to_array(), [0.0; 3]);
@@ -42,7 +42,7 @@ fn normals_are_renormalised_and_the_background_is_zero() {
 
 #[test]
 fn normals_of_another_length_are_refused_with_coordinates() {
-    // The last is a normal along +Z packed into [0, 1].
+    // The last one is a normal along +Z packed into [0, 1].
     for bad in [[0.0, 0.0, 1.02], [0.0, 0.0, 0.98], [f32::NAN, 0.0, 1.0], [f32::INFINITY, 0.0, 0.0], [0.5, 0.5, 1.0]] {
         let image = Image::from_pixels(2, 1, vec![[0.0; 3], bad]);
         let error = decode_normals("n.exr", &openexr::write(&image, None, &[]).unwrap()).unwrap_err();

@@ -1,4 +1,4 @@
-//! Real light probes, where they are at hand: the maxima that are published for them.
+//! The published maxima of real light probes, if the probes are available.
 
 use std::path::PathBuf;
 

@@ -1,6 +1,6 @@
 use crate::image::{Encoding, Format, ImageError, decode};
 
-/// A picture of flat pixels.
+/// A picture of plain pixels, without run-length encoding.
 pub(super) fn picture(header: &str, resolution: &str, pixels: &[[u8; 4]]) -> Vec<u8> {
     let header = format!("#?RADIANCE\n{header}FORMAT=32-bit_rle_rgbe\n\n{resolution}\n");
     [header.as_bytes(), pixels.as_flattened()].concat()
@@ -19,7 +19,7 @@ fn mantissas_and_exponents_are_exact() {
 }
 
 #[test]
-fn exposures_multiply_up_and_are_divided_out() {
+fn pixels_are_divided_by_the_product_of_all_exposures() {
     let header = "# made by hand = here\nEXPOSURE=2\nEXPOSURE=  4.0 \nCOLORCORR=1 0.5 2\nVIEW=-vtv\n";
     let decoded = decode("a.hdr", &picture(header, "-Y 1 +X 2", &TWO)).unwrap();
     assert_eq!(decoded.image.pixel(0, 0), [1.0 / 8.0, 0.5 / 4.0, 0.25 / 16.0]);
@@ -55,12 +55,12 @@ fn primaries_are_converted_unless_unknown() {
 
 #[test]
 fn run_lengths_of_both_styles_are_read() {
-    // New style: 10 pixels, red by run, green flat, blue and exponent by run.
+    // New style, 10 pixels: red as a run, green as copied bytes, blue and exponent as runs.
     let mut new = b"#?RGBE\n\n-Y 1 +X 10\n\x02\x02\x00\x0a".to_vec();
     new.extend([138, 128, 10, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 138, 0, 138, 129]);
     let decoded = decode("a.hdr", &new).unwrap();
     assert_eq!(decoded.image.pixel(9, 0), [1.0, 9.0 / 128.0, 0.0]);
-    // Old style: one pixel, then repeated 3 + 1 * 256 times.
+    // Old style: one pixel, repeated 3 + 1 * 256 times.
     let old = picture("", "-Y 1 +X 260", &[[128, 0, 0, 129], [1, 1, 1, 3], [1, 1, 1, 1]]);
     assert!(decode("a.hdr", &old).unwrap().image.pixels().iter().all(|pixel| *pixel == [1.0, 0.0, 0.0]));
     let overrun = picture("", "-Y 1 +X 259", &[[128, 0, 0, 129], [1, 1, 1, 3], [1, 1, 1, 1]]);

@@ -8,7 +8,7 @@ fn distribution(width: usize, height: usize, texel: impl Fn(usize) -> [f32; 3]) 
     LightDistribution::new(Arc::new(Environment::new(image).unwrap()))
 }
 
-/// Every texel differs; some are black, some bright.
+/// A map in which every texel differs; some are black, some bright.
 fn speckled(width: usize, height: usize) -> LightDistribution {
     distribution(width, height, |k| {
         let x = crate::math::to_f32(uniform(key(&[k as u64])));
@@ -20,7 +20,7 @@ fn points(count: u64) -> impl Iterator<Item = [f64; 2]> {
     (0..count).map(|i| [uniform(key(&[i, 7])), uniform(key(&[i, 8]))])
 }
 
-/// The sun of the design's test: one texel of 1e5 in a sky of 1, in a given row.
+/// The map of the design's test (section 5): one texel of 1e5 in a given row, 1 elsewhere.
 fn one_texel_sun(row: usize) -> LightDistribution {
     distribution(64, 32, |k| if k == row * 64 + 20 { [1e5; 3] } else { [1.0; 3] })
 }
@@ -39,7 +39,8 @@ fn samples_follow_the_density_and_the_density_integrates_to_one() {
         let sample = |i: u32| light.sample([uniform(key(&[u64::from(i), 1])), uniform(key(&[u64::from(i), 2]))]);
         let (test, total) = bins.test(200_000, |i| sample(i).direction, |d| light.pdf(d));
         println!("{name}: integral {total:.6}, {test:?}");
-        // The midpoint rule over kinked cells and the 1e5 peak is good to 1e-3; a wrong cell area would show as 1e-2.
+        // The midpoint rule errs by up to 1e-3 at the kinks between cells and at the peak of 1e5; a wrong cell area
+        // shows as 1e-2.
         assert!((total - 1.0).abs() < 1e-3, "{name}: {total}");
         assert!(test.p_value > 1e-3, "{name}: {test:?}");
     }
@@ -53,7 +54,7 @@ fn a_sample_carries_the_radiance_and_density_of_its_direction() {
             assert!((sample.direction.length() - 1.0).abs() < 1e-14);
             assert!(sample.pdf > 0.0 && sample.pdf.is_finite(), "{u:?} {sample:?}");
             let (radiance, pdf) = light.radiance_and_pdf(sample.direction);
-            // The direction is rounded to 1e-16, a map of 1e5 steepness per cell turns that into 1e-8 of a node.
+            // The direction is rounded to 1e-16; where a map changes by 1e5 per cell, that is 1e-8 of a node value.
             assert!((pdf - sample.pdf).abs() < 1e-6 * pdf.max(1e-3), "{u:?} {pdf} {sample:?}");
             assert!((radiance - sample.radiance).abs().max_element() < 1e-6 * radiance.max_element().max(1e-3));
             assert_eq!(pdf, light.pdf(sample.direction));
@@ -64,8 +65,9 @@ fn a_sample_carries_the_radiance_and_density_of_its_direction() {
 
 #[test]
 fn radiance_over_pdf_is_bounded_beside_a_one_texel_sun() {
-    // 1 would be perfect. The node value is exact at the texel centres, so between two rows the ratio is at most that of
-    // their sin(theta): 3 in the first, 1.1 in row 9; beside a pole the opposite texel gets as much, which doubles it.
+    // The ideal ratio is 1. The node value is exact at texel centres, so between two rows the ratio is at most the
+    // ratio of their sin(theta): 3 in row 0, 1.1 in row 9. Beside a pole the opposite texel has the same node, which
+    // doubles it.
     for (row, bound) in [(9, 1.15), (1, 1.7), (0, 6.0)] {
         let light = one_texel_sun(row);
         let total = light.environment().total().x;
@@ -77,7 +79,7 @@ fn radiance_over_pdf_is_bounded_beside_a_one_texel_sun() {
         };
         for u in points(100_000) {
             ratio(light.sample(u).direction);
-            // Uniform over the map, and dense around the sun.
+            // Points uniform over the map, then points close to the sun.
             ratio(light.environment().direction(u[0], u[1]));
             let v = (row as f64 - 1.0 + 3.0 * u[1]) / 32.0;
             ratio(light.environment().direction((19.0 + 3.0 * u[0]) / 64.0, v.max(0.0)));
@@ -145,6 +147,6 @@ fn estimates_of_the_irradiance_converge_to_it() {
             expected += environment.radiance(d) * (d.dot(normal).max(0.0) * weight);
         }
     }
-    // 200 000 samples of a ratio that varies by about its mean: 0.3 % standard error.
+    // The standard deviation of the ratio is about its mean: 200 000 samples give a standard error of 0.3 %.
     assert!((estimate / expected - Rgb::ONE).abs().max_element() < 0.01, "{estimate} {expected}");
 }

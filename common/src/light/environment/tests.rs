@@ -73,7 +73,8 @@ fn radiance_at_a_texel_centre_is_the_texel() {
     }
 }
 
-/// The definition, written down again without border, shared weights or fast angles.
+/// The definition of the bilinear map, without the border, the shared weights and the fast angles of the
+/// implementation.
 fn plain_bilinear(map: &Environment, d: Vec3) -> Rgb {
     use crate::math::elementary::{acos, atan2};
     let (w, h) = (map.width() as i64, map.height() as i64);
@@ -99,7 +100,7 @@ fn radiance_is_bilinear_wraps_in_u_and_continues_across_the_poles() {
     for (width, height) in [(16, 8), (2, 1), (6, 4)] {
         let map = speckled(width, height);
         for d in directions(3000) {
-            // acos loses half its digits near a pole, which is why the map does not use it.
+            // 1e-6, because the acos of this reference loses half its digits near a pole.
             assert!(close(map.radiance(d), plain_bilinear(&map, d), 1e-6), "{d}");
         }
     }
@@ -150,7 +151,7 @@ fn texel_solid_angles_add_up_to_the_sphere_and_totals_use_them() {
     assert!((sphere - 4.0 * PI).abs() < 1e-12);
     assert!(close(map.mean_radiance(), Rgb::new(0.5, 1.0, 2.0), 1e-12));
     assert_eq!(map.max_radiance(), Rgb::new(0.5, 1.0, 2.0));
-    // Midpoint rule over 64 x 32 texels.
+    // 0.01: the error of the midpoint rule over 64 x 32 texels.
     assert!(close(map.irradiance(Vec3::new(0.6, 0.0, 0.8)), Rgb::new(0.5, 1.0, 2.0) * PI, 0.01));
 }
 
@@ -175,7 +176,7 @@ fn faults_are_named_with_their_place() {
 
 #[test]
 fn slopes_are_those_of_the_bilinear_function() {
-    const STEP: f64 = 1e-3; // texels; the function is bilinear, so differences inside a patch are exact
+    const STEP: f64 = 1e-3; // texels; differences are exact inside a cell, because the function is bilinear there
     let map = speckled(8, 4).rotated(30.0);
     let (width, height) = (map.width() as f64, map.height() as f64);
     let sum = |x: f64, y: f64| map.radiance_at(x / width, y / height).element_sum();

@@ -2,15 +2,14 @@ use super::*;
 use crate::math::sampling::{key, uniform};
 
 impl Mapping {
-    /// Steradians per unit of image area (the whole image has area 1) at a position where [`Mapping::direction`] is
-    /// some direction.
+    /// Steradians per unit of image area (the whole image has area 1) at a position that has a direction.
     pub(in crate::light) fn solid_angle_density(self, [x, y]: [f64; 2]) -> f64 {
         match self {
             Self::LatLong => TAU * PI * sin_cos(PI * y).0,
             Self::Cross => {
                 let (a, b) = (2.0 * (3.0 * x).fract() - 1.0, 2.0 * (4.0 * y).fract() - 1.0);
                 let square = 1.0 + a * a + b * b;
-                // The face spans 2 x 2 at distance 1, and a twelfth of the image.
+                // The face is 2 x 2 at distance 1, and covers a twelfth of the image.
                 4.0 * 12.0 / (square * square.sqrt())
             }
             Self::Angular => {
@@ -18,7 +17,7 @@ impl Mapping {
                 // Both axes run over 2 units; sin(phi) d(phi) d(psi) = pi sin(pi r) / r dx dy.
                 4.0 * PI * if r > 0.0 { sin_cos(PI * r).0 / r } else { PI }
             }
-            // An orthographic mirror ball keeps areas: d(omega) = 4 dx dy.
+            // The orthographic view of a mirror ball preserves area: d(omega) = 4 dx dy.
             Self::MirrorBall => 16.0,
         }
     }
@@ -41,7 +40,7 @@ fn position_and_direction_invert_each_other() {
             seen += 1;
             assert!((d.length() - 1.0).abs() < 1e-14, "{mapping} {p:?}");
             let back = mapping.position(d);
-            // Near the rim of a ball all positions are one direction, so compare directions there.
+            // All positions near the rim of a ball have nearly the same direction, so compare directions there.
             let again = mapping.direction(back).unwrap();
             assert!((again - d).length() < 1e-7, "{mapping} {p:?} {back:?}");
             assert!(close(back, p, 1e-7) || d.z.abs() > 0.999, "{mapping} {p:?} {back:?}");
@@ -61,7 +60,7 @@ fn every_direction_has_a_position() {
 }
 
 #[test]
-fn angular_and_mirror_ball_look_where_the_design_says() {
+fn angular_and_mirror_ball_have_the_directions_of_the_design() {
     assert!((Mapping::Angular.direction([0.5, 0.5]).unwrap() + Vec3::Z).length() < 1e-15);
     assert!((Mapping::Angular.direction([0.75, 0.5]).unwrap() - Vec3::X).length() < 1e-15);
     assert!((Mapping::Angular.direction([0.5, 0.25]).unwrap() - Vec3::Y).length() < 1e-15);
@@ -74,9 +73,9 @@ fn angular_and_mirror_ball_look_where_the_design_says() {
     }
 }
 
-/// The centre and the marked corner (top left, as stored) of each face of the cross.
+/// Checks the centre and the top left corner (as stored) of each face.
 #[test]
-fn every_face_of_the_cross_lies_and_turns_as_documented() {
+fn every_face_of_the_cross_has_the_documented_place_and_orientation() {
     let eps = 1e-9;
     for (name, place, centre, top_left) in [
         ("up", [1.0, 0.0], Vec3::Y, Vec3::new(-1.0, 1.0, 1.0)),
@@ -84,7 +83,7 @@ fn every_face_of_the_cross_lies_and_turns_as_documented() {
         ("front", [1.0, 1.0], -Vec3::Z, Vec3::new(-1.0, 1.0, -1.0)),
         ("right", [2.0, 1.0], Vec3::X, Vec3::new(1.0, 1.0, -1.0)),
         ("down", [1.0, 2.0], -Vec3::Y, Vec3::new(-1.0, -1.0, -1.0)),
-        // Upright, the top left of the back face is (1, 1, 1); turned by 180 degrees it is (-1, -1, 1).
+        // Upright, the top left of the back face is (1, 1, 1); rotated by 180 degrees it is (-1, -1, 1).
         ("back", [1.0, 3.0], Vec3::Z, Vec3::new(-1.0, -1.0, 1.0)),
     ] {
         let [column, row] = place;
@@ -99,7 +98,7 @@ fn every_face_of_the_cross_lies_and_turns_as_documented() {
 }
 
 #[test]
-fn faces_of_the_cross_continue_each_other_along_the_folds() {
+fn directions_are_continuous_across_the_folds_of_the_cross() {
     let eps = 1e-9;
     for (x, y) in [(0.4, 0.25), (0.6, 0.5), (0.4, 0.75)] {
         let (above, below) = (Mapping::Cross.direction([x, y - eps]), Mapping::Cross.direction([x, y + eps]));
@@ -123,7 +122,7 @@ fn solid_angle_densities_integrate_to_the_sphere() {
             }
         }
         let sphere = sum / f64::from(n * n);
-        // The rim of the disks is resolved to a pixel of 1200.
+        // 1e-3: the rim of the disks is resolved to one of 1200 points.
         assert!((sphere / (4.0 * PI) - 1.0).abs() < 1e-3, "{mapping}: {sphere}");
     }
 }

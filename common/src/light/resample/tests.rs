@@ -1,8 +1,8 @@
 use super::*;
 use crate::math::sampling::{key, uniform};
 
-/// Sum over the pixels of an image in the layout `mapping` of radiance times solid angle: what [`Environment::total`] of the
-/// resampled map agrees with.
+/// Sum over the pixels of an image in the layout `mapping` of radiance times solid angle. [`Environment::total`] of the
+/// resampled map must agree with it.
 fn source_total(image: &Image, mapping: Mapping) -> Rgb {
     let (width, height) = (image.width(), image.height());
     let mut total = Rgb::ZERO;
@@ -32,7 +32,7 @@ fn pixel_solid_angle(mapping: Mapping, [width, height]: [usize; 2], column: usiz
     sum / (f64::from(POINTS * POINTS) * width as f64 * height as f64)
 }
 
-/// The largest relative disagreement of the totals before and after.
+/// The largest relative difference, over the channels, of the totals before and after.
 fn energy_error(image: &Image, mapping: Mapping) -> f64 {
     let before = source_total(image, mapping);
     let after = to_lat_long(image.clone(), mapping).unwrap().total();
@@ -56,7 +56,7 @@ fn filled(mapping: Mapping, size: usize, texel: impl Fn(Vec3) -> [f32; 3]) -> Im
 const RESAMPLED: [Mapping; 3] = [Mapping::Cross, Mapping::Angular, Mapping::MirrorBall];
 
 #[test]
-fn a_constant_map_stays_constant_and_empty_parts_never_leak() {
+fn a_constant_map_stays_constant_and_empty_parts_do_not_contribute() {
     for mapping in RESAMPLED {
         // The empty parts of the source are NaN.
         let map = to_lat_long(filled(mapping, 32, |_| [0.25, 1.0, 3.0]), mapping).unwrap();
@@ -86,21 +86,21 @@ fn sizes_follow_the_source() {
 }
 
 #[test]
-fn a_smooth_map_comes_out_as_itself_in_every_layout() {
+fn a_smooth_map_is_reproduced_from_every_layout() {
     let smooth = |d: Vec3| Rgb::new(1.0 + d.x, 1.0 + d.y * d.z, 1.5 + d.z);
     for mapping in RESAMPLED {
         let map = to_lat_long(filled(mapping, 64, |d| narrow(smooth(d))), mapping).unwrap();
         let mut worst = 0.0_f64;
         for k in 0..2000_u64 {
             let d = map.direction(uniform(key(&[k, 1])), uniform(key(&[k, 2])));
-            // The outermost pixels of a mirror ball span 0.35 radians each.
+            // Skips the outermost pixels of a mirror ball: each spans 0.35 radians.
             if mapping == Mapping::MirrorBall && d.z < -0.8 {
                 continue;
             }
             worst = worst.max((map.radiance(d) - smooth(d)).abs().max_element());
         }
         println!("{mapping}: {worst:.4}");
-        // A pixel of the source is up to 0.05 radians; an axis swapped or mirrored shows as 1.
+        // A pixel of the source spans up to 0.05 radians; a swapped or mirrored axis shows as 1.
         assert!(worst < 0.06, "{mapping}: {worst}");
     }
 }
@@ -119,7 +119,7 @@ fn energy_is_kept_on_noise() {
 }
 
 #[test]
-fn a_light_of_one_pixel_keeps_its_energy_and_its_place() {
+fn a_light_of_one_pixel_keeps_its_energy_and_its_direction() {
     for mapping in RESAMPLED {
         let mut worst = 0.0_f64;
         for k in 0..25_u64 {
@@ -133,21 +133,21 @@ fn a_light_of_one_pixel_keeps_its_energy_and_its_place() {
             let light = mapping.direction(position).unwrap();
             let map = to_lat_long(image.clone(), mapping).unwrap();
             let [x, y] = position.map(|x| 2.0 * x - 1.0);
-            let rim = mapping != Mapping::Cross && x * x + y * y > 0.9 * 0.9;
+            let is_at_rim = mapping != Mapping::Cross && x * x + y * y > 0.9 * 0.9;
             let kept = map.total().x / source_total(&image, mapping).x;
-            if rim {
-                // The solid angle of a pixel at the rim changes by its own size across it.
+            if is_at_rim {
+                // Across a pixel at the rim the solid angle per area changes by as much as itself.
                 assert!((0.5..2.0).contains(&kept), "{mapping}: {light} kept {kept}");
             } else {
                 worst = worst.max((kept - 1.0).abs());
             }
-            // Where it went: the energy's centroid, within a source pixel (0.05 to 0.15 radians).
+            // The centroid of the energy lies within a source pixel (0.05 to 0.15 radians) of the light.
             let pull = |axis: Vec3| map.irradiance(axis).x - map.irradiance(-axis).x;
             let centroid = Vec3::new(pull(Vec3::X), pull(Vec3::Y), pull(Vec3::Z)).normalize();
-            assert!(centroid.dot(light) > 0.985 || rim, "{mapping}: {light} became {centroid}");
+            assert!(centroid.dot(light) > 0.985 || is_at_rim, "{mapping}: expected {light}, found {centroid}");
         }
         println!("{mapping}: {worst:.4}");
-        // The tent of one pixel of a 48 pixel source sees the solid angle vary across it; a lost light shows as 1.
+        // The solid angle varies across the bilinear footprint of one of 48 pixels; a lost light shows as 1.
         assert!(worst < 0.05, "{mapping}: {worst}");
     }
 }
@@ -162,7 +162,7 @@ fn a_cross_of_six_coloured_faces_lights_the_right_sides() {
         (-Vec3::Y, [0.0, 1.0, 1.0]),
         (Vec3::Z, [1.0, 0.0, 1.0]),
     ];
-    // By place in the image, not by the code under test: column and row of up, left, front, right, down, back.
+    // Column and row of up, left, front, right, down, back, independent of the code under test.
     let places = [(1, 0), (0, 1), (1, 1), (2, 1), (1, 2), (1, 3)];
     let size = 16;
     let mut image = Image::new(3 * size, 4 * size);
@@ -179,7 +179,7 @@ fn a_cross_of_six_coloured_faces_lights_the_right_sides() {
         let near = (direction + Vec3::new(0.4, 0.3, 0.5) * (Vec3::ONE - direction.abs())).normalize();
         assert!((map.radiance(near) - widen(colour)).abs().max_element() < 1e-6, "{near}");
     }
-    // The front, -Z, lies at the edge u = 0 of the lat-long map, the back in its centre.
+    // The front, -Z, lies at the edge u = 0 of the lat-long map; the back, +Z, lies in its centre.
     assert!((widen(map.texel(16, 0)) - widen([0.0, 0.0, 1.0])).length() < 1e-6);
     assert!((widen(map.texel(16, 32)) - widen([1.0, 0.0, 1.0])).length() < 1e-6);
 }
@@ -203,10 +203,8 @@ fn energy_is_kept_on_real_maps() {
             println!("skipped: {name}.hdr is not in {root} (set LOOKALIKE_DATA)");
             continue;
         };
-        let decoded = image::load_from_memory(&bytes).unwrap().into_rgb32f();
-        let (width, height) = (decoded.width() as usize, decoded.height() as usize);
-        let image = Image::from_pixels(width, height, decoded.pixels().map(|p| p.0).collect());
-        assert_eq!(Mapping::recognise(width, height), Ok(Mapping::Cross));
+        let image = crate::image::decode(name, &bytes).unwrap().image;
+        assert_eq!(Mapping::recognise(image.width(), image.height()), Ok(Mapping::Cross));
         let clock = std::time::Instant::now();
         let error = energy_error(&image, Mapping::Cross);
         println!("{name}: energy off by {:.4} %, {:?}", 100.0 * error, clock.elapsed());

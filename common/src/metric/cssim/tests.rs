@@ -1,11 +1,11 @@
-//! The prepared judge: against the plain path, against itself, and on broken input.
+//! The prepared judge: against the plain path, with the reference itself, and with invalid input.
 
 use super::super::tests::pairs::{Sphere, sphere};
 use super::super::{CidOptions, DisplayImage, cid};
 use super::*;
 use crate::math::to_f32;
 
-/// A linear image of the sphere in the middle of a black frame, and its coverage: 0 outside, 0.5 on the silhouette.
+/// A linear image of the sphere in a black frame, and its coverage: 0 outside, 0.5 on the silhouette.
 fn framed(s: &Sphere, width: usize, height: usize, (left, top): (usize, usize)) -> (Image, Vec<f32>) {
     let picture = sphere(s);
     let mut image = Image::new(width, height);
@@ -43,14 +43,14 @@ fn the_judge_agrees_with_the_plain_path_through_encoded_images() {
     let [a, b] = [&reference, &image].map(|image| DisplayImage::from_linear(image, &coverage, 1.3).unwrap());
     let plain = cid(&a, &b, &CidOptions::default()).unwrap();
     assert!((score.cssim - plain).abs() < 1e-12 && plain > 0.01, "{score:?} {plain}");
-    // The object fills a third of the image, and nearly all of the error lies on it.
+    // The object covers a third of the image and has nearly all of the error.
     assert!(score.cssim_object > 1.5 * score.cssim, "{score:?}");
     let combined = 1.0 - score.features.iter().product::<f64>();
     assert_eq!(combined, score.cssim);
 }
 
 #[test]
-fn the_bounding_box_scores_as_the_whole_image_to_the_last_bit() {
+fn the_score_of_the_bounding_box_equals_that_of_the_whole_image_bit_for_bit() {
     for corner in [(3, 0), (41, 30), (88, 68)] {
         let (reference, coverage) = framed(&plastic(0.2), 160, 140, corner);
         let (image, _) = framed(&plastic(0.25), 160, 140, corner);
@@ -105,7 +105,7 @@ fn the_maps_average_to_the_features() {
 }
 
 #[test]
-fn what_lies_outside_the_object_is_not_looked_at() {
+fn pixels_outside_the_object_are_ignored() {
     let (reference, coverage) = framed(&plastic(0.2), 100, 90, (12, 8));
     let (mut image, _) = framed(&plastic(0.3), 100, 90, (12, 8));
     let judge = judge(&reference, &coverage, Lanes::Detected);
@@ -116,7 +116,7 @@ fn what_lies_outside_the_object_is_not_looked_at() {
 }
 
 #[test]
-fn broken_input_is_an_error_with_coordinates() {
+fn invalid_input_is_an_error_with_coordinates() {
     let (reference, coverage) = framed(&plastic(0.2), 100, 90, (12, 8));
     let options = JudgeOptions::default();
     let message = |result: Result<Judge, MetricError>| result.unwrap_err().to_string();

@@ -1,4 +1,4 @@
-//! The kernels against the authors' (their `separableFilters(40, 3)`, half of each from its centre).
+//! The kernels against those of the authors (`separableFilters(40, 3)`; half of each, from its centre).
 
 use super::*;
 
@@ -12,7 +12,7 @@ const EXPECTED: [&[f64]; 7] = [
     &[0.19447189516, 0.157780880378, 0.084241540825, 0.0295746774032, 0.00681832314741, 0.00103056539544],
     &[0.0258092428611, 0.025700748532, 0.0253779943488, 0.0248490526542, 0.0241270037771, 0.0232293984704],
 ];
-/// Last tap (the 20th) of the kernels that are not cut short.
+/// Last tap (the 20th) of the kernels that are not truncated.
 const LAST: [(usize, f64); 4] =
     [(1, 1.10986140997e-07), (2, 0.008542630242), (4, 0.00828222943459), (6, 0.00564064101431)];
 /// Twelve digits are published; the taps are below 1.
@@ -44,7 +44,7 @@ fn kernels_are_those_of_the_authors() {
     for (kernel, tap) in LAST {
         assert!((kernels[kernel][19] - tap).abs() < TOLERANCE);
     }
-    // The cut keeps every tap that a sum could notice.
+    // Truncation keeps every tap that can change a sum.
     assert_eq!([0, 3, 5].map(|k: usize| kernels[k].len()), [8, 11, 15]);
 }
 
@@ -62,7 +62,7 @@ fn gains_for_a_constant_are_those_of_the_authors() {
 }
 
 #[test]
-fn a_point_is_spread_into_the_outer_products_of_the_kernels() {
+fn a_point_becomes_the_outer_products_of_the_kernels() {
     let filter = Scielab::new(40.0);
     let (width, height) = (61, 47);
     let region = Region::whole(width, height);
@@ -74,7 +74,7 @@ fn a_point_is_spread_into_the_outer_products_of_the_kernels() {
     let tap = |k: usize, d: usize| kernels[k].get(d).copied().unwrap_or(0.0);
     for (x, y) in [(20, 25), (22, 24), (1, 25), (39, 44), (40, 25), (25, 5), (30, 46)] {
         let (dx, dy) = (usize::abs_diff(x, 20), usize::abs_diff(y, 25));
-        // Row 46 mirrors into row 47 and so on; the point at row 25 appears again at row 68.
+        // Rows are mirrored at the border: row 47 is row 46, so the point of row 25 is also at row 68.
         let mirrored = 68 - y;
         let at = |k| tap(k, dx) * (tap(k, dy) + tap(k, mirrored));
         let expected = [at(0) + at(1) - at(2), at(3) + at(4), at(5) + at(6)];

@@ -1,4 +1,4 @@
-//! The metric against the authors' own program, on the pairs of `pairs` with the numbers of `vectors`.
+//! The metric against the authors' program, with the image pairs of `pairs` and the scores of `vectors`.
 
 pub(super) mod pairs;
 mod vectors;
@@ -11,14 +11,16 @@ use super::*;
 use pairs::{Picture, base, noise, pair};
 use vectors::{COLOURS, EXPECTED, VARIANTS};
 
-/// The expected scores carry twelve digits; the rest is the rounding of sums of 1e5 terms. Any wrong constant shows at 1e-6.
+/// The expected scores have twelve digits; sums of 1e5 terms add rounding errors. A wrong constant shows at 1e-6 or
+/// more.
 const TABLE_TOLERANCE: f64 = 1e-9;
-/// What the fitted working space may cost (measured: 0.0068 on `sphere_kd_hue`).
+/// The largest difference between scores with the fitted working space and with the table (measured: 0.0068 on
+/// `sphere_kd_hue`).
 const FIT_TOLERANCE: f64 = 0.007;
-/// Scores with the fit are known to nine digits.
+/// The expected scores with the fit have nine digits.
 const FIT_DIGITS: f64 = 2e-9;
 
-/// The authors' table, or `None` (with a note) where it is not available: its licence is unknown, so it is not shipped.
+/// The authors' table, or `None` with a note if it is not available. It is not shipped, because its licence is unknown.
 fn table() -> Option<Lab2000hl> {
     let metric = std::env::var_os("LOOKALIKE_DATA").map_or_else(
         || PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/metric")),
@@ -74,7 +76,7 @@ fn default_cid(first: &Picture, second: &Picture) -> f64 {
 }
 
 #[test]
-fn every_variant_scores_every_pair_as_the_authors_program_with_their_table() {
+fn every_variant_agrees_with_the_authors_program_on_every_pair_with_their_table() {
     let Some(space) = table() else { return };
     for expected in &EXPECTED {
         let (first, second) = pair(expected.name);
@@ -94,7 +96,7 @@ fn every_variant_scores_every_pair_as_the_authors_program_with_their_table() {
 }
 
 #[test]
-fn the_means_of_the_features_are_those_of_the_authors_program_with_their_table() {
+fn the_means_of_the_features_agree_with_the_authors_program_with_their_table() {
     let Some(space) = table() else { return };
     let lanes = Lanes::Detected;
     let pipeline = Pipeline::new(SpatialFilter::Scielab, 20.0, space, lanes).unwrap();
@@ -110,7 +112,7 @@ fn the_means_of_the_features_are_those_of_the_authors_program_with_their_table()
 }
 
 #[test]
-fn the_fitted_space_scores_within_its_bound_of_the_table_and_keeps_the_order() {
+fn scores_with_the_fitted_space_are_within_the_bound_of_the_table_and_keep_the_order() {
     let mut ranked: Vec<(f64, f64)> = Vec::new();
     for expected in &EXPECTED {
         let (first, second) = pair(expected.name);
@@ -140,7 +142,7 @@ fn colours_convert_as_in_the_authors_program() {
 }
 
 #[test]
-fn identical_images_score_exactly_zero_by_every_variant() {
+fn every_variant_scores_identical_images_exactly_zero() {
     for name in ["identical", "large400x420_noise"] {
         let (_, picture) = pair(name);
         for (score, variant) in scores(&picture, &picture, &Lab2000hl::fit00()).into_iter().zip(VARIANTS) {
@@ -170,8 +172,8 @@ fn the_score_grows_with_the_noise() {
 }
 
 #[test]
-fn the_object_score_of_icid_sees_only_windows_centred_on_the_object() {
-    // Noise on the left, the object on the right, an image that is averaged down by 2.
+fn the_object_score_of_icid_uses_only_windows_centred_on_the_object() {
+    // Noise on the left and the object on the right, in an image that is averaged down by 2.
     let clean = base(420, 400);
     let mut noisy = noise(&clean, 0.2);
     let right = |i: usize| i % 420 >= 210;
@@ -180,7 +182,7 @@ fn the_object_score_of_icid_sees_only_windows_centred_on_the_object() {
         |column: usize| -> Vec<f32> { (0..420 * 400).map(|i| f32::from(u8::from(i % 420 >= column))).collect() };
     let options = IcidOptions { filter: SpatialFilter::None, ..IcidOptions::default() };
     let score = |from| icid(&clean.display(), &noisy.display(), &coverage_from(from), &options).unwrap();
-    // A window of 11 averaged pixels reaches 10 or 11 pixels to the left of its centre.
+    // A window of 11 averaged pixels extends 10 or 11 pixels to the left of its centre.
     assert_eq!(score(222).icid_object.to_bits(), 0);
     let touched = score(206);
     assert!(touched.icid_object > 0.0 && touched.icid > 10.0 * touched.icid_object);

@@ -1,11 +1,11 @@
-//! The nineteen pairs of images behind the expected scores, as formulas: encoded sRGB, no files and no random numbers.
+//! The nineteen pairs of images of the expected scores, given by formulas, as encoded sRGB.
 
 use std::f64::consts::{PI, TAU};
 
 use super::super::{DisplayImage, encode_srgb};
 use crate::math::Vec3;
 
-/// An image under construction.
+/// An encoded or linear image.
 #[derive(Debug, Clone, PartialEq)]
 pub(in super::super) struct Picture {
     pub(in super::super) width: usize,
@@ -64,7 +64,7 @@ pub(in super::super) fn pair(name: &str) -> (Picture, Picture) {
     }
 }
 
-/// Coloured waves under a chequerboard.
+/// Coloured waves with a chequerboard added.
 pub(in super::super) fn base(width: usize, height: usize) -> Picture {
     use libm::{cos, sin};
     Picture::from_fn(width, height, |x, y| {
@@ -77,7 +77,7 @@ pub(in super::super) fn base(width: usize, height: usize) -> Picture {
     })
 }
 
-/// Adds hashed noise in [-amplitude, amplitude].
+/// Adds noise in [-amplitude, amplitude], a hash of the position.
 pub(in super::super) fn noise(picture: &Picture, amplitude: f64) -> Picture {
     Picture::from_fn(picture.width, picture.height, |x, y| {
         let pixel = picture.pixels[y * picture.width + x];
@@ -134,7 +134,7 @@ fn chroma(picture: &Picture, factor: f64) -> Picture {
     })
 }
 
-/// A sphere of radius 0.92 of the half image, black around: Lambert and GGX under four directional lights.
+/// A sphere on black, with a radius of 0.92 of half the image: Lambert and GGX under four directional lights.
 #[derive(Debug, Clone, Copy)]
 pub(in super::super) struct Sphere {
     pub(in super::super) alpha: f64,

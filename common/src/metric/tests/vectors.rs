@@ -1,10 +1,10 @@
 //! Expected scores of the pairs.
 //!
-//! Source: the authors' own MATLAB programs (CID.m, CID_advanced.m v1.0; iCID.m v1.00) run under GNU Octave 7.3, with their
-//! LAB2000HL table; an independent numpy implementation agrees to 3e-13. The `fit00` column is the numpy implementation's
-//! with the fitted working space.
+//! Source: the authors' MATLAB programs (CID.m, CID_advanced.m v1.0; iCID.m v1.00), run under GNU Octave 7.3 with their
+//! LAB2000HL table. An independent numpy implementation agrees to 3e-13. The `fit00` scores are from the numpy
+//! implementation with the fitted working space.
 
-/// What is known of a pair.
+/// The expected results of a pair.
 #[derive(Debug)]
 pub(super) struct Expected {
     /// Name of the pair in `pairs`.
@@ -418,7 +418,7 @@ pub(super) const EXPECTED: [Expected; 19] = [
     },
 ];
 
-/// sRGB, CIELAB and (table) LAB2000HL of a few colours.
+/// sRGB, CIELAB and LAB2000HL (by the table) of a few colours.
 pub(super) const COLOURS: [[[f64; 3]; 3]; 9] = [
     [[1.0, 1.0, 1.0], [99.998338591, 0.00990853, -0.016592107], [75.152235413, 0.011009109, -0.015476359]],
     [[0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]],

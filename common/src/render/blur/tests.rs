@@ -45,9 +45,6 @@ fn points() -> Vec<Point> {
     [0.95, 0.7, 0.4].map(|cos: f64| Point::new(Vec3::new((1.0 - cos * cos).sqrt(), 0.0, cos), view).unwrap()).to_vec()
 }
 
-/// Lobes that are divided by the larger of `n.l` and `n.v`: it has a kink where these are equal, which is in the mirror direction.
-const KINKED: [&str; 2] = ["blinn-phong", "ashikhmin-shirley"];
-
 /// The largest error over lobes, with a kink or without, of light around directions near and off the mirror direction, as a share of the lobe's value there.
 fn error(size: f64, width: f64, second_order: bool, kinked: bool) -> f64 {
     let mut worst: f64 = 0.0;
@@ -60,7 +57,7 @@ fn error(size: f64, width: f64, second_order: bool, kinked: bool) -> f64 {
         let (angles, spread) = seen_from(&node, &point).unwrap();
         let spread = if second_order { spread } else { Spread::default() };
         for basis in MODELS.iter().flat_map(|model| model.lobes()).filter(|basis| basis.width.is_some()) {
-            if KINKED.contains(&basis.lobe.name()) != kinked {
+            if basis.lobe.expected().is_kinked != kinked {
                 continue;
             }
             let terms = lobe_terms(basis.lobe);

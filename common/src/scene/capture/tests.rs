@@ -40,7 +40,7 @@ fn a_clean_photo_is_usable_inside_the_silhouette_without_a_warning() {
 }
 
 #[test]
-fn every_reason_of_exclusion_is_told_apart() {
+fn every_reason_of_exclusion_has_its_status() {
     let capture = with(|input| {
         let mut clipped = vec![false; SIZE * SIZE];
         (clipped[MIDDLE + 1], clipped[0]) = (true, true);
@@ -64,7 +64,7 @@ fn every_reason_of_exclusion_is_told_apart() {
 }
 
 #[test]
-fn pixels_that_are_not_finite_never_reach_a_score() {
+fn pixels_that_are_not_finite_are_not_scored() {
     let capture = with(|input| {
         input.photo.pixels_mut()[MIDDLE] = [f32::NAN; 3];
         input.photo.pixels_mut()[1] = [f32::NAN; 3];
@@ -72,7 +72,7 @@ fn pixels_that_are_not_finite_never_reach_a_score() {
     .unwrap();
     assert_eq!((capture.photo().pixels()[MIDDLE], capture.photo().pixels()[1]), ([0.0; 3], [0.0; 3]));
     assert_eq!((capture.coverage()[MIDDLE], capture.scoring_coverage()[MIDDLE]), (0.0, 0.0));
-    // Outside the object they do not count.
+    // Pixel 1 lies outside the object and is not counted.
     assert_eq!(capture.counts().not_finite, 1);
 }
 
@@ -86,8 +86,8 @@ fn with_a_background_only_full_pixels_are_scored() {
         let scoring = capture.scoring_coverage();
         assert!(scoring.iter().zip(capture.coverage()).all(|(&s, &c)| s == if c == 1.0 { 1.0 } else { 0.0 }));
     }
-    let spilling = with(|input| input.photo.pixels_mut()[..SIZE].fill([0.9; 3])).unwrap();
-    assert!(spilling.warnings().iter().any(|w| w.contains("--mask")), "{:?}", spilling.warnings());
+    let lit_outside = with(|input| input.photo.pixels_mut()[..SIZE].fill([0.9; 3])).unwrap();
+    assert!(lit_outside.warnings().iter().any(|w| w.contains("--mask")), "{:?}", lit_outside.warnings());
 }
 
 #[test]
@@ -113,7 +113,7 @@ fn a_photo_brighter_than_its_light_is_reported() {
 }
 
 #[test]
-fn a_sphere_cut_by_the_border_is_reported() {
+fn a_sphere_cut_off_by_the_border_is_reported() {
     let capture = with(|input| {
         let circle = Circle { x: 4.0, y: 16.0, radius: 14.0 };
         input.geometry = Geometry::sphere(SIZE, SIZE, circle, Camera::Orthographic).unwrap();

@@ -10,6 +10,7 @@ fn disk(width: usize, height: usize, circle: Circle, change: impl Fn(usize, usiz
     Mask::new(width, height, (0..width * height).map(value).collect()).unwrap()
 }
 
+/// The largest error of the fitted centre and radius, in pixels.
 fn off(mask: &Mask, circle: Circle) -> f64 {
     let found = fit_circle(mask).unwrap().circle;
     (found.x - circle.x).abs().max((found.y - circle.y).abs()).max((found.radius - circle.radius).abs())
@@ -46,7 +47,7 @@ fn holes_and_specks_do_not_move_the_circle() {
 }
 
 #[test]
-fn a_disk_cut_by_the_photos_border_is_still_found() {
+fn a_disk_cut_off_by_the_border_of_the_photo_is_found() {
     let circle = Circle { x: 20.0, y: 52.8, radius: 41.6 };
     let off = off(&disk(140, 110, circle, |_, _, m| m), circle);
     assert!(off < 0.05, "{off}");

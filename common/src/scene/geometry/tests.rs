@@ -9,22 +9,22 @@ fn coverage_adds_up_to_the_disks_area() {
     for camera in CAMERAS {
         let geometry = Geometry::sphere(64, 60, circle, camera).unwrap();
         let area: f64 = (0..64 * 60).map(|k| f64::from(geometry.coverage(k % 64, k / 64))).sum();
-        // Some 200 silhouette pixels, each good to about 1/256; off the axis the ellipse is a little smaller.
+        // About 200 silhouette pixels, each accurate to about 1/256; off the axis the ellipse is slightly smaller.
         assert!((area / (std::f64::consts::PI * 25.4 * 25.4) - 1.0).abs() < 1e-3, "{camera}: {area}");
     }
 }
 
 #[test]
-fn full_coverage_means_that_the_whole_pixel_is_inside() {
+fn coverage_is_full_if_and_only_if_the_whole_pixel_is_inside() {
     let circle = Circle { x: 20.3, y: 19.6, radius: 15.7 };
     let geometry = Geometry::sphere(40, 40, circle, Camera::Orthographic).unwrap();
     for (column, row) in (0..1600).map(|k| (k % 40, k / 40)) {
         let corners =
             [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(i, j)| circle.distance((column + i) as f64, (row + j) as f64));
         let coverage = geometry.coverage(column, row);
-        let all_in = corners.iter().all(|&d| d < circle.radius);
-        assert_eq!(coverage == 1.0, all_in, "({column}, {row})");
-        assert_eq!(geometry.is_interior(column, row), all_in);
+        let is_inside = corners.iter().all(|&d| d < circle.radius);
+        assert_eq!(coverage == 1.0, is_inside, "({column}, {row})");
+        assert_eq!(geometry.is_interior(column, row), is_inside);
         assert!(coverage > 0.0 || corners.iter().all(|&d| d > circle.radius - 0.2), "({column}, {row})");
     }
 }
@@ -38,9 +38,9 @@ fn a_sphere_smaller_than_a_pixel_has_its_area() {
 }
 
 #[test]
-fn normal_spread_is_that_of_the_design_in_the_middle_and_grows_towards_the_edge() {
-    // Design section 5: at 256 pixels a pixel of a mirror sphere sees 0.9 degrees of the map at the centre, so its normal
-    // turns by half of that; ours is across the diagonal.
+fn normal_spread_has_the_designs_value_in_the_middle_and_grows_towards_the_edge() {
+    // Design section 5: at 256 pixels a pixel at the centre of a mirror sphere sees 0.9 degrees of the map, so its
+    // normal changes by half of that. The spread is across the diagonal.
     let geometry = Geometry::sphere(256, 256, Circle::inscribed(256, 256), Camera::Orthographic).unwrap();
     let middle = geometry.normal_spread(128, 128).to_degrees();
     assert!((middle - 0.45 * std::f64::consts::SQRT_2).abs() < 0.01, "{middle}");
@@ -62,7 +62,7 @@ fn a_one_pixel_hole_in_a_normal_map_is_not_covered() {
 }
 
 #[test]
-fn the_sphere_and_its_normal_map_cover_alike() {
+fn a_sphere_and_its_normal_map_cover_the_same_area() {
     let sphere = Geometry::sphere(48, 48, Circle { x: 24.0, y: 24.0, radius: 20.0 }, Camera::Orthographic).unwrap();
     let at = |k: usize| {
         let point = sphere.point((k % 48) as f64 + 0.5, (k / 48) as f64 + 0.5);

@@ -20,7 +20,7 @@ fn a_map_of_a_sphere_gives_the_spheres_normals_inside_pixels() {
         let (x, y) = (12.3 + 0.8 * f64::from(k % 50), 11.9 + 0.8 * f64::from(k / 50));
         let Some(expected) = sphere.point(x, y).filter(|point| point.normal.z > 0.4) else { continue };
         let found = surface.point(x, y).unwrap();
-        // Bilinear normals of a 64 pixel sphere: second differences of (1/32)^2 / cos^3.
+        // The error of bilinear normals on a sphere of 64 pixels: second differences of (1/32)^2 / cos^3.
         assert!((found.normal - expected.normal).length() < 4e-3, "{x} {y}");
         assert!((found.normal.length() - 1.0).abs() < 1e-12);
         assert_eq!(found.view, Vec3::Z);
@@ -36,7 +36,7 @@ fn half_plane() -> Image {
 }
 
 #[test]
-fn straight_edges_run_between_the_pixels_and_the_map_ends_with_the_photo() {
+fn straight_edges_lie_between_pixels_and_the_map_ends_at_the_border_of_the_photo() {
     let surface = NormalMap::new(&half_plane(), Camera::Orthographic).unwrap();
     assert!(surface.point(1.99, 2.5).is_none() && surface.point(2.01, 2.5).is_some());
     for (x, y, inside) in [(6.0, 5.0, true), (5.9, 0.0, true), (6.01, 2.0, false), (4.0, -0.01, false)] {
@@ -51,13 +51,13 @@ fn perspective_views_point_to_the_pinhole() {
     let map = Image::from_pixels(8, 8, vec![[0.0, 0.0, 1.0]; 64]);
     let surface = NormalMap::new(&map, Camera::Perspective { vertical_fov_deg: 60.0 }).unwrap();
     assert!((surface.point(4.0, 4.0).unwrap().view - Vec3::Z).length() < 1e-15);
-    // Seen to the right and above, so the camera is to the left and below.
+    // This point is to the right and above, so the camera lies to the left and below.
     let view = surface.point(7.5, 0.5).unwrap().view;
     assert!(view.x < -0.1 && view.y < -0.1 && view.z > 0.5);
 }
 
 #[test]
-fn normals_are_normalised_once_and_then_stay_bit_for_bit() {
+fn normalised_normals_are_kept_bit_for_bit() {
     let odd = |k: usize| {
         narrow(Vec3::new(0.1 * (k % 7) as f64, -0.05 * k as f64, 1.0).normalize() * (0.97 + 0.002 * k as f64))
     };

@@ -20,7 +20,7 @@ fn the_middle_of_a_centred_sphere_faces_the_camera() {
 }
 
 #[test]
-fn x_grows_to_plus_x_and_y_falls_to_minus_y() {
+fn image_x_is_plus_x_and_image_y_is_minus_y() {
     for camera in CAMERAS {
         let sphere = sphere(Circle { x: 100.0, y: 50.0, radius: 40.0 }, camera);
         assert!(sphere.point(120.0, 50.0).unwrap().normal.x > 0.1);
@@ -32,7 +32,7 @@ fn x_grows_to_plus_x_and_y_falls_to_minus_y() {
 }
 
 #[test]
-fn silhouette_touches_the_circle_in_the_middle_all_around() {
+fn the_silhouette_of_a_centred_sphere_is_the_circle() {
     for camera in CAMERAS {
         let sphere = sphere(Circle { x: 100.0, y: 50.0, radius: 40.0 }, camera);
         for k in 0..64 {
@@ -40,14 +40,14 @@ fn silhouette_touches_the_circle_in_the_middle_all_around() {
             let at = |r: f64| sphere.point(100.0 + r * c, 50.0 - r * s);
             assert!(at(40.0 + 1e-6).is_none(), "{camera}");
             let rim = at(40.0 - 1e-6).unwrap();
-            // Close to the rim the normal is nearly perpendicular to the view.
+            // At the rim the normal is nearly perpendicular to the view.
             assert!(rim.normal.dot(rim.view) > 0.0 && rim.normal.dot(rim.view) < 1e-3, "{camera}");
         }
     }
 }
 
 #[test]
-fn a_sphere_beside_the_middle_touches_the_circle_on_the_radial_line_and_stays_inside() {
+fn the_silhouette_of_an_off_centre_sphere_touches_the_circle_on_the_radial_line_and_lies_inside() {
     let circle = Circle { x: 150.0, y: 30.0, radius: 25.0 };
     for camera in &CAMERAS[2..] {
         let sphere = sphere(circle, *camera);
@@ -87,13 +87,13 @@ fn a_narrow_field_of_view_approaches_parallel_rays() {
     let (near, parallel) = (sphere(circle, CAMERAS[1]), sphere(circle, CAMERAS[0]));
     for (x, y) in [(100.0, 50.0), (120.0, 40.0), (70.0, 60.0)] {
         let (a, b) = (near.point(x, y).unwrap(), parallel.point(x, y).unwrap());
-        // 0.1 degrees are 1.7e-3 radians.
+        // 2e-3, because the field of view of 0.1 degrees is 1.7e-3 radians.
         assert!((a.normal - b.normal).length() < 2e-3 && (a.view - b.view).length() < 2e-3);
     }
 }
 
 #[test]
-fn faults_are_typed() {
+fn every_fault_has_its_error() {
     let new = |x: f64, radius: f64, camera: Camera| Sphere::new(200, 100, Circle { x, y: 50.0, radius }, camera);
     assert!(matches!(new(-50.0, 40.0, Camera::Orthographic), Err(SceneError::CircleOutside { .. })));
     assert!(matches!(new(50.0, 0.0, Camera::Orthographic), Err(SceneError::Circle { .. })));

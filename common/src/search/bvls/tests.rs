@@ -1,8 +1,8 @@
 use super::*;
 use crate::math::sampling::{key, uniform};
 
-/// The normal equations of m rows in n unknowns, pseudo-random in [-1, 1], with the last column a mixture of the first
-/// two when `dependent`.
+/// The normal equations of m rows in n unknowns, pseudo-random in [-1, 1]. If `dependent`, the last column is a
+/// combination of the first two.
 fn random_problem(seed: u64, m: usize, n: usize, dependent: bool) -> NormalEquations {
     let number = |i: usize, j: usize| 2.0 * uniform(key(&[seed, i as u64, j as u64])) - 1.0;
     let mut normal = NormalEquations::new(n);
@@ -21,7 +21,7 @@ fn objective(normal: &NormalEquations, x: &[f64]) -> f64 {
     (0..x.len()).map(|i| x[i] * (0.5 * product[i] - normal.vector(i))).sum()
 }
 
-/// The lowest objective over all ways to put variables at bounds and solve for the others, the feasible ones only.
+/// The lowest objective over all choices of variables at bounds, solved for the others, of those inside the box.
 fn brute_force(normal: &NormalEquations, lower: &[f64], upper: &[f64]) -> f64 {
     let n = lower.len();
     let mut lowest = f64::INFINITY;
@@ -41,7 +41,7 @@ fn brute_force(normal: &NormalEquations, lower: &[f64], upper: &[f64]) -> f64 {
     lowest
 }
 
-/// Gaussian elimination with partial pivoting, the plain independent way; NaN when singular.
+/// Gaussian elimination with partial pivoting, as an independent reference; NaN if singular.
 fn gauss(free: &[usize], normal: &NormalEquations, mut rhs: Vec<f64>) -> Vec<f64> {
     let k = free.len();
     let mut a: Vec<Vec<f64>> = free.iter().map(|&i| free.iter().map(|&j| normal.matrix(i, j)).collect()).collect();
@@ -110,7 +110,7 @@ fn solutions_are_optimal_and_as_low_as_every_active_set() {
             active += solution.states.iter().filter(|&&state| state != BoundState::Free).count();
         }
     }
-    // Both kinds occur, or the test tests nothing.
+    // Both free variables and variables at bounds must occur.
     assert!((400..1000).contains(&active), "{active} of 1260 variables at bounds");
 }
 
@@ -122,8 +122,8 @@ fn dependent_columns_and_fewer_rows_than_unknowns_still_give_a_minimum() {
         let (lower, upper) = random_box(seed, n);
         let solution = solve(&normal, &lower, &upper).unwrap();
         let violation = violation(&normal, &solution, &lower, &upper);
-        // A dependent column's square is eliminated to some 1e-15 of itself, hence its part of the gradient to the
-        // root.
+        // Elimination leaves about 1e-15 of the square of a dependent column, so its part of the gradient is accurate
+        // to the square root of that.
         assert!(violation < 1e-7, "{seed}: {violation:e}");
     }
 }
@@ -173,7 +173,7 @@ fn agrees_with_scipy() {
 }
 
 #[test]
-fn no_bounds_give_the_plain_solution_and_no_information_the_nearest_to_zero() {
+fn without_bounds_the_solution_is_the_plain_one_and_without_rows_the_nearest_to_zero() {
     let normal = random_problem(1, 9, 3, false);
     let infinite = [f64::INFINITY; 3];
     let solution = solve(&normal, &infinite.map(|x| -x), &infinite).unwrap();

@@ -25,8 +25,8 @@ fn assert_near(minimum: &Minimum, expected: &[f64], tolerance: f64) {
 fn rosenbrock_is_solved_from_the_classical_start() {
     let minimum = solve(&mut Rosenbrock, &[-1.2, 1.0], &wide(2));
     assert_near(&minimum, &[1.0, 1.0], 1e-9);
-    let cut_short = matches!(minimum.termination, Termination::MaxEvaluations | Termination::Stopped);
-    assert!(!cut_short && minimum.evaluations <= 30, "{minimum:?}");
+    let is_cut_short = matches!(minimum.termination, Termination::MaxEvaluations | Termination::Stopped);
+    assert!(!is_cut_short && minimum.evaluations <= 30, "{minimum:?}");
 }
 
 #[test]
@@ -55,19 +55,19 @@ fn exponential_fit_agrees_with_scipy_free_and_at_bounds() {
             let minimum = solve(&mut Exponential, &[1.0, -0.5, 0.7], &bounds);
             assert_near(&minimum, &expected, 1e-6);
             assert!((minimum.value - cost).abs() < 1e-12 * cost, "{minimum:?}");
-            // The last case has residuals too large for quadratic convergence; scipy takes 38.
+            // The residuals of the last case are too large for quadratic convergence; scipy needs 38 evaluations.
             assert!(minimum.evaluations <= 30, "{minimum:?}");
         }
     }
 }
 
 #[test]
-fn coordinate_that_belongs_at_its_bound_equals_it_and_can_leave_again() {
+fn a_coordinate_with_its_minimum_at_a_bound_equals_it_and_can_leave_bounds() {
     let bounds = Bounds::linear(&[0.0, -1.0, -5.0], &[10.0, 0.0, 5.0]).unwrap();
     let minimum = solve(&mut Exponential, &[1.0, -0.5, 0.7], &bounds);
     assert_eq!(minimum.point[1], -1.0);
     assert_eq!(minimum.states, [BoundState::Free, BoundState::AtLower, BoundState::Free]);
-    // From the far corner, where every coordinate starts at a bound.
+    // From the opposite corner, where every coordinate starts at a bound.
     let from_corner = solve(&mut Exponential, &[10.0, 0.0, -5.0], &bounds);
     assert_near(&from_corner, &minimum.point, 1e-6);
     assert_eq!(from_corner.point[1], -1.0);
@@ -84,17 +84,17 @@ fn bounded_rosenbrock_agrees_with_scipy() {
 }
 
 #[test]
-fn singular_jacobian_at_the_minimum_slows_but_does_not_stop() {
+fn a_singular_jacobian_at_the_minimum_slows_the_search_but_does_not_stop_it() {
     let bounds = Bounds::linear(&[-4.0; 4], &[4.0; 4]).unwrap();
     let minimum = solve(&mut PowellSingular, &[3.0, -1.0, 0.0, 1.0], &bounds);
-    // Linear convergence: the distance halves and the cost falls sixteenfold, until the damping's floor is what
-    // remains.
+    // Linear convergence: each step halves the distance and divides the cost by 16, until the minimum damping limits
+    // it.
     assert!(minimum.value < 1e-22, "{minimum:?}");
     assert!(minimum.point.iter().all(|x| x.abs() < 1e-5), "{minimum:?}");
 }
 
 #[test]
-fn parameters_that_the_residuals_cannot_tell_apart_do_no_harm() {
+fn parameters_that_the_residuals_do_not_distinguish_do_not_stop_the_search() {
     let bounds = Bounds::linear(&[0.0, 0.0, 0.0], &[1.0, 2.0, 1.0]).unwrap();
     for weak in [0.0, 1e-9, 1e-2] {
         let minimum = solve(&mut Degenerate { weak }, &[0.3, 0.3, 0.3], &bounds);
@@ -105,10 +105,10 @@ fn parameters_that_the_residuals_cannot_tell_apart_do_no_harm() {
         assert!(variances[0].is_finite());
         assert_eq!(variances[1].is_infinite(), weak < 1e-6, "{weak}: {variances:?}");
     }
-    // In between lies a valley so narrow and bent that the search creeps along it: it spends its budget, and says so.
-    let creeping = solve(&mut Degenerate { weak: 1e-5 }, &[0.3, 0.3, 0.3], &bounds);
-    assert_eq!(creeping.termination, Termination::MaxEvaluations);
-    assert!(creeping.value < 1e-12, "{creeping:?}");
+    // With 1e-5 the valley is narrow and curved. The search advances slowly and ends at the limit of evaluations.
+    let slow = solve(&mut Degenerate { weak: 1e-5 }, &[0.3, 0.3, 0.3], &bounds);
+    assert_eq!(slow.termination, Termination::MaxEvaluations);
+    assert!(slow.value < 1e-12, "{slow:?}");
 }
 
 #[test]
@@ -120,17 +120,17 @@ fn same_inputs_give_the_same_bits() {
     assert_eq!(bits(&runs[0]), bits(&runs[1]));
 }
 
-/// One residual `ln(x) - ln(0.02)` and one `y - 3`, with a hole where the cost or the Jacobian is NaN.
-struct Holed {
-    cost_hole: f64,
-    jacobian_hole: f64,
+/// The residuals `ln(x) - ln(0.02)` and `y - 3`; the cost or the Jacobian is NaN where y exceeds a limit.
+struct PartlyNan {
+    cost_limit: f64,
+    jacobian_limit: f64,
 }
 
-impl Rows for Holed {
+impl Rows for PartlyNan {
     const DIMENSION: usize = 2;
     fn rows(&self, x: &[f64]) -> Vec<(Vec<f64>, f64)> {
-        let cost = if x[1] > self.cost_hole { f64::NAN } else { ln(x[0]) - ln(0.02) };
-        let slope = if x[1] > self.jacobian_hole { f64::NAN } else { 1.0 / x[0] };
+        let cost = if x[1] > self.cost_limit { f64::NAN } else { ln(x[0]) - ln(0.02) };
+        let slope = if x[1] > self.jacobian_limit { f64::NAN } else { 1.0 / x[0] };
         vec![(vec![slope, 0.0], cost), (vec![0.0, 1.0], x[1] - 3.0)]
     }
 }
@@ -139,10 +139,10 @@ impl Rows for Holed {
 fn logarithmic_scale_makes_a_logarithmic_residual_linear() {
     let scales = vec![Scale::Logarithmic, Scale::Linear];
     let bounds = Bounds::new(vec![1e-4, 0.0], vec![1.0, 10.0], scales).unwrap();
-    let mut problem = Holed { cost_hole: f64::INFINITY, jacobian_hole: f64::INFINITY };
+    let mut problem = PartlyNan { cost_limit: f64::INFINITY, jacobian_limit: f64::INFINITY };
     let minimum = solve(&mut problem, &[0.9, 9.0], &bounds);
     assert_near(&minimum, &[0.02, 3.0], 1e-10);
-    // The model is exact: only the damping is in the way. The natural scale needs more steps.
+    // The model is exact and only the damping slows it. The natural scale needs more steps.
     let natural = solve(&mut problem, &[0.9, 9.0], &Bounds::linear(&[1e-4, 0.0], &[1.0, 10.0]).unwrap());
     assert!(minimum.evaluations < natural.evaluations, "{} {}", minimum.evaluations, natural.evaluations);
     // The normal equations are those of the natural parameters.
@@ -150,12 +150,12 @@ fn logarithmic_scale_makes_a_logarithmic_residual_linear() {
 }
 
 #[test]
-fn point_that_cannot_be_evaluated_or_linearised_is_rejected_and_at_the_start_refused() {
+fn a_point_that_is_not_finite_is_rejected_and_a_start_that_is_not_finite_is_an_error() {
     let bounds = Bounds::linear(&[1e-4, 0.0], &[1.0, 10.0]).unwrap();
-    for (cost_hole, jacobian_hole) in [(2.5, f64::INFINITY), (f64::INFINITY, 2.5)] {
-        let mut problem = Holed { cost_hole, jacobian_hole };
+    for (cost_limit, jacobian_limit) in [(2.5, f64::INFINITY), (f64::INFINITY, 2.5)] {
+        let mut problem = PartlyNan { cost_limit, jacobian_limit };
         let minimum = solve(&mut problem, &[0.9, 0.5], &bounds);
-        // The hole begins before the minimum in y: the search stops at its edge.
+        // The values end below the minimum in y: the search stops near the limit.
         assert!(minimum.point[1] <= 2.5 && minimum.point[1] > 2.0, "{minimum:?}");
         let refused = minimise(&mut problem, &[0.9, 9.0], &bounds, &LeastSquaresOptions::default());
         assert!(matches!(refused, Err(SearchError::NotFinite { .. })), "{refused:?}");
@@ -163,7 +163,7 @@ fn point_that_cannot_be_evaluated_or_linearised_is_rejected_and_at_the_start_ref
 }
 
 #[test]
-fn every_reason_to_end_is_reached_and_named() {
+fn every_termination_reason_is_reached() {
     let bounds = Bounds::linear(&[0.0, -5.0, -5.0], &[10.0, 0.0, 5.0]).unwrap();
     let never = LeastSquaresOptions {
         gradient_tolerance: 0.0,
@@ -182,12 +182,12 @@ fn every_reason_to_end_is_reached_and_named() {
         let cut = end(&LeastSquaresOptions { max_evaluations: budget, ..never.clone() });
         assert_eq!((cut.termination, cut.evaluations), (Termination::MaxEvaluations, budget));
     }
-    // Without tolerances the search still ends, at the rounding of the cost.
+    // Without tolerances the search ends at the rounding error of the cost.
     assert!(end(&never).value <= gradient.value);
 }
 
 #[test]
-fn observer_sees_every_evaluation_and_can_stop() {
+fn the_observer_is_called_after_every_evaluation_and_can_stop_the_search() {
     let mut seen = Vec::new();
     let mut observe = |progress: &Progress<'_>| {
         seen.push(progress.value);
@@ -211,8 +211,8 @@ fn faulty_inputs_are_refused() {
 }
 
 #[test]
-fn minimum_in_a_corner_and_fixed_parameters_end_by_the_gradient() {
-    // Everything wants out through the corner (0.2, 0.1, 1).
+fn a_minimum_in_a_corner_with_a_fixed_parameter_ends_by_the_gradient() {
+    // The gradient points out of the box at the corner (0.2, 0.1, 1).
     let bounds = Bounds::linear(&[0.0, 0.0, 1.0], &[0.2, 0.1, 1.0]).unwrap();
     let minimum = solve(&mut Degenerate { weak: 0.0 }, &[0.1, 0.02, 1.0], &bounds);
     assert_eq!(minimum.point[2], 1.0);
@@ -258,13 +258,13 @@ fn linear_problems_end_at_the_solution_of_bvls_from_anywhere_in_the_box() {
 }
 
 #[test]
-fn damping_follows_the_gain_as_nielsen_has_it() {
+fn damping_follows_the_gain_by_nielsens_rule() {
     let mut damping = Damping { mu: 1.0, growth: 2.0 };
     damping.tighten();
     damping.tighten();
     damping.tighten();
     assert_eq!((damping.mu, damping.growth), (2.0 * 4.0 * 8.0, 16.0));
-    // A gain of 1/2 leaves it, one of 1/4 raises it by 1/8, and a perfect one divides it by 3.
+    // A gain of 1/2 keeps the damping, 1/4 raises it by 1/8, and 1 divides it by 3.
     damping.relax(0.5);
     assert_eq!((damping.mu, damping.growth), (64.0, 2.0));
     damping.relax(0.25);

@@ -2,7 +2,7 @@ use super::super::test_functions::rosenbrock;
 use super::*;
 use crate::math::elementary::sin_cos;
 
-/// Runs a search and records every point the objective sees.
+/// Runs a search and records every point at which the objective is evaluated.
 fn recorded(
     f: impl Fn(&[f64]) -> f64,
     start: &[f64],
@@ -35,8 +35,8 @@ fn iterations(dimension: usize, max_iterations: usize) -> PatternOptions {
     PatternOptions { max_iterations, ..PatternOptions::matlab(dimension) }
 }
 
-/// `ps_example` of the Global Optimization Toolbox, whose first iterations are worked through on the page "How Pattern
-/// Search Polling Works" (unscaled mesh, start (2.1, 1.7)).
+/// `ps_example` of the Global Optimization Toolbox. The page "How Pattern Search Polling Works" lists its first
+/// iterations (unscaled mesh, start (2.1, 1.7)).
 fn ps_example(x: &[f64]) -> f64 {
     let side = x[1].abs();
     side + match x[0] {
@@ -48,12 +48,12 @@ fn ps_example(x: &[f64]) -> f64 {
 }
 
 #[test]
-fn iterations_are_those_matlab_documents() {
+fn iterations_are_those_that_matlab_documents() {
     let start = [2.1, 1.7];
     assert!((ps_example(&start) - 4.6347).abs() < 5e-5);
     let (_, seen) = recorded(ps_example, &start, &wide(2), &iterations(2, 4));
     let expected = [
-        // Start; mesh 1: (3.1, 1.7) and (2.1, 2.7) are worse, (1.1, 1.7) is better and (2.1, 0.7) is not looked at.
+        // Start. Mesh 1: (3.1, 1.7) and (2.1, 2.7) are worse, (1.1, 1.7) is better, and (2.1, 0.7) is not evaluated.
         [2.1, 1.7],
         [3.1, 1.7],
         [2.1, 2.7],
@@ -76,7 +76,7 @@ fn iterations_are_those_matlab_documents() {
     for (seen, expected) in seen.iter().zip(&expected) {
         assert!((seen[0] - expected[0]).abs() + (seen[1] - expected[1]).abs() < 1e-12, "{seen:?} {expected:?}");
     }
-    // The values the page gives for the three successes.
+    // The values on that page for the three successes.
     for (index, value) in [(3, 4.5146), (6, 3.25), (9, -0.2649)] {
         assert!((ps_example(&seen[index]) - value).abs() < 5e-5);
     }
@@ -84,7 +84,7 @@ fn iterations_are_those_matlab_documents() {
 
 #[test]
 fn ps_example_ends_where_matlab_ends() {
-    // The documented run: 60 iterations to (-4.712, 0), value -2, because of the mesh size.
+    // The documented run: 60 iterations to (-4.712, 0) with value -2, ended by the mesh size.
     let (minimum, _) = recorded(ps_example, &[2.1, 1.7], &wide(2), &PatternOptions::matlab(2));
     assert!((minimum.point[0] + 4.712).abs() < 5e-4 && minimum.point[1].abs() < 1e-5, "{minimum:?}");
     assert!((minimum.value + 2.0).abs() < 1e-5);
@@ -92,7 +92,7 @@ fn ps_example_ends_where_matlab_ends() {
 }
 
 #[test]
-fn poll_goes_through_the_positive_axes_and_then_the_negative_ones() {
+fn a_poll_tries_the_positive_axes_and_then_the_negative_ones() {
     let (minimum, seen) = recorded(|x| if x == [0.0; 3] { 0.0 } else { 1.0 }, &[0.0; 3], &wide(3), &iterations(3, 1));
     let expected =
         [[0., 0., 0.], [1., 0., 0.], [0., 1., 0.], [0., 0., 1.], [-1., 0., 0.], [0., -1., 0.], [0., 0., -1.]];
@@ -102,7 +102,7 @@ fn poll_goes_through_the_positive_axes_and_then_the_negative_ones() {
 
 #[test]
 fn mesh_doubles_after_success_and_halves_after_failure() {
-    // Along -x only; successes at mesh 1, 2, 4 lead to -7; then x + 8, x - 8 fail, and so on down.
+    // Only -x improves: successes at mesh 1, 2 and 4 lead to -7. Then x + 8 and x - 8 fail, and x + 4 and x - 4.
     let (_, seen) = recorded(|x| (x[0] + 7.0).abs(), &[0.0], &wide(1), &iterations(1, 5));
     assert_eq!(seen.concat(), [0.0, 1.0, -1.0, 1.0, -3.0, 1.0, -7.0, 1.0, -15.0, -3.0, -11.0]);
 }
@@ -111,13 +111,13 @@ fn mesh_doubles_after_success_and_halves_after_failure() {
 fn points_outside_the_box_are_neither_evaluated_nor_counted() {
     let bounds = Bounds::unscaled(&[-1.0, 0.0], &[0.5, 3.0]).unwrap();
     let (minimum, seen) = recorded(|x| x[0] * x[0] + x[1], &[0.0, 0.0], &bounds, &iterations(2, 2));
-    // Mesh 1: (1, 0) and (0, -1) are outside. Mesh 1/2: (0, -1/2) is.
+    // Outside the box: (1, 0) and (0, -1) at mesh 1, (0, -1/2) at mesh 1/2.
     assert_eq!(seen, [[0.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.5, 0.0], [0.0, 0.5], [-0.5, 0.0]]);
     assert_eq!(minimum.evaluations, 6);
 }
 
 #[test]
-fn evaluation_budget_is_exact_even_within_a_poll() {
+fn the_evaluation_limit_is_exact_within_a_poll() {
     for budget in [1, 2, 5, 17] {
         let options = PatternOptions { max_evaluations: budget, ..PatternOptions::matlab(2) };
         let (minimum, seen) = recorded(rosenbrock, &[-1.2, 1.0], &wide(2), &options);
@@ -128,13 +128,13 @@ fn evaluation_budget_is_exact_even_within_a_poll() {
 }
 
 #[test]
-fn every_reason_to_end_is_reached_and_named() {
+fn every_termination_reason_is_reached() {
     let f = |x: &[f64]| (x[0] - 0.3).abs();
     let end = |options: &PatternOptions| minimise(f, &[0.9], &unit_box(1), options).unwrap().termination;
     let matlab = PatternOptions::matlab(1);
     assert_eq!(end(&matlab), Termination::MeshTolerance);
     assert_eq!(end(&PatternOptions { step_tolerance: 1e-2, ..matlab.clone() }), Termination::StepTolerance);
-    // A range of 1000 units: steps of x stay above the tolerance when those of the scaled mesh are below.
+    // With a range of 1000 units, steps of x are above the tolerance when the scaled mesh is below it.
     let bounds = Bounds::linear(&[0.0], &[1000.0]).unwrap();
     let options = PatternOptions { step_tolerance: 1e-2, function_tolerance: 10.0, ..matlab.clone() };
     let far = minimise(|x: &[f64]| (x[0] - 300.0).abs(), &[900.0], &bounds, &options).unwrap();
@@ -144,29 +144,29 @@ fn every_reason_to_end_is_reached_and_named() {
 }
 
 #[test]
-fn observer_sees_the_incumbent_after_every_evaluation_and_can_stop() {
-    let mut told = Vec::new();
+fn the_observer_gets_the_incumbent_after_every_evaluation_and_can_stop_the_search() {
+    let mut reports = Vec::new();
     let mut observe = |progress: &Progress<'_>| {
         assert_eq!(progress.value, rosenbrock(progress.point));
-        told.push((progress.evaluations, progress.value));
+        reports.push((progress.evaluations, progress.value));
         if progress.evaluations == 25 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     };
     let options = PatternOptions::matlab(2);
     let minimum = minimise_observed(rosenbrock, &[-1.2, 1.0], &wide(2), &options, &mut observe).unwrap();
     assert_eq!((minimum.termination, minimum.evaluations), (Termination::Stopped, 25));
-    assert!(told.iter().map(|told| told.0).eq(1..=25));
-    assert!(told.windows(2).all(|pair| pair[1].1 <= pair[0].1));
-    assert_eq!(told[24].1, minimum.value);
+    assert!(reports.iter().map(|report| report.0).eq(1..=25));
+    assert!(reports.windows(2).all(|pair| pair[1].1 <= pair[0].1));
+    assert_eq!(reports[24].1, minimum.value);
 }
 
 #[test]
-fn start_that_cannot_be_evaluated_is_an_error_elsewhere_it_is_rejected() {
+fn a_point_that_is_not_finite_is_rejected_and_a_start_that_is_not_finite_is_an_error() {
     let options = PatternOptions::matlab(1);
     let refused = minimise(|_| f64::NAN, &[0.5], &unit_box(1), &options);
     assert_eq!(refused, Err(SearchError::NotFinite { what: "the objective", point: vec![0.5] }));
-    // NaN and minus infinity below 0.4: the minimum among the rest.
-    for hole in [f64::NAN, f64::NEG_INFINITY] {
-        let f = |x: &[f64]| if x[0] < 0.4 { hole } else { x[0] };
+    // NaN or minus infinity below 0.4: the minimum of the finite values is found.
+    for invalid in [f64::NAN, f64::NEG_INFINITY] {
+        let f = |x: &[f64]| if x[0] < 0.4 { invalid } else { x[0] };
         let minimum = minimise(f, &[0.9], &unit_box(1), &options).unwrap();
         assert!((minimum.point[0] - 0.4).abs() < 2e-6 && minimum.value >= 0.4, "{minimum:?}");
     }
@@ -181,8 +181,7 @@ fn smooth_kinked_and_discontinuous_minima_are_found() {
     let cases: [Case; 4] = [
         ("quadratic", |x| (x[0] - 0.3) * (x[0] - 0.3) + 4.0 * (x[1] - 0.7) * (x[1] - 0.7), [0.3, 0.7], 2e-6),
         ("sum of moduli", |x| (x[0] - 0.3).abs() + 2.0 * (x[1] - 0.7).abs(), [0.3, 0.7], 2e-6),
-        // Descent along the kink is diagonal: polling the axes stops on it, but only within the mesh when it starts
-        // there.
+        // Descent along the kink is diagonal, so polling along the axes stops on the kink, at the final mesh size.
         ("largest modulus", |x| (x[0] - 0.3).abs().max(0.1 * (x[1] - 0.7).abs()), [0.3, 0.7], 2e-5),
         ("step", |x| (x[0] - 0.3).abs() + if x[1] < 0.6 { 1.0 } else { x[1] }, [0.3, 0.6], 2e-6),
     ];
@@ -195,7 +194,8 @@ fn smooth_kinked_and_discontinuous_minima_are_found() {
 
 #[test]
 fn rosenbrock_is_descended_in_two_and_four_dimensions() {
-    // Slow along the valley, as the axes are not its direction: a large budget, and a distance of 100 meshes.
+    // The search is slow, because the valley is not along an axis. Hence a high limit of evaluations and a tolerance of
+    // 1e-4.
     for dimension in [2, 4] {
         let start: Vec<f64> = (0..dimension).map(|i| if i % 2 == 0 { -1.2 } else { 1.0 }).collect();
         let options = PatternOptions {
@@ -213,7 +213,7 @@ fn rosenbrock_is_descended_in_two_and_four_dimensions() {
 }
 
 #[test]
-fn minimum_at_a_bound_is_approached_and_never_left() {
+fn a_minimum_at_a_bound_is_approached_from_inside_the_box() {
     let bounds = Bounds::new(
         vec![-2.0, 0.005],
         vec![2.0, 1.0],
@@ -226,13 +226,13 @@ fn minimum_at_a_bound_is_approached_and_never_left() {
     };
     let minimum = minimise(f, &[0.37, 0.3], &bounds, &PatternOptions::matlab(2)).unwrap();
     assert!(minimum.point[0] + 2.0 < 8e-6 && minimum.point[1] - 0.005 < 1e-7, "{minimum:?}");
-    // A step that lands on a bound lands there to the bit.
+    // A step that reaches a bound is equal to it to the bit.
     let exact = minimise(f, &[0.0, 1.0], &bounds, &PatternOptions::matlab(2)).unwrap();
     assert_eq!(exact.point, [-2.0, 0.005]);
 }
 
 #[test]
-fn fixed_parameter_stays_and_costs_nothing() {
+fn a_fixed_parameter_is_not_polled() {
     let bounds = Bounds::linear(&[0.0, 0.4], &[1.0, 0.4]).unwrap();
     let options = PatternOptions::matlab(2);
     let (minimum, seen) = recorded(|x| (x[0] - 0.25).abs() + x[1], &[1.0, 0.4], &bounds, &options);

@@ -2,21 +2,21 @@
 //!
 //! `f = (1 - metallic) (base_color ((1 - subsurface) f_d + subsurface f_ss) + sheen F5) + F D G / (4 n.l n.v) + clearcoat/4 F_c D_c G_c / (4 n.l n.v)`
 //! with `F5 = (1 - v.h)^5` (Schlick 1994) and
-//! - `f_d`, `f_ss`: a diffuse lobe whose rim follows the roughness, and an approximation of light that travels below the surface after
-//!   Hanrahan & Krueger 1993 (`disney/diffuse.rs`),
-//! - `D`: GGX of `alpha = roughness^2`; `G`: Smith's masking of light and view, each for itself, of the wider
-//!   `alpha_g = (0.5 + roughness/2)^2`; `F = c + (1 - c) F5`, `c = (1 - metallic) 0.08 specular + metallic base_color`,
+//! - `f_d`, `f_ss`: a diffuse lobe whose rim follows the roughness, and an approximation of subsurface scattering after Hanrahan & Krueger
+//!   1993 (`disney/diffuse.rs`),
+//! - `D`: GGX of `alpha = roughness^2`; `G`: separable Smith masking of the wider `alpha_g = (0.5 + roughness/2)^2`;
+//!   `F = c + (1 - c) F5`, `c = (1 - metallic) 0.08 specular + metallic base_color`,
 //! - `D_c`: the distribution with the long tail, `1/(a^2 + tan^2)` to the first power (GTR 1), `a = 0.1 - 0.099 clearcoat_gloss`; `G_c`
-//!   Smith's of 0.25; `F_c = 0.04 + 0.96 F5` (`disney/specular.rs`).
+//!   Smith's masking of width 0.25; `F_c = 0.04 + 0.96 F5` (`disney/specular.rs`).
 //!
 //! (Burley 2012, sections 5.3 to 5.6 and the reference implementation, `disney.brdf`; its `specularTint`, `sheenTint` and `anisotropic`
-//! are 0.) Fresnel's term is split as that of `ggx`. The diffuse lobes are polynomials of the second degree in the roughness, so that
-//! they need no grid of widths: three basis lobes each.
+//! are 0.) The Fresnel term is split as in `ggx`. The diffuse lobes are polynomials of the second degree in the roughness, so each is three
+//! basis lobes without a grid of widths.
 //!
 //! | parameter | meaning | bounds |
 //! |---|---|---|
 //! | `base_color` | colour of the surface, linear Rec. 709: diffuse, and specular where it is metallic | [0, 1] |
-//! | `subsurface` | from the diffuse lobe to that of light below the surface | [0, 1] |
+//! | `subsurface` | from the diffuse lobe to the subsurface lobe | [0, 1] |
 //! | `metallic` | from a dielectric to a metal | [0, 1] |
 //! | `specular` | of the dielectric: its reflectance at normal incidence is 0.08 times this | [0, 1] |
 //! | `roughness` | square root of the width of the specular lobe | [0.071, 1] |
@@ -24,13 +24,13 @@
 //! | `clearcoat` | weight of the coat | [0, 1] |
 //! | `clearcoat_gloss` | from a satin coat to a glossy one | [0, 0.9595] |
 //!
-//! Burley's roughness and gloss reach 0 and 1; here both lobes end at a width of 0.005, as that of `ggx` does. At grazing views the
-//! lobe below the surface and the satin coat reflect up to a quarter more than they receive: so they are published.
+//! Burley's roughness reaches 0 and his gloss 1; here both lobes end at a width of 0.005, as in `ggx`. At grazing views the published
+//! subsurface lobe and satin coat have an albedo of up to 1.25.
 
 mod diffuse;
 mod specular;
 
-use super::{BasisLobe, Channels, Model, Parameter, Role, Scale};
+use super::{BasisLobe, Model, Parameter, Role};
 use crate::math::Rgb;
 use diffuse::{Diffuse, Sheen, Subsurface};
 use specular::{Clearcoat, Specular};
@@ -54,49 +54,45 @@ const MOST_DIELECTRIC: f64 = 0.08;
 /// Share of the coat's lobe in the sum where `clearcoat` is 1.
 const COAT: f64 = 0.25;
 
-/// Reflectance of the coat at normal incidence: of polyurethane, of index 1.5.
+/// Reflectance of the coat at normal incidence: polyurethane, index 1.5.
 const COAT_F0: f64 = 0.04;
 
-/// Terms of the specular lobe and of the coat, after three of the diffuse lobe, three of the one below the surface, and the sheen.
+/// First terms of sheen, specular lobe and coat, after three terms each of the diffuse and the subsurface lobe.
 const SHEEN_TERM: usize = 6;
 const SPECULAR_TERM: usize = 7;
 const COAT_TERM: usize = 9;
 
-const fn scalar(name: &'static str, meaning: &'static str, role: Role) -> Parameter {
-    let (channels, scale) = (Channels::Scalar, Scale::Linear);
-    Parameter { name, meaning, channels, lower: 0.0, upper: 1.0, start: 0.3, role, scale }
-}
-
 static PARAMETERS: [Parameter; 8] = [
-    Parameter {
-        channels: Channels::Rgb,
-        ..scalar("base_color", "colour of the surface, linear Rec. 709: diffuse, and specular of a metal", Role::Linear)
-    },
-    scalar("subsurface", "from diffuse to light that travels below the surface", Role::Blend(&[0.0, 1.0])),
-    scalar("metallic", "from a dielectric to a metal", Role::Blend(&[0.0, 0.5, 1.0])),
-    scalar("specular", "of a dielectric: 0.08 times this is its reflectance at normal incidence", Role::Linear),
+    Parameter::colour("base_color", "colour of the surface, linear Rec. 709: diffuse, and specular of a metal"),
+    Parameter::blend("subsurface", "from the diffuse lobe to the subsurface lobe", &[0.0, 1.0]),
+    Parameter::blend("metallic", "from a dielectric to a metal", &[0.0, 0.5, 1.0]),
+    Parameter::scalar(
+        "specular",
+        "of a dielectric: 0.08 times this is its reflectance at normal incidence",
+        Role::Linear,
+    ),
     Parameter {
         lower: specular::LEAST_ROUGHNESS,
-        ..scalar("roughness", "square root of the width of the specular lobe", Role::Width)
+        ..Parameter::scalar("roughness", "square root of the width of the specular lobe", Role::Width)
     },
-    scalar("sheen", "weight of a white rim", Role::Linear),
-    scalar("clearcoat", "weight of the clear coat", Role::Linear),
+    Parameter::scalar("sheen", "weight of a white rim", Role::Linear),
+    Parameter::scalar("clearcoat", "weight of the clear coat", Role::Linear),
     Parameter {
         upper: specular::MOST_GLOSS,
-        ..scalar("clearcoat_gloss", "from a satin coat to a glossy one", Role::Scanned(&[0.0, 0.5, 0.9]))
+        ..Parameter::scalar("clearcoat_gloss", "from a satin coat to a glossy one", Role::Scanned(&[0.0, 0.5, 0.9]))
     },
 ];
 
 static LOBES: [BasisLobe; 9] = [
-    BasisLobe { lobe: &Diffuse::<0>, width: None },
-    BasisLobe { lobe: &Diffuse::<1>, width: None },
-    BasisLobe { lobe: &Diffuse::<2>, width: None },
-    BasisLobe { lobe: &Subsurface::<0>, width: None },
-    BasisLobe { lobe: &Subsurface::<1>, width: None },
-    BasisLobe { lobe: &Subsurface::<2>, width: None },
-    BasisLobe { lobe: &Sheen, width: None },
-    BasisLobe { lobe: &Specular, width: Some(specular::roughness(ROUGHNESS)) },
-    BasisLobe { lobe: &Clearcoat, width: Some(specular::gloss(GLOSS)) },
+    BasisLobe::fixed(&Diffuse::<0>),
+    BasisLobe::fixed(&Diffuse::<1>),
+    BasisLobe::fixed(&Diffuse::<2>),
+    BasisLobe::fixed(&Subsurface::<0>),
+    BasisLobe::fixed(&Subsurface::<1>),
+    BasisLobe::fixed(&Subsurface::<2>),
+    BasisLobe::fixed(&Sheen),
+    BasisLobe::with_width(&Specular, specular::roughness(ROUGHNESS)),
+    BasisLobe::with_width(&Clearcoat, specular::gloss(GLOSS)),
 ];
 
 impl Model for Disney {
@@ -160,7 +156,7 @@ impl Model for Disney {
         Rgb::splat(dielectric) + Rgb::from_slice(&p[BASE..]) * p[METALLIC]
     }
 
-    /// That of the lobe below the surface is about three quarters of that of the diffuse one.
+    /// The albedo of the subsurface lobe is about three quarters of that of the diffuse lobe.
     fn diffuse_albedo(&self, p: &[f64]) -> Rgb {
         Rgb::from_slice(&p[BASE..]) * ((1.0 - p[METALLIC]) * (1.0 - 0.25 * p[SUBSURFACE]))
     }

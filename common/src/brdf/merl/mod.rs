@@ -10,12 +10,12 @@
 //! | `phi_d`, light around the half vector | \[0, pi), periodic by pi through reciprocity | `(i + 1/2) / 180 pi` |
 //!
 //! Between centres the value is trilinear in (`sqrt(theta_h)`, `theta_d`, `phi_d`); beyond the outermost centres of the first
-//! two axes it continues as it is, which at 0 is the mirror image that the geometry demands. A cell with a negative channel is
-//! *outside* (below the horizon, or not measured): it is dropped and the other weights are renormalised; where all eight
-//! neighbours are outside, the BRDF is 0.
+//! two axes it is constant, which at 0 is the reflection that the geometry requires. A cell with a negative channel is *outside*
+//! (below the horizon, or not measured): it is dropped and the other weights are renormalised. Where all eight neighbours are
+//! outside, the BRDF is 0.
 //!
-//! `f` is in 1/sr, without the cosine, linear Rec. 709 (as the database is used by convention; it does not say). The value is
-//! bitwise reciprocal. Nothing bounds the albedo: extrapolated measurements may exceed 1 at grazing angles.
+//! `f` is in 1/sr, without the cosine, linear Rec. 709 (by convention; the database does not say). The value is bitwise
+//! reciprocal. The albedo is not bounded: extrapolated measurements may exceed 1 at grazing angles.
 
 mod coordinates;
 mod error;
@@ -86,7 +86,7 @@ impl MerlTable {
         for (row, row_weight) in neighbours.rows {
             for (column, weight) in neighbours.columns {
                 let [r, g, b] = self.cells[row + column];
-                // A select rather than a branch: near the horizon it would be mispredicted.
+                // A select, because a branch would be mispredicted near the horizon.
                 let weight = if r >= 0.0 { row_weight * weight } else { 0.0 };
                 sum += Rgb::new(f64::from(r), f64::from(g), f64::from(b)) * weight;
                 total += weight;
@@ -107,13 +107,13 @@ impl Reflectance for MerlTable {
         self.eval(wi_local, wo_local) * wi_local.z.max(0.0)
     }
 
-    /// A few widths of GGX from the core of the table's lobes to their tails, and 1 for the rest.
+    /// GGX widths from the core of the table's lobes to their tails, and 1 for the rest.
     fn sampling_alphas(&self) -> Vec<f64> {
         self.alphas.clone()
     }
 }
 
-/// The planes of a file whose header and length are right, as little-endian numbers.
+/// Checks header and length of a file and returns its planes as little-endian numbers.
 fn planes<'a>(name: &str, bytes: &'a [u8]) -> Result<&'a [[u8; 8]], MerlError> {
     let expected = HEADER + 3 * 8 * CELLS;
     let length = || MerlError::Length { name: name.to_owned(), expected, found: bytes.len() };
@@ -131,7 +131,7 @@ fn planes<'a>(name: &str, bytes: &'a [u8]) -> Result<&'a [[u8; 8]], MerlError> {
     }
 }
 
-/// Where a cell lies on the three axes.
+/// The indices of a cell along the three axes.
 fn cell_of(index: usize) -> [usize; 3] {
     [index / (DIMENSIONS[2] * DIMENSIONS[1]), index / DIMENSIONS[2] % DIMENSIONS[1], index % DIMENSIONS[2]]
 }
@@ -141,7 +141,7 @@ const DIMENSIONS: [usize; 3] = [90, 90, 180];
 const CELLS: usize = DIMENSIONS[0] * DIMENSIONS[1] * DIMENSIONS[2];
 /// Bytes before the planes.
 const HEADER: usize = 12;
-/// What a stored number is worth in 1/sr (`BRDFRead.cpp` of the database).
+/// 1/sr per unit of a stored number (`BRDFRead.cpp` of the database).
 const SCALE: [f64; 3] = [1.0 / 1500.0, 1.15 / 1500.0, 1.66 / 1500.0];
-/// A cell that holds no measurement.
+/// A cell without a measurement.
 const OUTSIDE: [f32; 3] = [-1.0; 3];
