@@ -3,6 +3,7 @@
 
 pub mod access;
 pub mod actions;
+pub mod atomic;
 pub mod events;
 pub mod journal;
 pub mod limits;

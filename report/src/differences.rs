@@ -16,8 +16,12 @@ const SHOWN: [&str; 2] = ["ours", "full"];
 /// their names.
 ///
 /// # Errors
-/// If a picture cannot be read, has another size than its photo, or cannot be written.
-pub(super) fn write(folder: &Path, names: &mut BTreeSet<String>) -> anyhow::Result<()> {
+/// Where a picture cannot be read, has another size than its photo, or cannot be written.
+pub(super) fn write(
+    folder: &Path,
+    names: &mut BTreeSet<String>,
+    mut write: impl FnMut(&str, &[u8]) -> anyhow::Result<()>,
+) -> anyhow::Result<()> {
     let scenes: Vec<String> =
         names.iter().filter_map(|name| name.strip_suffix("-full.png")).map(str::to_owned).collect();
     for scene in scenes {
@@ -30,7 +34,7 @@ pub(super) fn write(folder: &Path, names: &mut BTreeSet<String>) -> anyhow::Resu
             let name = file(&format!("difference-{what}"));
             let image = difference(&photo, &read(folder, &file(what))?)
                 .with_context(|| format!("the pictures {} and {} differ in size", file("photo"), file(what)))?;
-            crate::folder::file(folder, &name, png::write(&image, &[])?)?;
+            write(&format!("pictures/{name}"), &png::write(&image, &[])?)?;
             names.insert(name);
         }
     }

@@ -1,4 +1,4 @@
-//! Lists and writes files in the folder of the report.
+//! Lists files in the folder of the report.
 
 use anyhow::Context;
 use std::{collections::BTreeSet, fs, io::ErrorKind, path::Path};
@@ -13,11 +13,4 @@ pub(crate) fn names(folder: &Path) -> anyhow::Result<BTreeSet<String>> {
             entries.map(|entry| Ok(entry.with_context(cannot)?.file_name().to_string_lossy().into_owned())).collect()
         }
     }
-}
-
-/// Writes a temporary file and renames it, so that a reader finds either the old file or the new one, both complete.
-pub(crate) fn file(folder: &Path, name: &str, content: impl AsRef<[u8]>) -> anyhow::Result<()> {
-    let (path, part) = (folder.join(name), folder.join(format!("{name}.part")));
-    let written = fs::write(&part, content).and_then(|()| fs::rename(&part, &path));
-    written.with_context(|| format!("cannot write {}", path.display()))
 }

@@ -21,36 +21,36 @@ mod verdict;
 mod tests;
 
 use crate::measured::StudyData;
-use anyhow::Context;
 use document::{Block, Section};
-use folder::file;
-use std::{fs, path::Path};
+use std::path::Path;
 use study::Study;
 
 /// The heading of both pages.
 const TITLE: &str = "Lookalike against Bieron and Peers 2020";
 
-/// Writes the report into `out`: `results.md`, `report.html`, `results.json`, `data.json` and `figures/`. The pictures that it shows must be
-/// in `out/pictures/`; the pictures of differences are added there.
+/// Makes the report of the study in `out`: `results.md`, `report.html`, `results.json`, `data.json` and `figures/`, which `write` gets
+/// with their names below `out`. The pictures that it shows are in `out/pictures/` already; those of differences are added.
 ///
 /// # Errors
-/// If a file cannot be read or written.
-pub fn write(data: &StudyData, out: &Path) -> anyhow::Result<()> {
+/// Where a picture cannot be read, or as `write` says.
+pub fn write(
+    data: &StudyData,
+    out: &Path,
+    mut write: impl FnMut(&str, &[u8]) -> anyhow::Result<()>,
+) -> anyhow::Result<()> {
     let pictures = out.join("pictures");
     let mut names = folder::names(&pictures)?;
-    differences::write(&pictures, &mut names)?;
+    differences::write(&pictures, &mut names, &mut write)?;
     let study = Study::new(data, names);
     let sections = section::all(&study)?;
     let lead = lead(&study);
-    let figures = out.join("figures");
-    fs::create_dir_all(&figures).with_context(|| format!("cannot create the folder {}", figures.display()))?;
     for (name, text) in figure_files(&sections) {
-        file(&figures, &name, text)?;
+        write(&format!("figures/{name}"), text.as_bytes())?;
     }
-    file(out, "results.json", results::json(&study)?)?;
-    file(out, "data.json", results::data(data)?)?;
-    file(out, "results.md", markdown::page(TITLE, &lead, &sections))?;
-    file(out, "report.html", html::page(TITLE, &lead, &sections, &pictures)?)
+    write("results.json", results::json(&study)?.as_bytes())?;
+    write("data.json", results::data(data)?.as_bytes())?;
+    write("results.md", markdown::page(TITLE, &lead, &sections).as_bytes())?;
+    write("report.html", html::page(TITLE, &lead, &sections, &pictures)?.as_bytes())
 }
 
 /// The subject of the study, in two sentences.

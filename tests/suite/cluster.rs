@@ -165,11 +165,8 @@ fn workers_may_come_from_elsewhere_and_end_with_the_run() {
 
 #[test]
 fn without_any_worker_the_run_ends_with_a_named_error() {
-    let policy = Policy {
-        wait_for_workers: Duration::from_millis(300),
-        remind_every: Duration::from_millis(100),
-        ..policy()
-    };
+    let policy =
+        Policy { wait_for_workers: Duration::from_millis(300), remind_every: Duration::from_millis(100), ..policy() };
     let leaves = Leaves::Digests { count: 1, shared_bytes: 1 };
     let (events, outcome) = Cluster::start(leaves, RunnerOptions { policy, ..local_listener() }).outcome();
     let error = outcome.unwrap_err();

@@ -20,6 +20,7 @@ mod faults;
 mod fit;
 mod hostile;
 mod network;
+mod out_folder;
 mod overhead;
 mod physics;
 mod program;

@@ -2,7 +2,7 @@
 //! metrics and the summaries.
 
 use super::{
-    results::Scores,
+    row::{Row, STATES, Scores, State},
     summary::{self, Summary},
 };
 use crate::{
@@ -12,81 +12,14 @@ use crate::{
     run::Clock,
     settings::BatchFit,
 };
-use lookalike::{brdf::Model, fit::BestScore, graph::split_label};
-use lookalike_coordinator::{
-    events::RunEvent,
-    journal::{PartLedger, PartRow, PartStatus},
-    metrics::Metrics,
-};
+use lookalike::{fit::BestScore, graph::split_label};
+use lookalike_coordinator::{events::RunEvent, journal::PartLedger, metrics::Metrics};
 use std::{
     collections::BTreeMap,
     sync::{Arc, Mutex, MutexGuard, PoisonError},
     time::Instant,
 };
 use tracing::warn;
-
-/// A fit, as the summaries show it.
-#[derive(Debug, Clone)]
-pub(super) struct Row {
-    pub(super) name: String,
-    pub(super) photo: String,
-    pub(super) env: String,
-    pub(super) model: &'static dyn Model,
-    pub(super) state: State,
-    /// From its start to its end, so far as it has one.
-    pub(super) seconds: Option<f64>,
-}
-
-/// How far a fit is.
-#[derive(Debug, Clone)]
-pub(super) enum State {
-    /// Its turn has not come.
-    Waiting,
-    /// Its nodes run, or its results are being written.
-    Running,
-    /// Its results are there.
-    Done(Scores),
-    /// It has no results and gets none.
-    Failed(String),
-    /// The run ended before it did.
-    Stopped,
-}
-
-impl State {
-    /// In one word, as the summaries and the metrics have it.
-    pub(super) fn name(&self) -> &'static str {
-        match self {
-            Self::Waiting => "waiting",
-            Self::Running => "running",
-            Self::Done(scores) if scores.is_missed => "missed",
-            Self::Done(_) => "done",
-            Self::Failed(_) => "failed",
-            Self::Stopped => "stopped",
-        }
-    }
-}
-
-impl Row {
-    /// As the journal has it.
-    fn journal_row(&self, number: u32) -> PartRow {
-        let (scores, error) = match &self.state {
-            State::Done(scores) => (Some(scores), None),
-            State::Failed(error) => (None, Some(error.clone())),
-            State::Waiting | State::Running | State::Stopped => (None, None),
-        };
-        let status = PartStatus {
-            name: self.name.clone(),
-            state: self.state.name().to_owned(),
-            score: scores.map(|scores| scores.cssim),
-            seconds: self.seconds,
-            error,
-        };
-        PartRow { number, status, outputs: scores.map(|scores| scores.files.clone()).unwrap_or_default() }
-    }
-}
-
-/// All words that [`State::name`] can say.
-const STATES: [&str; 6] = ["waiting", "running", "done", "missed", "failed", "stopped"];
 
 /// How every fit is doing.
 pub(super) struct Board {
@@ -274,7 +207,7 @@ impl Board {
 
     /// The exit code that the fits ask for.
     pub(super) fn exit(&self) -> Exit {
-        super::exit(&self.lock().count())
+        exit(&self.lock().count())
     }
 
     fn lock(&self) -> MutexGuard<'_, Inner> {
@@ -369,6 +302,17 @@ impl Inner {
             let of = |state: &str| self.rows.iter().filter(|row| row.state.name() == state).count();
             metrics.set_fits(&STATES.map(|state| (state, of(state))));
         }
+    }
+}
+
+/// The exit code of a batch: a fit that failed outweighs one that missed its score.
+fn exit(count: &FitCount) -> Exit {
+    if count.failed > 0 {
+        Exit::SomeFitsFailed
+    } else if count.missed > 0 {
+        Exit::MissedMaxCssim
+    } else {
+        Exit::Done
     }
 }
 

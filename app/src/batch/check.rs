@@ -15,7 +15,7 @@ pub(super) struct Checked {
     pub(super) inputs: Value,
     /// Pixels of its photo.
     pub(super) pixels: usize,
-    /// What may not change when the batch is gone on with, by name.
+    /// What may not change when the batch is resumed, by name.
     pub(super) identity: Vec<(&'static str, String)>,
 }
 

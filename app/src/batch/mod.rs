@@ -19,6 +19,7 @@ mod loader;
 mod prepare;
 mod results;
 mod resume;
+mod row;
 mod summary;
 mod supply;
 mod window;
@@ -26,7 +27,7 @@ mod window;
 use crate::{
     exit::Exit,
     inputs::show_warnings,
-    outputs::{FIT_FILES, OutFolder, print_result},
+    outputs::{BATCH_MARK, Claim, ClaimedFolder, FIT_FILES, OldFiles, OutFolder, print_result},
     progress::{Ending, display_of_many},
     run::{journal_failed, run_to_end, runner_options},
     settings::{BatchFit, BatchSettings, OnFailure, ProgressKind},
@@ -36,7 +37,7 @@ use board::{Board, Watchers};
 use lights::Lights;
 use lookalike::graph::Many;
 use lookalike_coordinator::journal::{self, Finished, JOURNAL_FILE, JournalOptions, PartLedger};
-use std::{process::ExitCode, sync::Arc};
+use std::{path::Path, process::ExitCode, sync::Arc};
 use supply::{Supply, SupplyOptions};
 use tokio::sync::Notify;
 use window::{Demand, Window};
@@ -44,12 +45,12 @@ use window::{Demand, Window};
 /// Runs a batch and writes its results.
 pub(crate) fn run(settings: BatchSettings) -> anyhow::Result<ExitCode> {
     // Whatever can fail fails before any work is done.
-    resume::refuse_old(&settings)?;
-    let out = OutFolder::create(&settings.out, settings.resume)?;
+    let folder = ClaimedFolder::take(&claim(&settings))?;
     let metrics = settings.metrics.map(|address| address.listen()).transpose()?;
     let lights = Arc::new(Lights::default());
     let checked = check::check(&settings, &lights)?;
     let out_name = settings.out.display().to_string();
+    let out = folder.begin()?;
     let identity = resume::identity(&settings.fits, &checked.fits);
     let resume::Earlier { is_finished, complete, remark } =
         resume::earlier(&out, &out_name, &identity, &settings.fits)?;
@@ -122,18 +123,34 @@ fn close(out: &OutFolder, board: &Board, ledger: &PartLedger, is_whole: bool, fi
     Ok(())
 }
 
+/// What the batch asks of its folder.
+fn claim(settings: &BatchSettings) -> Claim<'_> {
+    let mut inputs: Vec<&Path> = vec![&settings.manifest];
+    for fit in &settings.fits {
+        inputs.extend(fit.capture.files());
+    }
+    inputs.extend(settings.cluster.access.as_deref());
+    Claim {
+        command: "batch",
+        files: vec![summary::CSV, BATCH_MARK],
+        fits: settings.fits.iter().map(|fit| fit.name.as_str()).collect(),
+        inputs,
+        access: settings.cluster.access.as_deref(),
+        ..Claim::of_fit(&settings.out, OldFiles::of(settings.resume, settings.force))
+    }
+}
+
 /// Tells all that is wrong with a batch, without running it.
 pub(crate) fn check(settings: &BatchSettings) -> anyhow::Result<()> {
-    resume::refuse_old(settings)?;
+    claim(settings).check()?;
     show_warnings(&check::check(settings, &Lights::default())?.warnings);
     Ok(())
 }
 
 /// The files of all fits, each with its hash.
 fn outputs(out: &OutFolder, fits: &[BatchFit]) -> anyhow::Result<Vec<(String, String)>> {
-    let files = fits.iter().flat_map(|fit| FIT_FILES.map(|file| format!("{}/{file}", fit.name)));
-    let there = files.filter_map(|name| out.hash(&name).transpose().map(|hash| hash.map(|hash| (name, hash))));
-    there.collect()
+    let files: Vec<String> = fits.iter().flat_map(|fit| FIT_FILES.map(|file| format!("{}/{file}", fit.name))).collect();
+    out.hashes(files.iter().map(String::as_str))
 }
 
 /// Writes the last summaries and tells how it went.
@@ -161,16 +178,5 @@ fn first_error(first: anyhow::Result<()>, then: anyhow::Result<()>) -> anyhow::R
             Err(first)
         }
         (first, then) => first.and(then),
-    }
-}
-
-/// The exit code of a batch: a fit that failed outweighs one that missed its score.
-fn exit(count: &crate::progress::FitCount) -> Exit {
-    if count.failed > 0 {
-        Exit::SomeFitsFailed
-    } else if count.missed > 0 {
-        Exit::MissedMaxCssim
-    } else {
-        Exit::Done
     }
 }

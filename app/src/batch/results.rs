@@ -1,6 +1,6 @@
 //! The results of fits that have ended: written beside the run, so that it never waits for a disk.
 
-use super::{backlog::Backlog, board::Board};
+use super::{backlog::Backlog, board::Board, row::Scores};
 use crate::{
     fit::{final_parameters, final_score, final_scores, notes, write_results},
     outputs::{FIT_FILES, FitRecord, OutFolder, Timing},
@@ -33,22 +33,6 @@ pub(super) struct Fitted {
     pub(super) inputs: Inputs,
     pub(super) outcome: FitOutcome,
     pub(super) timing: Timing,
-}
-
-/// What the summaries say of a fit with results.
-#[derive(Debug, Clone)]
-pub(super) struct Scores {
-    pub(super) cssim: f64,
-    pub(super) cssim_object: f64,
-    /// Of the winner of stage two.
-    pub(super) gamma: f64,
-    /// The flat vector that the fit ends with.
-    pub(super) parameters: Vec<f64>,
-    pub(super) is_polished: bool,
-    /// Whether the score lies above the fit's `max-cssim`.
-    pub(super) is_missed: bool,
-    /// The files that were written, each with the BLAKE3 of its bytes.
-    pub(super) files: Vec<(String, String)>,
 }
 
 /// Writes results on the rayon pool.

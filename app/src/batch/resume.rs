@@ -1,34 +1,16 @@
 //! What an earlier run of a batch has left: the same batch or another one, and which fits are complete.
 
-use super::{check::Checked, results::Scores};
+use super::{check::Checked, row::Scores};
 use crate::{
     fit::version,
     outputs::{MARK, OutFolder},
-    problems::Problems,
     run::{journal_failed, missing},
-    settings::{BatchFit, BatchSettings},
+    settings::BatchFit,
 };
-use anyhow::bail;
 use lookalike::brdf::{Channels, Model};
 use lookalike_coordinator::journal::{self, JOURNAL_FILE, RunIdentity};
 use serde_json::Value;
-use std::{fs, path::Path};
-
-/// Refuses a folder that holds a batch which is not to be gone on with, or fits that a new one would write over.
-pub(super) fn refuse_old(settings: &BatchSettings) -> anyhow::Result<()> {
-    let out = &settings.out;
-    let old = out.join(super::summary::JSON);
-    if !settings.resume && old.exists() {
-        bail!(
-            "{} says that a batch was run there already: go on with it with --resume, choose another --out, or remove that folder first",
-            old.display()
-        );
-    }
-    if out.join(JOURNAL_FILE).exists() {
-        return Ok(());
-    }
-    refuse_strangers(out, &settings.fits, |folder| folder.join(MARK).exists() || folder.join(JOURNAL_FILE).exists())
-}
+use std::fs;
 
 /// What the run of these fits is a run of. Their order does not matter.
 pub(super) fn identity(fits: &[BatchFit], checks: &[Checked]) -> RunIdentity {
@@ -49,11 +31,11 @@ pub(super) struct Earlier {
     pub(super) remark: Option<String>,
 }
 
-/// What the run in a folder has left, if there is one and it is to be gone on with. Only what its journal says that it wrote is taken
-/// for its work.
+/// What the run in a folder has left, if there is one and it is resumed. Only files that its journal lists count as
+/// its results.
 ///
 /// # Errors
-/// If the run there is one of other inputs or settings, a result was changed, or folders of fits hold what this run did not write.
+/// If the run there is one of other inputs or settings, or a result was changed.
 pub(super) fn earlier(
     out: &OutFolder,
     out_name: &str,
@@ -76,33 +58,13 @@ pub(super) fn earlier(
         complete.push(if missing.is_empty() { complete_fit(out, fit, files) } else { None });
         gone.extend(missing);
     }
-    let open: Vec<&BatchFit> =
-        fits.iter().zip(&complete).filter(|(_, complete)| complete.is_none()).map(|(fit, _)| fit).collect();
-    // Its own files may lie there without an entry: it was killed just then. A journal there is never its own.
-    let is_finished = written.is_finished && open.is_empty();
-    refuse_strangers(Path::new(out_name), open, |folder| folder.join(JOURNAL_FILE).exists())?;
+    let is_finished = written.is_finished && complete.iter().all(Option::is_some);
     let remark = if is_finished {
         Some(format!("the run in {out_name} is finished, and its results are as it wrote them"))
     } else {
         (!gone.is_empty()).then(|| format!("of the run in {out_name}, {} is missing: fitting again", gone.join(", ")))
     };
     Ok(Earlier { is_finished, complete, remark })
-}
-
-/// Refuses all folders of fits that hold another run, which this one would write over.
-fn refuse_strangers<'a>(
-    out: &Path,
-    fits: impl IntoIterator<Item = &'a BatchFit>,
-    holds_another: impl Fn(&Path) -> bool,
-) -> anyhow::Result<()> {
-    let taken = fits.into_iter().map(|fit| out.join(&fit.name)).filter(|folder| holds_another(folder));
-    let lines = taken.map(|folder| {
-        format!(
-            "{} holds a fit that is not of this run: choose another --out, or move that folder elsewhere",
-            folder.display()
-        )
-    });
-    Problems::check(lines.collect(), &out.display().to_string())
 }
 
 /// The scores of a fit whose files are there, with its seconds.

@@ -1,8 +1,8 @@
 //! `summary.csv`, `summary.json` and the table at the end: one row per fit.
 
-use super::board::{Row, State};
+use super::row::{Row, State};
 use crate::{
-    outputs::{OutFolder, aligned, parameters_json},
+    outputs::{BATCH_MARK, OutFolder, aligned, parameters_json},
     progress::FitCount,
 };
 use anyhow::Context;
@@ -13,9 +13,8 @@ use std::fmt::Write as _;
 /// The schema of `summary.json`.
 const SCHEMA: &str = "lookalike.batch/1";
 
-/// The names of the summaries.
-const CSV: &str = "summary.csv";
-pub(super) const JSON: &str = "summary.json";
+/// The name of the summary for spreadsheets.
+pub(super) const CSV: &str = "summary.csv";
 
 /// All fits at a time.
 #[derive(Debug)]
@@ -29,9 +28,9 @@ pub(super) struct Summary {
 
 /// Writes both summaries, each in one piece.
 pub(super) fn write(summary: &Summary, out: &OutFolder) -> anyhow::Result<()> {
-    let text = serde_json::to_string_pretty(&summary.json()).context(JSON)? + "\n";
+    let text = serde_json::to_string_pretty(&summary.json()).context(BATCH_MARK)? + "\n";
     out.write(CSV, summary.csv().as_bytes())?;
-    out.write(JSON, text.as_bytes())
+    out.write(BATCH_MARK, text.as_bytes())
 }
 
 impl Summary {
@@ -164,7 +163,7 @@ fn quoted(text: &str) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::{super::results::Scores, *};
+    use super::{super::row::Scores, *};
     use lookalike::brdf;
 
     fn row(name: &str, model: &str, state: State) -> Row {

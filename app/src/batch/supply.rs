@@ -176,6 +176,7 @@ mod tests {
     use super::*;
     use crate::{
         batch::{board::Watchers, window::Demand},
+        outputs::{Claim, ClaimedFolder, OldFiles},
         progress::display_of_many,
         settings::ProgressKind,
     };
@@ -208,7 +209,10 @@ mod tests {
     #[test]
     fn fits_that_are_being_written_take_room_until_they_are() {
         let folder = tempfile::tempdir().unwrap();
-        let supply = supply(&OutFolder::create(folder.path(), false).unwrap(), 1 << 20);
+        let supply = {
+            let claim = Claim::of_fit(folder.path(), OldFiles::Refuse);
+            supply(&ClaimedFolder::take(&claim).unwrap().begin().unwrap(), 1 << 20)
+        };
         assert!(supply.wants_more(1, 0));
         let one = supply.writers.backlog().add(1);
         assert!(!supply.wants_more(1, 0), "one under way and one being written are two for one thread");

@@ -7,7 +7,7 @@ use super::output::{check_writable, write_file};
 use crate::{
     exit::Exit,
     inputs::{LoadedPhoto, load_image, load_mask, resolve_display_exposure, show_warnings},
-    settings::{CompareSettings, DisplayExposure, MetricKind},
+    settings::{CompareSettings, MetricKind},
 };
 use anyhow::{Context, bail};
 use coverage::Coverage;
@@ -150,13 +150,4 @@ fn write_map(path: &Path, map: &ErrorMap, settings: &CompareSettings) -> anyhow:
 fn full_scale(map: &ErrorMap) -> f64 {
     let largest = map.error.iter().copied().fold(0.0, f64::max);
     [0.1, 0.2, 0.5, 1.0].into_iter().find(|&scale| largest <= scale).unwrap_or(2.0)
-}
-
-/// How an exposure was chosen, for people.
-fn exposure_source(asked: &DisplayExposure) -> String {
-    match asked {
-        DisplayExposure::Auto => "auto: 97th percentile of the reference's largest channel to 0.9".to_owned(),
-        DisplayExposure::Value(_) => "as given; 1 unless --display-exposure says otherwise".to_owned(),
-        DisplayExposure::From(path) => format!("from {}", path.display()),
-    }
 }

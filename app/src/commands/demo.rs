@@ -3,7 +3,7 @@
 use crate::{
     demo::{environment, material, photo},
     fit::{self, FitJob},
-    outputs::{OutFolder, Panel, Pictures, print_result, strip},
+    outputs::{Claim, ClaimedFolder, FIT_FILES, OldFiles, OutFolder, Panel, Pictures, print_result, strip},
     settings::{ClusterSettings, DemoSettings},
 };
 use anyhow::Context;
@@ -22,12 +22,16 @@ use std::{process::ExitCode, sync::Arc, time::Instant};
 const SIZE: usize = 192;
 /// Rows of the environment map.
 const MAP_ROWS: usize = 256;
+/// What the demo writes beside the files of its fit.
+const FILES: [&str; 4] = ["photo.exr", "environment.exr", "environment.png", "strip.png"];
 /// The gammas that the strip shows beside the winner.
 const SHOWN: [f64; 3] = [1.0, 2.0, 3.0];
 
 pub(crate) fn run(settings: DemoSettings) -> anyhow::Result<ExitCode> {
     let began = Instant::now();
-    let out = OutFolder::overwrite(&settings.out)?;
+    let old = if settings.force { OldFiles::Replace } else { OldFiles::ReplaceDemo };
+    let files = FIT_FILES.into_iter().chain(FILES).collect();
+    let out = ClaimedFolder::take(&Claim { command: "demo", files, ..Claim::of_fit(&settings.out, old) })?.begin()?;
     eprintln!("making a photo of a pearl paint under lacquer, in a pavilion with four windows");
     let map = environment::lat_long(MAP_ROWS);
     let light = Arc::new(Environment::new(map.clone()).context("the demo's light")?);
@@ -53,7 +57,6 @@ pub(crate) fn run(settings: DemoSettings) -> anyhow::Result<ExitCode> {
         max_cssim: None,
         also_render: SHOWN.to_vec(),
         resume: false,
-        is_resumable: false,
         input_seconds: began.elapsed().as_secs_f64(),
     };
     let finished = fit::run(job)?.context("a fit that nobody has made is finished: please report this")?;

@@ -3,7 +3,7 @@
 use crate::{
     fit::{self, FitJob},
     inputs::{load_capture, resolve_display_exposure, show_warnings},
-    outputs::OutFolder,
+    outputs::{Claim, ClaimedFolder, OldFiles},
     settings::FitSettings,
 };
 use std::{process::ExitCode, sync::Arc, time::Instant};
@@ -11,11 +11,12 @@ use std::{process::ExitCode, sync::Arc, time::Instant};
 pub(crate) fn run(settings: FitSettings) -> anyhow::Result<ExitCode> {
     let began = Instant::now();
     // Whatever can fail fails before any work is done.
-    let out = OutFolder::create(&settings.out, settings.resume)?;
+    let folder = ClaimedFolder::take(&claim(&settings))?;
     let loaded = load_capture(&settings.capture)?;
     show_warnings(&loaded.warnings);
     let coverage = loaded.capture.scoring_coverage();
     let exposure = resolve_display_exposure(&settings.display_exposure, loaded.capture.photo(), &coverage)?;
+    let out = folder.begin()?;
     let job = FitJob {
         inputs: loaded.to_json(),
         capture: Arc::new(loaded.capture),
@@ -29,8 +30,18 @@ pub(crate) fn run(settings: FitSettings) -> anyhow::Result<ExitCode> {
         max_cssim: settings.max_cssim,
         also_render: Vec::new(),
         resume: settings.resume,
-        is_resumable: true,
         input_seconds: began.elapsed().as_secs_f64(),
     };
     Ok(fit::run(job)?.map_or(ExitCode::SUCCESS, |finished| finished.code))
+}
+
+/// What the fit asks of its folder.
+fn claim(settings: &FitSettings) -> Claim<'_> {
+    let mut inputs = settings.capture.files();
+    inputs.extend(settings.cluster.access.as_deref());
+    Claim {
+        inputs,
+        access: settings.cluster.access.as_deref(),
+        ..Claim::of_fit(&settings.out, OldFiles::of(settings.resume, settings.force))
+    }
 }

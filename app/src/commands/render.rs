@@ -1,27 +1,29 @@
 //! `lookalike render`: a sphere, or a map of normals, of one material under one light, by the direct integrator.
 
 mod encode;
+mod material;
 
 use super::output::{check_writable, write_file};
 use crate::{
     exit::Exit,
-    inputs::{
-        self, LoadedEnvironment, LoadedGeometry, LoadedTable, flat_parameters, load_environment, load_normals,
-        load_table, show_warnings, sphere_geometry,
-    },
-    settings::{self, RenderSettings},
+    inputs::{LoadedEnvironment, LoadedGeometry, load_environment, load_normals, show_warnings, sphere_geometry},
+    settings::RenderSettings,
 };
 use anyhow::Context;
 use encode::{Format, Subject};
 use indicatif::{ProgressBar, ProgressStyle};
 use lookalike::{
-    brdf::{Material, Reflectance, flat_names},
     light::LightDistribution,
     math::Rgb,
     render::image::{Noise, Rendering, Shot},
     scene::Circle,
 };
-use std::process::ExitCode;
+use material::LoadedMaterial;
+use std::{
+    process::ExitCode,
+    sync::Mutex,
+    time::{Duration, Instant},
+};
 
 /// Renders a material.
 pub(crate) fn run(settings: RenderSettings) -> anyhow::Result<ExitCode> {
@@ -50,37 +52,6 @@ pub(crate) fn run(settings: RenderSettings) -> anyhow::Result<ExitCode> {
     Ok(Exit::Done.into())
 }
 
-/// A material with what names it in metadata.
-#[derive(Debug)]
-struct LoadedMaterial {
-    reflectance: Box<dyn Reflectance>,
-    /// The model's name; `merl` for a measured one.
-    model: &'static str,
-    /// `name=value` pairs of a model.
-    parameters: Option<String>,
-    /// The file of a measured material, with its hash.
-    file: Option<inputs::InputFile>,
-}
-
-impl LoadedMaterial {
-    fn load(material: &settings::Material) -> anyhow::Result<Self> {
-        match material {
-            settings::Material::Measured(path) => {
-                let LoadedTable { table, source } = load_table(path)?;
-                Ok(Self { reflectance: Box::new(table), model: "merl", parameters: None, file: Some(source) })
-            }
-            settings::Material::Analytic { model, params } => {
-                let model = model.model();
-                let flat = flat_parameters(model, params).context("--params")?;
-                let pairs = flat_names(model.parameters()).into_iter().zip(&flat);
-                let parameters = pairs.map(|(name, value)| format!("{name}={value}")).collect::<Vec<_>>().join(",");
-                let reflectance = Box::new(Material::new(model, flat).context("--params")?);
-                Ok(Self { reflectance, model: model.name(), parameters: Some(parameters), file: None })
-            }
-        }
-    }
-}
-
 fn shape(settings: &RenderSettings) -> anyhow::Result<LoadedGeometry> {
     match &settings.view.normals {
         Some(path) => load_normals(path, settings.view.camera),
@@ -96,13 +67,23 @@ fn shape(settings: &RenderSettings) -> anyhow::Result<LoadedGeometry> {
     }
 }
 
-/// Renders under a bar of rows on stderr, which shows on terminals only.
+/// Renders under a bar of rows on stderr; where none can be drawn, with a line now and then.
 fn with_progress(shot: &Shot<'_>) -> Rendering {
     let rows = ProgressBar::new(shot.geometry.height() as u64);
     if let Ok(style) = ProgressStyle::with_template("rendering {wide_bar} {pos}/{len} rows, {eta} left") {
         rows.set_style(style);
     }
-    let rendering = shot.render(|| rows.inc(1));
+    let told = Mutex::new(Instant::now());
+    let rendering = shot.render(|| {
+        rows.inc(1);
+        // A row that finds another one at it leaves the line to that one.
+        if let (true, Ok(mut told)) = (rows.is_hidden(), told.try_lock())
+            && told.elapsed() >= PAUSE
+        {
+            *told = Instant::now();
+            eprintln!("rendering: {} of {} rows", rows.position(), shot.geometry.height());
+        }
+    });
     rows.finish_and_clear();
     rendering
 }
@@ -129,6 +110,9 @@ fn tell(settings: &RenderSettings, light: &LoadedEnvironment, rendering: &Render
     }
     eprintln!("wrote {}", settings.out.display());
 }
+
+/// Between two lines.
+const PAUSE: Duration = Duration::from_secs(10);
 
 /// What the image writers and readers take.
 const LARGEST_PX: usize = 1 << 14;

@@ -4,7 +4,10 @@
 //! Indoors is the module `pavilion`; this file has what lies outside it, and the map. It is a picture to look at in a mirror
 //! sphere, not a solution of light transport.
 
-use super::pavilion;
+use super::{
+    pavilion,
+    sky::{SUN_AZIMUTH, smooth_step, sun_direction},
+};
 use lookalike::{
     image::Image,
     math::{
@@ -41,18 +44,6 @@ pub fn lat_long(height: usize) -> Image {
 #[must_use]
 pub fn radiance(direction: Vec3) -> Rgb {
     pavilion::radiance(direction).unwrap_or_else(|| outdoors(direction))
-}
-
-/// The unit direction of the sun's centre.
-pub(super) fn sun_direction() -> Vec3 {
-    let ((sin_elevation, cos_elevation), (sin_azimuth, cos_azimuth)) = (sin_cos(SUN_ELEVATION), sin_cos(SUN_AZIMUTH));
-    Vec3::new(cos_elevation * sin_azimuth, sin_elevation, cos_elevation * cos_azimuth)
-}
-
-/// 0 below `low`, 1 above `high`, a cubic between.
-pub(super) fn smooth_step(low: f64, high: f64, x: f64) -> f64 {
-    let t = ((x - low) / (high - low)).clamp(0.0, 1.0);
-    t * t * (3.0 - 2.0 * t)
 }
 
 /// What is seen where the pavilion does not stand in the way.
@@ -118,9 +109,6 @@ fn cypress(azimuth: f64, elevation: f64) -> Option<Rgb> {
 
 /// Points along each side of a texel.
 const POINTS: usize = 6;
-/// Radians above the horizon, and from +Z towards +X.
-const SUN_ELEVATION: f64 = 0.375;
-const SUN_AZIMUTH: f64 = 0.42;
 /// Radians: three texels across at 512 x 256, a third of that its soft edge.
 const SUN_RADIUS: f64 = 0.020;
 const SUN_EDGE: f64 = 0.006;
@@ -136,6 +124,7 @@ const TREES: [(f64, f64); 6] = [(-0.60, 0.20), (-0.48, 0.27), (-0.37, 0.17), (0.
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::demo::sky::SUN_ELEVATION;
     use lookalike::math::{luminance, widen};
 
     #[test]

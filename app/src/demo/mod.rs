@@ -7,3 +7,4 @@ pub mod environment;
 pub mod material;
 mod pavilion;
 pub mod photo;
+mod sky;

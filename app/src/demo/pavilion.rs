@@ -1,6 +1,6 @@
 //! The room of the bundled scene: a box around the observer, in metres, seen from its inside.
 
-use super::environment::{smooth_step, sun_direction};
+use super::sky::{smooth_step, sun_direction};
 use lookalike::math::{
     Rgb, Vec3, cell,
     elementary::exp,

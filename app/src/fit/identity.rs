@@ -1,4 +1,4 @@
-//! What a fit is a fit of: what may not change when its run is gone on with.
+//! The identity of a fit: what may not change when its run is resumed.
 
 use anyhow::Context;
 use lookalike::{

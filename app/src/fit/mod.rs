@@ -48,8 +48,6 @@ pub(crate) struct FitJob {
     pub(crate) also_render: Vec<f64>,
     /// Go on with the run that is in the folder, if there is one.
     pub(crate) resume: bool,
-    /// Whether somebody may want to go on with this run.
-    pub(crate) is_resumable: bool,
     /// Seconds spent on loading or making the inputs.
     pub(crate) input_seconds: f64,
 }

@@ -1,8 +1,14 @@
-//! The folder of results: made, checked and written to with errors that name it.
+//! The folder of results: claimed before any work, and written to so that no file is replaced that the run did not write.
 
+use super::{
+    claim::{Claim, FIT_FILES, OldFiles, changed, is_file, is_there},
+    ledger::{Ledger, hash_of},
+};
 use anyhow::{Context, bail};
-use lookalike::graph::BlobHash;
-use lookalike_coordinator::journal::{self, JOURNAL_FILE, RunLock, status::STATUS_FILE};
+use lookalike_coordinator::{
+    atomic,
+    journal::{self, JOURNAL_FILE, RunLock},
+};
 use std::{
     fs,
     io::ErrorKind,
@@ -10,118 +16,133 @@ use std::{
     sync::Arc,
 };
 
-/// An OUT folder that can be written to.
-#[derive(Debug, Clone)]
-pub(crate) struct OutFolder {
-    path: PathBuf,
-    /// Held while this lives.
-    _lock: Arc<RunLock>,
+/// An OUT folder that is locked for this process, and as it was.
+#[derive(Debug)]
+pub(crate) struct ClaimedFolder {
+    folder: OutFolder,
+    command: &'static str,
+    old: OldFiles,
+    /// What is removed when the run begins.
+    replaced: Vec<PathBuf>,
 }
 
-/// The mark of a finished fit.
-pub(crate) const MARK: &str = "fit.json";
+/// An OUT folder that can be written to, or a folder in it.
+#[derive(Debug, Clone)]
+pub(crate) struct OutFolder {
+    /// What comes before names in the ledger.
+    prefix: String,
+    root: Arc<Root>,
+}
 
-/// What every fit leaves behind.
-pub(crate) const FIT_FILES: [&str; 6] =
-    ["candidates.csv", "match.exr", "match.png", "reference.png", "difference.png", MARK];
+#[derive(Debug)]
+struct Root {
+    path: PathBuf,
+    ledger: Ledger,
+    /// Held while this lives.
+    _lock: RunLock,
+}
 
-/// Everything else that a fit or a demo writes.
-const RESULTS: [&str; 10] = [
-    STATUS_FILE,
-    "candidates.csv",
-    "match.exr",
-    "match.png",
-    "reference.png",
-    "difference.png",
-    "strip.png",
-    "photo.exr",
-    "environment.exr",
-    "environment.png",
-];
-
-impl OutFolder {
-    /// Makes the folder, or takes an existing one that holds no run, or one to be gone on with.
-    pub(crate) fn create(path: &Path, resume: bool) -> anyhow::Result<Self> {
-        let folder = Self::open(path)?;
-        let shown = path.display();
-        match (folder.file(MARK).exists(), folder.file(JOURNAL_FILE).exists(), resume) {
-            (_, true, true) | (false, false, _) => Ok(folder),
-            (true, _, false) => {
-                bail!("{shown} already holds a finished fit ({MARK}): choose another --out, or remove it first")
-            }
-            (true, false, true) => bail!(
-                "{shown} holds a finished fit ({MARK}) without the journal of its run, so there is nothing to resume: choose \
-                 another --out, or remove it first"
-            ),
-            (false, true, false) => bail!(
-                "{shown} already holds a run that is not finished ({JOURNAL_FILE}): go on with it with --resume, choose another \
-                 --out, or remove that folder first"
-            ),
-        }
+impl ClaimedFolder {
+    /// Locks a folder, which is made if it is not there.
+    ///
+    /// # Errors
+    /// If it cannot be written to, another process has it, or the claim is refused.
+    pub(crate) fn take(claim: &Claim<'_>) -> anyhow::Result<Self> {
+        claim.check_lock()?;
+        let path = claim.out;
+        let cannot =
+            || format!("cannot write results to {}: choose a folder you may write to with --out", path.display());
+        fs::create_dir_all(path).with_context(cannot)?;
+        atomic::write_unsynced(&path.join(PROBE), b"").with_context(cannot)?;
+        fs::remove_file(path.join(PROBE)).with_context(cannot)?;
+        let lock = RunLock::take(path)?;
+        let ledger = Ledger::read(path)?;
+        claim.check_against(&ledger)?;
+        let replaced = match claim.old {
+            OldFiles::Refuse | OldFiles::Resume => Vec::new(),
+            OldFiles::Replace | OldFiles::ReplaceDemo => claim.replaced(&ledger),
+        };
+        let root = Arc::new(Root { path: path.to_owned(), ledger, _lock: lock });
+        let folder = OutFolder { prefix: String::new(), root };
+        Ok(Self { folder, command: claim.command, old: claim.old, replaced })
     }
 
-    /// Makes the folder, or takes an existing one and removes the run and the results in it, the mark of a finished fit first.
-    pub(crate) fn overwrite(path: &Path) -> anyhow::Result<Self> {
-        let folder = Self::open(path)?;
-        let cannot = |name: &str| format!("cannot remove the old {}", folder.file(name).display());
-        let remove = |name: &str| match fs::remove_file(folder.file(name)) {
-            Err(error) if error.kind() != ErrorKind::NotFound => Err(error).with_context(|| cannot(name)),
-            _ => Ok(()),
-        };
-        remove(MARK)?;
-        journal::remove(&folder.file(JOURNAL_FILE)).with_context(|| cannot(JOURNAL_FILE))?;
-        RESULTS.into_iter().try_for_each(remove)?;
+    /// The folder, for a run that begins now: of an old one that it replaces, nothing is left.
+    ///
+    /// # Errors
+    /// If an old file cannot be removed, or the folder cannot be written to.
+    pub(crate) fn begin(self) -> anyhow::Result<OutFolder> {
+        let Self { folder, command, old, replaced } = self;
+        if matches!(old, OldFiles::Replace | OldFiles::ReplaceDemo) {
+            let cannot = |path: &Path| format!("cannot remove the old {}", path.display());
+            for path in &replaced {
+                fs::remove_file(path).with_context(|| cannot(path))?;
+            }
+            let journal = folder.file(JOURNAL_FILE);
+            journal::remove(&journal).with_context(|| cannot(&journal))?;
+        }
+        if old != OldFiles::Resume || !folder.root.ledger.is_begun() {
+            folder.root.ledger.begin(command)?;
+        }
         Ok(folder)
     }
+}
 
+impl OutFolder {
     /// The results of a fit that are there, each with the BLAKE3 of its bytes.
     pub(crate) fn results(&self) -> anyhow::Result<Vec<(String, String)>> {
-        let names = RESULTS.into_iter().chain([MARK]).filter(|name| *name != STATUS_FILE);
-        let there = names.filter_map(|name| Some((name.to_owned(), self.hash(name).transpose()?)));
+        self.hashes(FIT_FILES)
+    }
+
+    /// Those of some files that are there, each with the BLAKE3 of its bytes.
+    pub(crate) fn hashes<'a>(&self, names: impl IntoIterator<Item = &'a str>) -> anyhow::Result<Vec<(String, String)>> {
+        let there = names.into_iter().filter_map(|name| Some((name.to_owned(), self.hash(name).transpose()?)));
         there.map(|(name, hash)| Ok((name, hash?))).collect()
     }
 
     /// The BLAKE3 of a file's bytes; `None` if there is no such file.
     pub(crate) fn hash(&self, name: &str) -> anyhow::Result<Option<String>> {
         match fs::read(self.file(name)) {
-            Ok(bytes) => Ok(Some(BlobHash::of(&bytes).to_string())),
+            Ok(bytes) => Ok(Some(hash_of(&bytes))),
             Err(error) if error.kind() == ErrorKind::NotFound => Ok(None),
             Err(error) => Err(error).with_context(|| format!("cannot read {}", self.file(name).display())),
         }
     }
 
-    /// Makes the folder or takes an existing one, and locks it for this process.
-    fn open(path: &Path) -> anyhow::Result<Self> {
-        let cannot =
-            || format!("cannot write results to {}: choose a folder you may write to with --out", path.display());
-        if path.exists() && !path.is_dir() {
-            bail!("{} is a file: --out takes a folder, which is made if it is not there", path.display());
-        }
-        fs::create_dir_all(path).with_context(cannot)?;
-        let probe = path.join(".lookalike-write-test");
-        fs::write(&probe, b"").with_context(cannot)?;
-        fs::remove_file(&probe).with_context(cannot)?;
-        let lock = RunLock::take(path)?;
-        Ok(Self { path: path.to_owned(), _lock: Arc::new(lock) })
-    }
-
-    /// Makes a folder in this one, for the results of one of several fits.
+    /// Makes a folder in this one.
+    ///
+    /// # Errors
+    /// If it cannot be made, or is a symbolic link, which may lead anywhere.
     pub(crate) fn sub(&self, name: &str) -> anyhow::Result<Self> {
         let path = self.file(name);
+        if path.is_symlink() {
+            bail!("{} is a symbolic link, which is not followed: remove it, then --resume", path.display());
+        }
         fs::create_dir_all(&path).with_context(|| format!("cannot make the folder {}", path.display()))?;
-        Ok(Self { path, _lock: Arc::clone(&self._lock) })
+        Ok(Self { prefix: format!("{}{name}/", self.prefix), root: Arc::clone(&self.root) })
     }
 
     /// The path of a file in the folder.
     pub(crate) fn file(&self, name: &str) -> PathBuf {
-        self.path.join(name)
+        self.root.path.join(format!("{}{name}", self.prefix))
     }
 
-    /// Writes a file: beside its place first, then renamed, so that nobody sees half of it.
+    /// Writes a file in one piece.
+    ///
+    /// # Errors
+    /// If it cannot be written, or a file of this name is there that the run did not write.
     pub(crate) fn write(&self, name: &str, bytes: &[u8]) -> anyhow::Result<()> {
-        let (path, partial) = (self.file(name), self.file(&format!("{name}.partial")));
-        fs::write(&partial, bytes)
-            .and_then(|()| fs::rename(&partial, &path))
-            .with_context(|| format!("cannot write {}: is the disk full?", path.display()))
+        let (path, full_name) = (self.file(name), format!("{}{name}", self.prefix));
+        if is_there(&path) {
+            let old = if is_file(&path) { self.hash(name)? } else { None };
+            if !old.is_some_and(|hash| self.root.ledger.has(&full_name, &hash)) {
+                bail!("{}", changed(&full_name, &self.root.path.display().to_string()));
+            }
+        }
+        self.root.ledger.note(&full_name, &hash_of(bytes))?;
+        atomic::write(&path, bytes).with_context(|| format!("cannot write {}: is the disk full?", path.display()))
     }
 }
+
+/// A file that is written and removed to see whether a folder can be written to.
+const PROBE: &str = ".lookalike-write-test";

@@ -1,18 +1,24 @@
 //! What a fit leaves behind in OUT (design section 10): numbers for programs, pictures for people.
 
 mod candidates_csv;
+mod claim;
 mod conventions;
 mod fit_json;
 mod folder;
+mod ledger;
 mod pictures;
 mod strip;
 mod summary;
 
+pub(crate) use claim::{ACCESS_FILE, BATCH_MARK, Claim, FIT_FILES, MARK, OldFiles, changed};
 pub(crate) use conventions::conventions;
 pub(crate) use fit_json::{FitRecord, Timing, parameters_json};
-pub(crate) use folder::{FIT_FILES, MARK, OutFolder};
+pub(crate) use folder::{ClaimedFolder, OutFolder};
 pub(crate) use pictures::{Pictures, write_pictures};
 pub(crate) use strip::{Panel, strip};
 pub(crate) use summary::{aligned, print_result, print_summary};
 
 pub(crate) use candidates_csv::candidates_csv;
+
+#[cfg(test)]
+mod tests;

@@ -25,7 +25,8 @@ fn summary(record: &FitRecord<'_>, timing: &Timing, out: &str) -> String {
     let (model, outcome) = (record.method.model, record.outcome);
     let usable = record.capture.counts().usable;
     let mut text = format!("{} on {} of {usable} usable pixels", model.name(), record.method.samples);
-    let _ = writeln!(text, ", {} gammas, seed {}\n", record.method.gammas.len(), record.method.seed);
+    let gammas = counted(record.method.gammas.len(), "gamma");
+    let _ = writeln!(text, ", {gammas}, seed {}\n", record.method.seed);
     let mut rows = vec![header(model)];
     let first = outcome.judged.iter().find(|j| j.candidate.gamma == 1.0);
     if let Some(j) = first {
@@ -39,26 +40,29 @@ fn summary(record: &FitRecord<'_>, timing: &Timing, out: &str) -> String {
         rows.push(row(model, "polished", "", p.cssim, p.cssim_object, &p.parameters));
     }
     text.push_str(&aligned(&rows));
+    text.push_str("\n  CSSIM is a difference: 0 = identical, larger = worse.\n");
     for note in record.notes {
         let _ = writeln!(text, "\nnote: {note}");
     }
     let seconds: Vec<String> = timing.seconds.iter().map(|(stage, s)| format!("{stage} {s:.1}")).collect();
-    let workers = match timing.workers {
-        1 => "1 worker".to_owned(),
-        n => format!("{n} workers"),
-    };
+    let workers = counted(timing.workers, "worker");
     let _ = writeln!(text, "\nseconds: {} ({workers})", seconds.join(", "));
     let _ = writeln!(text, "results: {out}");
     text
 }
 
+/// `1 gamma`, `2 gammas`.
+pub(crate) fn counted(count: usize, noun: &str) -> String {
+    format!("{count} {noun}{}", if count == 1 { "" } else { "s" })
+}
+
 fn header(model: &dyn Model) -> Vec<String> {
-    let fixed = ["", "gamma", "CSSIM", "on object"].map(str::to_owned);
+    let fixed = ["", "gamma", "CSSIM on object", "on image"].map(str::to_owned);
     fixed.into_iter().chain(model.parameters().iter().map(|p| p.name.to_owned())).collect()
 }
 
 fn row(model: &dyn Model, name: &str, gamma: &str, cssim: f64, object: f64, parameters: &[f64]) -> Vec<String> {
-    let mut row = vec![name.to_owned(), gamma.to_owned(), format!("{cssim:.4}"), format!("{object:.4}")];
+    let mut row = vec![name.to_owned(), gamma.to_owned(), format!("{object:.4}"), format!("{cssim:.4}")];
     let mut first = 0;
     for parameter in model.parameters() {
         let values = &parameters[first..first + parameter.channels.count()];

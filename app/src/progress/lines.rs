@@ -1,7 +1,9 @@
-//! A line when a stage is complete, for logs and pipes.
+//! A line when a stage is complete, and now and then one in between, for logs and pipes.
 
-use super::{Display, Ending, print_line, remark, stage::Tally};
-use crate::progress::stage::Stage;
+use super::{
+    Display, Ending, PAUSE, print_line, remark,
+    stage::{Stage, Tally},
+};
 use lookalike::fit::BestScore;
 use lookalike_coordinator::events::RunEvent;
 use std::{sync::Arc, time::Instant};
@@ -10,23 +12,31 @@ pub(super) struct Lines {
     tally: Tally,
     best: Arc<BestScore>,
     began: Instant,
+    told: Instant,
 }
 
 impl Lines {
     pub(super) fn new(best: Arc<BestScore>) -> Self {
-        Self { tally: Tally::default(), best, began: Instant::now() }
+        Self { tally: Tally::default(), best, began: Instant::now(), told: Instant::now() }
+    }
+
+    fn tell(&mut self, stage: Stage, what: &str) {
+        let best = self.best.get().filter(|_| stage >= Stage::Judging);
+        let best = best.map(|score| format!(", best CSSIM so far {score:.4}")).unwrap_or_default();
+        self.say(&format!("{:6.1} s  {}{what}{best}", self.began.elapsed().as_secs_f64(), stage.title()));
+        self.told = Instant::now();
     }
 }
 
 impl Display for Lines {
     fn event(&mut self, event: &RunEvent) {
-        if let Some((stage, count)) = self.tally.note(event)
-            && count.is_complete()
-            && matches!(event, RunEvent::NodeFinished { .. } | RunEvent::NodeRecalled { .. })
-        {
-            let best = self.best.get().filter(|_| stage >= Stage::Judging);
-            let best = best.map(|score| format!(", best CSSIM so far {score:.4}")).unwrap_or_default();
-            self.say(&format!("{:6.1} s  {} done{best}", self.began.elapsed().as_secs_f64(), stage.title()));
+        if let Some((stage, count)) = self.tally.note(event) {
+            let is_end = matches!(event, RunEvent::NodeFinished { .. } | RunEvent::NodeRecalled { .. });
+            if is_end && count.is_complete() {
+                self.tell(stage, " done");
+            } else if self.told.elapsed() >= PAUSE {
+                self.tell(stage, &format!(": {} %", count.thousandths() / 10));
+            }
         }
         if let Some(text) = remark(event) {
             self.say(&text);

@@ -5,7 +5,7 @@ use super::{
     Display, Ending,
     fits::{FitCount, FitEvent},
     print_line, remark_of_many,
-    stage::{Count, Stage, Tally},
+    stage::{Stage, Tally},
 };
 use indicatif::{MultiProgress, ProgressBar, ProgressStyle};
 use lookalike::{fit::BestScore, graph::NodeId, graph::split_label};
@@ -107,17 +107,12 @@ impl Row {
         let (Some(bar), Some((stage, count))) = (&self.bar, self.tally.latest()) else { return };
         let best = self.best.get().filter(|_| stage >= Stage::Judging);
         bar.set_message(match (best, count.planned) {
-            (Some(best), _) => format!("{}, best {best:.4}", stage.short()),
-            (None, 0..=1) => stage.short().to_owned(),
-            (None, planned) => format!("{}, {} of {planned}", stage.short(), count.done),
+            (Some(best), _) => format!("{}, best {best:.4}", stage.title()),
+            (None, 0..=1) => stage.title().to_owned(),
+            (None, planned) => format!("{}, {} of {planned}", stage.title(), count.done),
         });
-        bar.set_position(thousandths(count));
+        bar.set_position(count.thousandths());
     }
-}
-
-/// How much of a stage is done.
-fn thousandths(count: Count) -> u64 {
-    (count.done * 1000 + count.permille).checked_div(count.planned).unwrap_or(0).min(1000)
 }
 
 impl Display for ManyBars {
@@ -200,11 +195,5 @@ mod tests {
         assert_eq!(shortened("gold-garden-ggx"), "gold-garden-ggx");
         let long = shortened("gold-metallic-paint3-grace_cross-cook-torrance");
         assert_eq!((long.chars().count(), long.as_str()), (NAME_COLUMNS, "gold-metallic-paint3-grace_cr…"));
-    }
-
-    #[test]
-    fn a_stage_that_has_no_nodes_is_at_its_begin() {
-        assert_eq!(thousandths(Count::default()), 0);
-        assert_eq!(thousandths(Count { planned: 4, done: 1, permille: 500 }), 375);
     }
 }

@@ -1,7 +1,7 @@
-//! A line when a fit of a batch has ended, for logs and pipes.
+//! A line when a fit of a batch has ended, and now and then one in between, for logs and pipes.
 
 use super::{
-    Display, Ending,
+    Display, Ending, PAUSE,
     fits::{FitCount, FitEvent},
     print_line, remark_of_many,
 };
@@ -10,11 +10,13 @@ use std::time::Instant;
 
 pub(super) struct ManyLines {
     began: Instant,
+    told: Instant,
+    count: FitCount,
 }
 
 impl ManyLines {
     pub(super) fn new() -> Self {
-        Self { began: Instant::now() }
+        Self { began: Instant::now(), told: Instant::now(), count: FitCount::default() }
     }
 }
 
@@ -23,10 +25,17 @@ impl Display for ManyLines {
         if let Some(text) = remark_of_many(event) {
             self.say(&text);
         }
+        if self.count.running > 0 && self.told.elapsed() >= PAUSE {
+            self.told = Instant::now();
+            let (seconds, running) = (self.began.elapsed().as_secs_f64(), self.count.running);
+            self.say(&format!("{seconds:7.1} s  {}, {running} under way", self.count.text()));
+        }
     }
 
     fn fit(&mut self, event: &FitEvent, count: FitCount) {
+        self.count = count;
         if let Some(line) = event.line() {
+            self.told = Instant::now();
             let width = count.total.to_string().len();
             let ended = count.done + count.failed;
             let seconds = self.began.elapsed().as_secs_f64();

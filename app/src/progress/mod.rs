@@ -16,7 +16,11 @@ use lookalike_coordinator::events::RunEvent;
 use std::{
     io::{self, IsTerminal, Write as _},
     sync::Arc,
+    time::Duration,
 };
+
+/// Between two lines of progress where no bars can be drawn.
+const PAUSE: Duration = Duration::from_secs(10);
 
 /// How a run ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -44,7 +48,7 @@ pub(crate) trait Display: Send {
     fn finish(&mut self, ending: Ending<'_>);
 }
 
-/// A line on stderr. When nobody reads it any more, the run goes on all the same.
+/// Prints a line on stderr. A closed stderr does not stop the run.
 fn print_line(text: &str) {
     let _ = writeln!(io::stderr(), "{text}");
 }
@@ -53,7 +57,7 @@ fn print_line(text: &str) {
 pub(crate) fn display(kind: ProgressKind, best: Arc<BestScore>) -> Box<dyn Display> {
     match kind {
         ProgressKind::Auto if !io::stderr().is_terminal() => Box::new(lines::Lines::new(best)),
-        // Where bars cannot be drawn (a pipe, a dumb terminal) lines must do.
+        // Where bars cannot be drawn (a pipe, a dumb terminal), lines are printed.
         ProgressKind::Bar | ProgressKind::Auto => match bars::Bars::new(Arc::clone(&best)) {
             Some(bars) => Box::new(bars),
             None => Box::new(lines::Lines::new(best)),
@@ -88,7 +92,7 @@ impl Display for Silent {
     fn finish(&mut self, _ending: Ending<'_>) {}
 }
 
-/// Nothing but what has to be told: fits that failed.
+/// Shows only fits that failed.
 struct SilentMany;
 
 impl Display for SilentMany {
@@ -107,17 +111,15 @@ impl Display for SilentMany {
     fn finish(&mut self, _ending: Ending<'_>) {}
 }
 
-/// As [`remark`], for a batch: of a node that fails, its fit tells.
+/// As [`remark`], for a batch, which reports a failed node as a failed fit.
 fn remark_of_many(event: &RunEvent) -> Option<String> {
     if matches!(event, RunEvent::NodeFailed { .. }) { None } else { remark(event) }
 }
 
-/// What people should be told about a run beyond the counts; `None` for everything that goes as planned.
+/// A line for people about what does not go as planned; `None` for all other events.
 fn remark(event: &RunEvent) -> Option<String> {
     match event {
-        RunEvent::Resumed { results, .. } => {
-            Some(format!("going on with the run that is there: {results} results need not be computed again"))
-        }
+        RunEvent::Resumed { results, .. } => Some(format!("resuming the run: {results} results are there already")),
         RunEvent::Listening { address, local_workers: 0 } => Some(format!(
             "listening for workers, which connect to {address}; start one with `lookalike worker --access OUT/access.json`"
         )),
@@ -127,25 +129,25 @@ fn remark(event: &RunEvent) -> Option<String> {
             limit.as_secs()
         )),
         RunEvent::LocalWorkerEnded { process, status, restart_after } => {
-            let next = restart_after.map_or("it is not started again", |_| "another one takes its place");
+            let next = restart_after.map_or("it is not started again", |_| "starting another one");
             Some(format!("warning: local worker {process} ended ({status}); {next}"))
         }
         RunEvent::WorkerDraining { worker } => {
-            Some(format!("{worker} was asked to end: it finishes what it computes and gets nothing more"))
+            Some(format!("{worker} was asked to end: it finishes its nodes and gets no more"))
         }
         RunEvent::NodeSuspected { name, deaths } => Some(format!(
-            "warning: {deaths} workers have died while they computed {}: from now on it runs alone",
+            "warning: {deaths} workers died while they computed {}: it runs alone from now on",
             name.label
         )),
         RunEvent::AnswersDiffer { name, first, second, error } => Some(format!(
-            "warning: {} has an output and an error ({error}), one from {first} and one from {second}: one of these machines is not to \
-             be trusted",
+            "warning: {} has an output and an error ({error}), one from {first} and one from {second}: one of these machines computes \
+             wrongly",
             name.label
         )),
         RunEvent::NodeSpeculated { name, worker } => {
-            Some(format!("{} is slow: {worker} computes it too, and the first answer counts", name.label))
+            Some(format!("{} is slow: {worker} computes it too, and the first result counts", name.label))
         }
-        RunEvent::NodeRequeued { name, .. } => Some(format!("{} runs again on another worker", name.label)),
+        RunEvent::NodeRequeued { name, .. } => Some(format!("retrying {} on another worker", name.label)),
         RunEvent::NodeFailed { reason, .. } if reason.is_cancellation() => None,
         RunEvent::NodeFailed { name, reason } => Some(format!("error: {} failed: {reason}", name.label)),
         _ => None,

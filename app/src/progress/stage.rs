@@ -1,73 +1,66 @@
 //! The stages of a fit as a user sees them, counted from the events of its nodes.
 
-use lookalike::graph::{NodeId, split_label};
+use lookalike::{graph::NodeId, nodes};
 use lookalike_coordinator::events::{NodeName, RunEvent};
 use std::collections::BTreeMap;
 
 /// One line of the display.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Stage {
-    SubsetTables,
+    /// Transport tables of the pixel subsets.
+    Tables,
     Searches,
-    FullTables,
+    /// The full-resolution table, and the scores of the candidates.
     Judging,
+    /// With the tables that it adds.
     Polish,
     Pictures,
 }
 
 impl Stage {
-    pub(super) const ALL: [Self; 6] =
-        [Self::SubsetTables, Self::Searches, Self::FullTables, Self::Judging, Self::Polish, Self::Pictures];
+    pub(super) const ALL: [Self; 5] = [Self::Tables, Self::Searches, Self::Judging, Self::Polish, Self::Pictures];
 
     pub(super) fn title(self) -> &'static str {
         match self {
-            Self::SubsetTables => "first transport",
-            Self::Searches => "stage one: searches",
-            Self::FullTables => "full transport",
-            Self::Judging => "stage two: CSSIM",
-            Self::Polish => "stage three: polish",
-            Self::Pictures => "pictures",
-        }
-    }
-
-    /// A shorter title.
-    pub(super) fn short(self) -> &'static str {
-        match self {
-            Self::SubsetTables => "subset",
+            Self::Tables => "light tables",
             Self::Searches => "searches",
-            Self::FullTables => "full table",
             Self::Judging => "judging",
-            Self::Polish => "polish",
+            Self::Polish => "polishing",
             Self::Pictures => "pictures",
         }
     }
 
-    /// The stage a node belongs to.
-    fn of(name: &NodeName) -> Option<Self> {
-        Some(match name.kind.as_str() {
-            "transport" if split_label(&name.label).1.starts_with("transport in full") => Self::FullTables,
-            "transport" => Self::SubsetTables,
-            "search" => Self::Searches,
-            "select" => Self::Judging,
-            "explore" | "polish" => Self::Polish,
-            "report" => Self::Pictures,
-            _ => return None,
-        })
+    /// The kind of node that ends the stage.
+    fn last_kind(self) -> &'static str {
+        match self {
+            Self::Tables => nodes::TRANSPORT,
+            Self::Searches => nodes::SEARCH,
+            Self::Judging => nodes::SELECT,
+            Self::Polish => nodes::POLISH,
+            Self::Pictures => nodes::REPORT,
+        }
     }
 }
 
-/// Thousandths of nodes planned and done.
+/// Nodes planned and done.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub(super) struct Count {
     pub(super) planned: u64,
     pub(super) done: u64,
     /// Of the node that is under way, in thousandths.
     pub(super) permille: u64,
+    /// Whether a node has ended that ends the stage.
+    has_ended: bool,
 }
 
 impl Count {
     pub(super) fn is_complete(self) -> bool {
-        self.planned > 0 && self.done == self.planned
+        self.has_ended && self.done == self.planned
+    }
+
+    /// How much of the stage is done, in thousandths.
+    pub(super) fn thousandths(self) -> u64 {
+        (self.done * 1000 + self.permille).checked_div(self.planned).unwrap_or(0).min(1000)
     }
 }
 
@@ -83,16 +76,17 @@ impl Tally {
     pub(super) fn note(&mut self, event: &RunEvent) -> Option<(Stage, Count)> {
         let stage = match event {
             RunEvent::NodeAdded { name } => {
-                let stage = Stage::of(name)?;
+                let stage = self.stage_of(name)?;
                 self.stages.insert(name.node, stage);
                 self.counts.entry(stage).or_default().planned += 1;
                 stage
             }
             RunEvent::NodeFinished { name, .. } | RunEvent::NodeRecalled { name, .. } => {
-                let stage = Stage::of(name)?;
+                let stage = *self.stages.get(&name.node)?;
                 let count = self.counts.entry(stage).or_default();
                 count.done += 1;
                 count.permille = 0;
+                count.has_ended |= name.kind == stage.last_kind();
                 stage
             }
             RunEvent::NodeProgress { node, permille } => {
@@ -110,27 +104,55 @@ impl Tally {
         let open = self.counts.iter().find(|(_, count)| !count.is_complete());
         open.or_else(|| self.counts.last_key_value()).map(|(stage, count)| (*stage, *count))
     }
+
+    /// The stage of a node that is added now.
+    fn stage_of(&self, name: &NodeName) -> Option<Stage> {
+        let is_judged = self.counts.get(&Stage::Judging).is_some_and(|count| count.has_ended);
+        Some(match name.kind.as_str() {
+            // What is integrated after the candidates were judged is for polish.
+            nodes::TRANSPORT | nodes::TRANSPORT_FULL if is_judged => Stage::Polish,
+            nodes::TRANSPORT => Stage::Tables,
+            nodes::SEARCH => Stage::Searches,
+            nodes::TRANSPORT_FULL | nodes::SELECT => Stage::Judging,
+            nodes::EXPLORE | nodes::POLISH => Stage::Polish,
+            nodes::REPORT => Stage::Pictures,
+            _ => return None,
+        })
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use lookalike_coordinator::events::Site;
+    use std::time::Duration;
+
+    fn name(node: u64, kind: &str) -> NodeName {
+        NodeName { node: NodeId(node), kind: kind.to_owned(), label: String::new() }
+    }
+
+    fn added(tally: &mut Tally, node: u64, kind: &str) -> (Stage, Count) {
+        tally.note(&RunEvent::NodeAdded { name: name(node, kind) }).unwrap()
+    }
+
+    fn finished(tally: &mut Tally, node: u64, kind: &str) -> (Stage, Count) {
+        let (name, site, elapsed) = (name(node, kind), Site::Coordinator, Duration::ZERO);
+        tally.note(&RunEvent::NodeFinished { name, site, bytes: 0, elapsed }).unwrap()
+    }
 
     #[test]
-    fn nodes_are_counted_in_their_stage() {
-        let name = |node: u64, kind: &str, label: &str| NodeName {
-            node: NodeId(node),
-            kind: kind.to_owned(),
-            label: label.to_owned(),
-        };
+    fn nodes_are_counted_in_their_stage_which_ends_once() {
         let mut tally = Tally::default();
-        let added = |tally: &mut Tally, n, kind, label| {
-            tally.note(&RunEvent::NodeAdded { name: name(n, kind, label) }).unwrap()
-        };
-        assert_eq!(added(&mut tally, 0, "transport", "transport of the subset, pixels 0 to 31").0, Stage::SubsetTables);
-        assert_eq!(added(&mut tally, 1, "transport", "transport in full, pixels 0 to 31").0, Stage::FullTables);
-        assert_eq!(added(&mut tally, 2, "polish", "polish").1, Count { planned: 1, done: 0, permille: 0 });
-        let half = tally.note(&RunEvent::NodeProgress { node: NodeId(2), permille: 500 }).unwrap();
-        assert_eq!(half, (Stage::Polish, Count { planned: 1, done: 0, permille: 500 }));
+        assert_eq!(added(&mut tally, 0, nodes::TRANSPORT).0, Stage::Tables);
+        assert!(finished(&mut tally, 0, nodes::TRANSPORT).1.is_complete());
+        assert_eq!(added(&mut tally, 1, nodes::TRANSPORT_FULL).0, Stage::Judging);
+        assert!(!finished(&mut tally, 1, nodes::TRANSPORT_FULL).1.is_complete(), "nothing was judged yet");
+        added(&mut tally, 2, nodes::SELECT);
+        assert!(finished(&mut tally, 2, nodes::SELECT).1.is_complete());
+        assert_eq!(added(&mut tally, 3, nodes::TRANSPORT_FULL).0, Stage::Polish);
+        added(&mut tally, 4, nodes::POLISH);
+        let half = tally.note(&RunEvent::NodeProgress { node: NodeId(4), permille: 500 }).unwrap();
+        assert_eq!((half.0, half.1.thousandths()), (Stage::Polish, 250));
+        assert_eq!(Count::default().thousandths(), 0);
     }
 }

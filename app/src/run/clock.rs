@@ -1,5 +1,6 @@
 //! Seconds per stage and per process, for people: nothing of it reaches a result.
 
+use lookalike::nodes;
 use lookalike_coordinator::events::RunEvent;
 use nix::sys::{
     resource::{Usage, UsageWho, getrusage},
@@ -15,7 +16,7 @@ pub(crate) struct Clock {
 }
 
 const NAMES: [&str; 4] = ["stage one", "stage two", "polish", "pictures"];
-const LAST_KINDS: [&str; 4] = ["search", "select", "polish", "report"];
+const LAST_KINDS: [&str; 4] = [nodes::SEARCH, nodes::SELECT, nodes::POLISH, nodes::REPORT];
 
 impl Clock {
     pub(crate) fn start() -> Self {

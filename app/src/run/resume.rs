@@ -1,6 +1,6 @@
 //! A run that is finished already, and is asked for again.
 
-use crate::outputs::OutFolder;
+use crate::outputs::{OutFolder, changed};
 use anyhow::bail;
 use lookalike_coordinator::journal::{self, JOURNAL_FILE, RunIdentity};
 
@@ -40,10 +40,7 @@ pub(crate) fn missing(out: &OutFolder, out_name: &str, files: &[(String, String)
         match out.hash(name)? {
             None => missing.push(name.clone()),
             Some(found) if found == *hash => {}
-            Some(_) => bail!(
-                "{name} is not what the run in {out_name} wrote; keep a changed file elsewhere and remove it here, then --resume makes \
-                 it again"
-            ),
+            Some(_) => bail!("{}", changed(name, out_name)),
         }
     }
     Ok(missing)

@@ -1,6 +1,10 @@
 //! A run from its settings to its end: what a fit and a batch have in common.
 
-use crate::{exit::Exit, outputs::OutFolder, settings::ClusterSettings};
+use crate::{
+    exit::Exit,
+    outputs::{ACCESS_FILE, OutFolder},
+    settings::ClusterSettings,
+};
 use anyhow::Context;
 use lookalike::{graph::Planner, nodes};
 use lookalike_coordinator::{
@@ -13,7 +17,7 @@ use std::sync::Arc;
 
 /// How a run with these settings treats its workers; its access file goes to `out`. The seed decides which outputs are verified.
 pub(crate) fn runner_options(cluster: &ClusterSettings, out: &OutFolder, seed: u64) -> RunnerOptions {
-    let mut options = RunnerOptions::new(cluster.workers.count(), out.file("access.json"));
+    let mut options = RunnerOptions::new(cluster.workers.count(), out.file(ACCESS_FILE));
     options.listen = cluster.listen_for_others();
     options.access = cluster.access.clone();
     options.advertise = cluster.advertise.as_ref().map(ToString::to_string);

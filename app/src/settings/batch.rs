@@ -15,6 +15,8 @@ pub struct BatchSettings {
     pub out: PathBuf,
     /// Resume the run in the folder, if there is one.
     pub resume: bool,
+    /// Replace files with our names in the folder, never an input of the run.
+    pub force: bool,
     /// Where candidates are judged and polished.
     pub stage_two: StageTwo,
     /// What happens when a fit fails.

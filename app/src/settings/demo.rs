@@ -6,8 +6,10 @@ use std::path::PathBuf;
 /// A fit of the bundled scene.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DemoSettings {
-    /// The folder of results, overwritten.
+    /// The folder of results.
     pub out: PathBuf,
+    /// Replace files with our names in the folder, also those of no demo.
+    pub force: bool,
     /// Local worker processes; never 0.
     pub workers: Workers,
     /// The log filter of the local workers.

@@ -19,6 +19,8 @@ pub struct FitSettings {
     pub out: PathBuf,
     /// Resume the run in the folder, if there is one.
     pub resume: bool,
+    /// Replace files with our names in the folder, never an input of the run.
+    pub force: bool,
     /// Where workers come from.
     pub cluster: ClusterSettings,
     /// How progress is shown.

@@ -4,7 +4,7 @@ use lookalike::{
     light::Mapping,
     scene::{Camera, Circle},
 };
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// A photo with everything that is known of its scene.
 #[derive(Debug, Clone, PartialEq)]
@@ -19,6 +19,14 @@ pub struct CaptureSettings {
     pub view: ViewSettings,
     /// Where the sphere lies; none means fitted to the mask, else the inscribed circle.
     pub sphere: Option<Circle>,
+}
+
+impl CaptureSettings {
+    /// The files that it is read from.
+    pub(crate) fn files(&self) -> Vec<&Path> {
+        let others = [&self.mask, &self.view.normals].into_iter().filter_map(|path| path.as_deref());
+        [self.photo.as_path(), &self.environment.path].into_iter().chain(others).collect()
+    }
 }
 
 /// The environment map.

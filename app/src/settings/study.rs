@@ -12,6 +12,8 @@ pub struct StudySettings {
     pub out: PathBuf,
     /// Resume the run in the folder, if there is one.
     pub resume: bool,
+    /// Replace files with our names in the folder, never an input of the run.
+    pub force: bool,
     /// Where metrics are served.
     pub metrics: Option<MetricsAddress>,
     /// Where workers come from.

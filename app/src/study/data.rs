@@ -2,10 +2,10 @@
 
 use super::{
     cells::{Cell, FitTask, Task, What},
+    inputs::{Inputs, geometry},
     pictures::base,
     record::{self, Content, Match, Record},
     seconds::Seconds,
-    supply::Inputs,
     variants,
 };
 use anyhow::Context;
@@ -126,7 +126,7 @@ impl Collector<'_> {
     fn exposure(&self, cell: &Cell) -> anyhow::Result<Option<f64>> {
         let name = format!("{}-photo", base(self.inputs, cell.scene));
         let Some(photo) = record::read_image(&self.inputs.out, &name)? else { return Ok(None) };
-        let geometry = super::supply::geometry(cell.scene.size)?;
+        let geometry = geometry(cell.scene.size)?;
         let (width, height) = (photo.width(), photo.height());
         let coverage: Vec<f32> = (0..width * height).map(|i| geometry.coverage(i % width, i / width)).collect();
         Ok(Some(auto_exposure(&photo, &coverage)?))

@@ -5,7 +5,7 @@ use anyhow::Context;
 use serde::{Deserialize, Serialize};
 use std::fs;
 
-const FILE: &str = "effort.json";
+pub(super) const FILE: &str = "effort.json";
 
 /// Time and workers.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]

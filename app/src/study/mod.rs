@@ -15,6 +15,7 @@ mod cells;
 mod data;
 mod effort;
 mod file;
+mod inputs;
 mod pictures;
 mod planner;
 mod progress;
@@ -27,14 +28,15 @@ use crate::{
     exit::Exit,
     fit::version,
     inputs::{load_environment, show_warnings},
-    outputs::{OutFolder, print_result},
+    outputs::{Claim, ClaimedFolder, OldFiles, OutFolder, print_result},
     progress::Ending,
     run::{journal_failed, run_to_end, runner_options},
     settings::{EnvironmentSettings, StudySettings},
 };
-use anyhow::{Context, bail};
+use anyhow::Context;
 use effort::Effort;
 use file::Study;
+use inputs::{Inputs, Light};
 use lookalike::{
     brdf::merl::MerlTable,
     graph::{Blob, Many},
@@ -50,21 +52,23 @@ use progress::Progress;
 use seconds::Seconds;
 use std::{
     fs,
+    path::Path,
     process::ExitCode,
     sync::{Arc, Mutex, PoisonError},
     time::Instant,
 };
-use supply::{Inputs, Light, Supply, Tally};
+use supply::{Supply, Tally};
 
 /// Runs a study and writes its report.
 pub(crate) fn run(settings: StudySettings) -> anyhow::Result<ExitCode> {
     let began = Instant::now();
     let study = Study::read(&settings.study)?;
     let cells = cells::plan(&study)?;
-    let out = OutFolder::create(&settings.out, settings.resume)?;
-    refuse_strangers(&out)?;
+    let folder = ClaimedFolder::take(&claim(&settings, &study))?;
     let metrics = settings.metrics.map(|address| address.listen()).transpose()?;
-    let inputs = Arc::new(load(study, cells, out, settings.cluster.workers.count())?);
+    let (materials, lights) = (read_materials(&study)?, read_lights(&study)?);
+    let (out, workers) = (folder.begin()?, settings.cluster.workers.count());
+    let inputs = Arc::new(Inputs { study, cells, materials, lights, out, workers });
     let tally = Arc::new(Mutex::new(Tally::default()));
     let mut seconds = Seconds::open(&inputs.out)?;
     let supply = Supply::new(Arc::clone(&inputs), Arc::clone(&tally))?;
@@ -93,14 +97,8 @@ pub(crate) fn run(settings: StudySettings) -> anyhow::Result<ExitCode> {
 
 /// Tells what is wrong with a study, without running it.
 pub(crate) fn check(settings: &StudySettings) -> anyhow::Result<()> {
-    let journal = settings.out.join(JOURNAL_FILE);
-    if !settings.resume && journal.exists() {
-        bail!(
-            "{} says that a run was begun there already: go on with it with --resume, choose another --out, or remove that folder first",
-            journal.display()
-        );
-    }
     let study = Study::read(&settings.study)?;
+    claim(settings, &study).check()?;
     cells::plan(&study)?;
     read_materials(&study)?;
     read_lights(&study).map(|_| ())
@@ -141,15 +139,20 @@ fn run_cells(
     Ok(workers)
 }
 
-/// Refuses cells that no journal here knows of: another study may have left them.
-fn refuse_strangers(out: &OutFolder) -> anyhow::Result<()> {
-    if out.file("cells").exists() && !out.file(JOURNAL_FILE).exists() {
-        bail!(
-            "{} holds cells of a study but no journal ({JOURNAL_FILE}) that says of which: choose another --out, or remove it first",
-            out.file("cells").display()
-        );
+/// What the study asks of its folder.
+fn claim<'a>(settings: &'a StudySettings, study: &'a Study) -> Claim<'a> {
+    let mut inputs: Vec<&Path> = study.materials.iter().chain(&study.lights).map(|(_, path)| path.as_path()).collect();
+    inputs.push(&settings.study);
+    inputs.extend(settings.cluster.access.as_deref());
+    Claim {
+        command: "study",
+        files: vec![effort::FILE, "results.json", "data.json", "results.md", "report.html"],
+        growing: vec![seconds::FILE],
+        folders: vec!["cells", "pictures", "figures"],
+        inputs,
+        access: settings.cluster.access.as_deref(),
+        ..Claim::of_fit(&settings.out, OldFiles::of(settings.resume, settings.force))
     }
-    Ok(())
 }
 
 /// Tells the journal that all has ended.
@@ -160,19 +163,11 @@ fn end(out: &OutFolder, failed: usize) -> anyhow::Result<()> {
         return journal::settle(&path, &PartLedger::default(), Some(&ended)).map_err(journal_failed);
     }
     let names = ["results.md", "results.json", "report.html"];
-    let outputs = names.into_iter().filter_map(|name| Some((name.to_owned(), out.hash(name).transpose()?)));
-    let outputs = outputs.map(|(name, hash)| Ok((name, hash?))).collect::<anyhow::Result<_>>()?;
-    journal::finish(&path, &Finished { outputs }).map_err(journal_failed)
+    journal::finish(&path, &Finished { outputs: out.hashes(names)? }).map_err(journal_failed)
 }
 
 fn lock(tally: &Mutex<Tally>) -> std::sync::MutexGuard<'_, Tally> {
     tally.lock().unwrap_or_else(PoisonError::into_inner)
-}
-
-/// Reads materials and lights, which is also their check.
-fn load(study: Study, cells: Vec<cells::Cell>, out: OutFolder, workers: usize) -> anyhow::Result<Inputs> {
-    let (materials, lights) = (read_materials(&study)?, read_lights(&study)?);
-    Ok(Inputs { study, cells, materials, lights, out, workers })
 }
 
 fn read_materials(study: &Study) -> anyhow::Result<Vec<Blob>> {
@@ -235,7 +230,10 @@ fn write_report(settings: &StudySettings, inputs: &Inputs, nodes: &Seconds, effo
     };
     let data =
         StudyData { about, photos: data.photos, rows: data.rows, direct: data.direct, agreements: data.agreements };
-    lookalike_report::write(&data, &settings.out)
+    lookalike_report::write(&data, &settings.out, |name, bytes| match name.split_once('/') {
+        Some((folder, name)) => inputs.out.sub(folder)?.write(name, bytes),
+        None => inputs.out.write(name, bytes),
+    })
 }
 
 /// The processor and how many cores of it this process may use.

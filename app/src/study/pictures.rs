@@ -2,9 +2,9 @@
 
 use super::{
     cells::{Cell, Scene, Task},
+    inputs::{Inputs, geometry},
     planner::Outcome,
     record::{write_image, write_picture},
-    supply::Inputs,
 };
 use lookalike::image::Image;
 use lookalike_report::measured::Method as MethodName;
@@ -77,7 +77,7 @@ fn held_out_base(inputs: &Inputs, fitted: Scene, shown: Scene) -> String {
 
 /// The exposure of a photo that is not a capture yet.
 fn own_exposure(photo: &Image, size: u32) -> anyhow::Result<f64> {
-    let geometry = super::supply::geometry(size)?;
+    let geometry = geometry(size)?;
     let (width, height) = (photo.width(), photo.height());
     let coverage: Vec<f32> = (0..width * height).map(|i| geometry.coverage(i % width, i / width)).collect();
     Ok(lookalike::metric::auto_exposure(photo, &coverage)?)

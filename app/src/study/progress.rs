@@ -29,7 +29,7 @@ enum Kind {
 }
 
 /// Between two lines.
-const PAUSE: Duration = Duration::from_secs(30);
+const PAUSE: Duration = Duration::from_secs(10);
 
 impl Progress {
     pub(super) fn new(kind: ProgressKind, cells: usize) -> Self {

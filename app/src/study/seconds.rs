@@ -1,5 +1,5 @@
 //! What nodes cost: seconds from their start to the arrival of their output, by label. Workers of one thread each, one per core, make
-//! them seconds of one core. Kept in a file, so that a run that is gone on with knows what was computed before.
+//! them seconds of one core. Kept in a file, so that a resumed run knows what was computed before.
 
 use crate::outputs::OutFolder;
 use anyhow::Context;
@@ -10,7 +10,7 @@ use std::{
     io::Write,
 };
 
-const FILE: &str = "seconds.tsv";
+pub(super) const FILE: &str = "seconds.tsv";
 
 /// What begins the lines of another process.
 const EPOCH: &str = "#";

@@ -3,46 +3,26 @@
 
 use super::{
     cells::{Cell, CellId, Scene, Task, What},
-    file::Study,
+    inputs::{Inputs, geometry},
     planner::{CellPlanner, Outcome},
     record::{self, Content, Match, Record},
 };
-use crate::outputs::OutFolder;
 use anyhow::{Context, anyhow};
 use lookalike::{
     brdf,
     fit::{Compress, Method},
-    graph::{Blob, Next, Part, PartFailure, Parts, Placement, PlanError},
+    graph::{Next, Part, PartFailure, Parts, Placement, PlanError},
     image::Image,
-    light::Environment,
     math::sampling::{key, uniform},
     metric::auto_exposure,
     plan::{FitPlanner, PhotoPlanner, Subject, SurveyPlanner, SurveyRequest},
-    scene::{Camera, Capture, CaptureInput, Circle, Geometry, SceneError},
+    scene::{Capture, CaptureInput},
 };
 use lookalike_report::measured::APART;
 use std::{
     collections::BTreeMap,
     sync::{Arc, Mutex, PoisonError},
 };
-
-/// A light with its encoding for nodes.
-#[derive(Debug)]
-pub(super) struct Light {
-    pub(super) environment: Arc<Environment>,
-    pub(super) encoded: Blob,
-}
-
-/// What all cells are made from.
-#[derive(Debug)]
-pub(super) struct Inputs {
-    pub(super) study: Study,
-    pub(super) cells: Vec<Cell>,
-    pub(super) materials: Vec<Blob>,
-    pub(super) lights: Vec<Light>,
-    pub(super) out: OutFolder,
-    pub(super) workers: usize,
-}
 
 /// How many cells there are, are complete, and have failed: for the display.
 #[derive(Debug, Default)]
@@ -334,12 +314,6 @@ impl Parts for Supply {
     fn newly_safe(&mut self) -> Vec<u32> {
         std::mem::take(&mut self.safe)
     }
-}
-
-/// The sphere that fills a photo.
-pub(super) fn geometry(size: u32) -> Result<Geometry, SceneError> {
-    let size = size as usize;
-    Geometry::sphere(size, size, Circle::inscribed(size, size), Camera::Orthographic)
 }
 
 /// Matches around one: each parameter moved by up to a fifth of its range, less and less.

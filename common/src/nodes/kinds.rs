@@ -1,11 +1,22 @@
 //! The kind of each node type: its name on the wire, in the journal and in logs.
 
-pub(crate) const TRANSPORT: &str = "transport";
-pub(crate) const SEARCH: &str = "search";
-pub(crate) const SELECT: &str = "select";
-pub(crate) const EXPLORE: &str = "explore";
-pub(crate) const POLISH: &str = "polish";
-pub(crate) const REPORT: &str = "report";
-pub(crate) const RENDER: &str = "render";
-pub(crate) const BRUTE_FORCE: &str = "brute-force";
-pub(crate) const APPRAISE: &str = "appraise";
+/// Integrates the transport table of pixels of a subset or of the coarse picture.
+pub const TRANSPORT: &str = "transport";
+/// As [`TRANSPORT`], of the full-resolution table.
+pub const TRANSPORT_FULL: &str = "transport-full";
+/// Searches the parameters at one gamma.
+pub const SEARCH: &str = "search";
+/// Judges the candidates.
+pub const SELECT: &str = "select";
+/// Searches the coarse picture before polish.
+pub const EXPLORE: &str = "explore";
+/// Lowers the score of the winner.
+pub const POLISH: &str = "polish";
+/// Renders what a fit ends with.
+pub const REPORT: &str = "report";
+/// Renders a photo.
+pub const RENDER: &str = "render";
+/// Minimises the score from one start.
+pub const BRUTE_FORCE: &str = "brute-force";
+/// Scores given parameters.
+pub const APPRAISE: &str = "appraise";

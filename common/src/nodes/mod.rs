@@ -21,7 +21,7 @@ use crate::graph::Registry;
 
 pub(crate) use appraise::{AppraiseParameters, AppraisedWire};
 pub(crate) use brute_force::BruteForceParameters;
-pub(crate) use kinds::{APPRAISE, BRUTE_FORCE, EXPLORE, POLISH, RENDER, REPORT, SEARCH, SELECT, TRANSPORT};
+pub use kinds::{APPRAISE, BRUTE_FORCE, EXPLORE, POLISH, RENDER, REPORT, SEARCH, SELECT, TRANSPORT, TRANSPORT_FULL};
 pub(crate) use polish::PolishParameters;
 pub(crate) use render::{RenderParameters, RenderedWire};
 pub(crate) use report::{ReportParameters, ReportWire};
@@ -34,7 +34,8 @@ pub(crate) use view::{ViewWire, joined};
 #[must_use]
 pub fn registry() -> Registry {
     Registry::default()
-        .with(transport::Transport)
+        .with(transport::Transport { kind: TRANSPORT })
+        .with(transport::Transport { kind: TRANSPORT_FULL })
         .with(search::Search)
         .with(select::Select)
         .with(explore::Explore)

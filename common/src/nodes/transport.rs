@@ -1,4 +1,4 @@
-//! `transport`: integrates the transport table of a range of pixels.
+//! `transport` and `transport-full`: integrates the transport table of a range of pixels.
 //!
 //! Inputs: the environment; the list of pixels (an encoded `Vec<Pixel>`); the normal map if the surface has one.
 
@@ -25,12 +25,15 @@ pub(crate) struct TransportParameters {
     pub(crate) range: (u32, u32),
 }
 
+/// The node type, under one of its two kinds.
 #[derive(Debug)]
-pub(super) struct Transport;
+pub(super) struct Transport {
+    pub(super) kind: &'static str,
+}
 
 impl NodeType for Transport {
     fn kind(&self) -> &'static str {
-        super::TRANSPORT
+        self.kind
     }
 
     fn run(&self, parameters: &[u8], inputs: &[Blob], context: &RunContext) -> Result<Vec<u8>, NodeFailure> {

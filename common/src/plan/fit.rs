@@ -171,7 +171,13 @@ impl FitPlanner {
             let (count, shard) =
                 (subset.pixels.len(), if subset.pixels.len() > 4096 { FULL_SHARD } else { SUBSET_SHARD });
             let knots = stage_one_knots(&self.scene.method);
-            inputs.extend(self.scene.add_transport(graph, &what, (list, count, shard), knots, Accuracy::SUBSET)?);
+            inputs.extend(self.scene.add_transport(
+                graph,
+                (nodes::TRANSPORT, &what),
+                (list, count, shard),
+                knots,
+                Accuracy::SUBSET,
+            )?);
             inputs.extend(of_scene.iter().copied());
             for (g, &gamma) in self.scene.method.gammas.iter().enumerate() {
                 let parameters = SearchParameters {

@@ -103,7 +103,7 @@ impl SceneTables {
     pub(super) fn add_transport(
         &mut self,
         graph: &mut GraphEdit<'_>,
-        what: &str,
+        (kind, what): (&str, &str),
         pixels: (BlobHash, usize, usize),
         knots: Knots,
         accuracy: Accuracy,
@@ -124,7 +124,7 @@ impl SceneTables {
                 range,
             };
             let spec = NodeSpec {
-                kind: nodes::TRANSPORT.to_owned(),
+                kind: kind.to_owned(),
                 label: format!("transport {what}, pixels {first} to {}", first + range.1 as usize - 1),
                 parameters: encode("parameters", &parameters)?,
                 inputs: inputs.clone(),
@@ -150,7 +150,7 @@ impl SceneTables {
         };
         let pixels = (list, self.pixels.len(), FULL_SHARD);
         let what = if self.tables.is_empty() { "in full" } else { "in full again" };
-        let shards = self.add_transport(graph, what, pixels, knots, Accuracy::FULL)?;
+        let shards = self.add_transport(graph, (nodes::TRANSPORT_FULL, what), pixels, knots, Accuracy::FULL)?;
         self.tables.push((span, shards.clone()));
         Ok(shards)
     }

@@ -21,6 +21,8 @@ use lookalike_worker::tls::TlsError;
 use thiserror::Error;
 use tracing::warn;
 
+use crate::atomic;
+
 pub use self::identity::Identity;
 
 /// What a coordinator needs to let workers in: what both files hold.
@@ -163,7 +165,7 @@ impl Credentials {
     /// # Errors
     /// When the system does not let us.
     pub fn write(&self, path: &Path) -> Result<(), CredentialsError> {
-        self.write_with(path, private_file::replace)
+        self.write_with(path, atomic::write_private)
     }
 
     /// Write both files, mode 0600, where none were.

@@ -2,15 +2,7 @@
 
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, Write};
-use std::path::{Path, PathBuf};
-
-/// Write a file with mode 0600 in the place of what was there. It appears complete or not at all, and whoever had an older file
-/// of this name open sees nothing of the new one.
-pub(super) fn replace(path: &Path, content: &[u8]) -> io::Result<()> {
-    let draft = draft_path(path)?;
-    create(&draft, content)?;
-    fs::rename(&draft, path).inspect_err(|_| remove(&draft))
-}
+use std::path::Path;
 
 /// Write a file with mode 0600 where none was.
 pub(super) fn create(path: &Path, content: &[u8]) -> io::Result<()> {
@@ -41,19 +33,10 @@ fn remove(path: &Path) {
     let _ = fs::remove_file(path);
 }
 
-/// A name beside `path` that no other process uses.
-fn draft_path(path: &Path) -> io::Result<PathBuf> {
-    let mut salt = [0; 8];
-    getrandom::fill(&mut salt).map_err(io::Error::other)?;
-    let name = path.file_name().ok_or_else(|| io::Error::new(io::ErrorKind::InvalidInput, "expected a file name"))?;
-    let mut draft = name.to_owned();
-    draft.push(format!(".{:016x}", u64::from_le_bytes(salt)));
-    Ok(path.with_file_name(draft))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::atomic;
 
     #[test]
     fn file_is_private_even_where_a_public_one_was() {
@@ -62,11 +45,11 @@ mod tests {
         fs::write(&path, "public").unwrap();
         #[cfg(unix)]
         assert!(is_readable_by_others(&File::open(&path).unwrap()));
-        replace(&path, b"private").unwrap();
+        atomic::write_private(&path, b"private").unwrap();
         assert_eq!(fs::read(&path).unwrap(), b"private");
         assert!(!is_readable_by_others(&File::open(&path).unwrap()));
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
-        assert!(replace(Path::new("/"), b"").is_err());
+        assert!(atomic::write_private(Path::new("/"), b"").is_err());
     }
 
     #[test]

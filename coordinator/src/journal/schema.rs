@@ -9,6 +9,7 @@ use rusqlite::{Connection, OpenFlags};
 
 use super::error::JournalError;
 use super::place;
+use crate::atomic;
 
 /// The format of the tables: `PRAGMA user_version`. A change of any kind is a new number.
 pub(super) const FORMAT: i64 = 3;
@@ -154,10 +155,7 @@ pub(super) fn create(
         let _ = remove(&unfinished);
     }
     made?;
-    std::fs::rename(&unfinished, path).map_err(creating)?;
-    // A file system that cannot synchronise a folder has its own way to keep names.
-    let _ =
-        path.parent().map(std::fs::File::open).transpose().and_then(|folder| folder.map_or(Ok(()), |it| it.sync_all()));
+    atomic::rename(&unfinished, path).map_err(creating)?;
     connect(path, is_shared(path))
 }
 

@@ -16,6 +16,7 @@ use super::options::JOURNAL_FILE;
 use super::parts::{self, PartStatus};
 use super::schema::node_id;
 use super::{place, schema};
+use crate::atomic;
 
 /// The status of a run beside its journal, for where the journal cannot be read by others.
 pub const STATUS_FILE: &str = "status.json";
@@ -249,9 +250,7 @@ fn read_journal(path: &Path) -> Result<Status, JournalError> {
 pub(super) fn write(connection: &Connection, journal: &Path) -> anyhow::Result<()> {
     let mut text = serde_json::to_string_pretty(&read(connection)?)?;
     text.push('\n');
-    let (path, draft) = (journal.with_file_name(STATUS_FILE), journal.with_file_name("status.json.partial"));
-    fs::write(&draft, text)?;
-    Ok(fs::rename(&draft, &path)?)
+    Ok(atomic::write_unsynced(&journal.with_file_name(STATUS_FILE), text.as_bytes())?)
 }
 
 /// The status that a journal tells.

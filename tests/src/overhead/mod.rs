@@ -50,13 +50,15 @@ pub fn main() -> ExitCode {
         ["throughput", nodes] => number(nodes).and_then(run::throughput).and_then(|found| print(&found)),
         // What `coordinator-killed` kills.
         ["coordinate", folder, nodes] => number(nodes).and_then(|nodes| recovery::coordinate(folder.as_ref(), nodes)),
-        [fault, ref nodes @ ..] if FAULTS.contains(&fault) => {
-            nodes.first().map_or(Ok(recovery::NODES), |nodes| number(nodes)).and_then(|nodes| match fault {
+        [fault, ref nodes @ ..] if FAULTS.contains(&fault) => nodes
+            .first()
+            .map_or(Ok(recovery::NODES), |nodes| number(nodes))
+            .and_then(|nodes| match fault {
                 "worker-killed" => recovery::worker_is_sent("KILL", nodes),
                 "worker-stopped" => recovery::worker_is_sent("STOP", nodes),
                 _ => recovery::coordinator_is_killed(nodes),
-            }).and_then(|found| print(&found))
-        }
+            })
+            .and_then(|found| print(&found)),
         _ => Err("expected no argument, or a measurement: round-trip, throughput, worker-killed, worker-stopped, \
                   coordinator-killed"
             .into()),

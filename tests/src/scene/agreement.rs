@@ -133,12 +133,7 @@ impl References {
     /// # Panics
     /// When there are none of such a lobe.
     #[must_use]
-    pub fn from_json(
-        model: &'static dyn Model,
-        pixels: &[Pixel],
-        stored: &Value,
-        keep: impl Fn(&str) -> bool,
-    ) -> Self {
+    pub fn from_json(model: &'static dyn Model, pixels: &[Pixel], stored: &Value, keep: impl Fn(&str) -> bool) -> Self {
         let mut entries = Vec::new();
         for (lobe, basis) in model.lobes().iter().enumerate().filter(|(_, basis)| keep(basis.lobe.name())) {
             let name = basis.lobe.name();

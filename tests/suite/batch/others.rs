@@ -90,6 +90,11 @@ fn batch_that_is_gone_on_with_takes_only_what_its_journal_says_it_wrote() {
     batch(&folder, "out", "--resume")
         .refused(&[&format!("{written}/match.exr is not what the run in out wrote; keep a changed file elsewhere")]);
     fs::write(at(written).join("match.exr"), kept).unwrap();
+    // A fit that the run did not write stays, also without a journal of its own.
+    let foreign = fs::read(at(open).join("fit.json")).unwrap();
+    batch(&folder, "out", "--resume").refused(&[&format!("out/{open} holds a fit that is not of this run")]);
+    assert!(fs::read(at(open).join("fit.json")).unwrap() == foreign);
+    fs::remove_dir_all(at(open)).unwrap();
     batch(&folder, "out", "--resume --workers 1").done();
     batch(&folder, "whole", "--workers 1").done();
     assert_eq!(states(&summary(&folder.path().join("out"))), ["done"; 2]);

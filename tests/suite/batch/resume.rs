@@ -1,4 +1,4 @@
-//! A batch that is gone on with: what is complete stays, what was acknowledged is not computed again, and the results are those of a
+//! A batch that is resumed: what is complete stays, what was acknowledged is not computed again, and the results are those of a
 //! run that nobody disturbed.
 
 use super::{QUICK, batch, folder, scene, states, summary};
@@ -106,7 +106,7 @@ fn changed_settings_inputs_and_fits_are_refused_by_name() {
     kill_at(&folder, |event| event["event"] == "node-finished");
     let refused = |flags: &str, phrase: &str| batch(&folder, "out", flags).refused(&[phrase]);
     refused("--resume --seed 1", "photo-map-ggx: --seed is 0 there and 1 here");
-    refused("", "out/summary.json says that a batch was run there already: go on with it with --resume");
+    refused("", "out/summary.json says that a batch was run there already: resume it with --resume");
     let manifest = fs::read_to_string(folder.path().join("batch.toml")).unwrap();
     fs::write(folder.path().join("batch.toml"), manifest.replace("'red.exr'", "'tiny.exr'")).unwrap();
     refused("--resume", "tiny-map-ggx: the photo is none there and");
@@ -117,9 +117,7 @@ fn changed_settings_inputs_and_fits_are_refused_by_name() {
 
 #[test]
 fn failed_fits_are_tried_again() {
-    let folder = folder(&format!(
-        "photos = ['photo.exr', 'tiny.exr']\nenvironments = 'map.exr'\n[defaults]\n{QUICK}"
-    ));
+    let folder = folder(&format!("photos = ['photo.exr', 'tiny.exr']\nenvironments = 'map.exr'\n[defaults]\n{QUICK}"));
     assert_eq!(batch(&folder, "out", "--workers 1").code, Some(4));
     let (output, events) = start(&folder, "--workers 1").watch_stderr(|_| ());
     assert_eq!(output.status.code(), Some(4), "{events:?}");

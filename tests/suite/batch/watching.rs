@@ -89,9 +89,8 @@ fn scrape(address: &str) -> String {
 #[test]
 fn metrics_tell_what_waits_for_workers() {
     let models = "models = ['ggx', 'cook-torrance']";
-    let folder = folder(&format!(
-        "photos = ['photo.exr', 'red.exr']\nenvironments = 'map.exr'\n{models}\n[defaults]\n{QUICK}"
-    ));
+    let folder =
+        folder(&format!("photos = ['photo.exr', 'red.exr']\nenvironments = 'map.exr'\n{models}\n[defaults]\n{QUICK}"));
     let process = start(&folder, "--workers 0 --metrics 0");
     let coordinator = process.id();
     let (mut address, mut page) = (None, None);
@@ -128,8 +127,7 @@ fn metrics_tell_what_waits_for_workers() {
 
 #[test]
 fn batch_goes_on_when_nobody_reads_its_progress_any_more() {
-    let folder =
-        folder(&format!("photos = 'photo.exr'\nenvironments = 'map.exr'\n[defaults]\n{QUICK}"));
+    let folder = folder(&format!("photos = 'photo.exr'\nenvironments = 'map.exr'\n[defaults]\n{QUICK}"));
     let mut process = start(&folder, "--workers 1");
     let found = process.stderr_until(|event| is(event, "worker-joined").then_some(()));
     assert!(found.is_some());

@@ -17,8 +17,7 @@ use super::{
 
 /// No heartbeat comes in between: what goes up the wire is what the test is about.
 fn quiet() -> RunnerOptions {
-    let policy =
-        Policy { heartbeat: Duration::from_secs(60), lost_after: Duration::from_secs(300), ..policy() };
+    let policy = Policy { heartbeat: Duration::from_secs(60), lost_after: Duration::from_secs(300), ..policy() };
     RunnerOptions { policy, ..without_workers() }
 }
 

@@ -1,4 +1,4 @@
-//! A fit whose coordinator is killed, wherever, and that is resumed: the same bits, and nothing done twice.
+//! A fit whose coordinator is killed at any point and that is resumed: the same bits, and nothing done twice.
 
 use super::scene::{Finished, MANY_NODES, MANY_NODES_FIT, QUICK, QUICK_FIT, fit, folder, without_timing};
 use crate::program::Answer;
@@ -116,7 +116,7 @@ fn run_with_other_inputs_or_settings_is_refused_with_what_differs() {
         |flags: &str, phrases: &[&str]| fit(folder.path(), "out", &format!("{QUICK} {flags}")).refused(phrases);
     kill_after(folder.path(), "killed", MANY_NODES, 2);
     fit(folder.path(), "killed", QUICK)
-        .refused(&["killed already holds a run that is not finished", "go on with it with --resume"]);
+        .refused(&["killed already holds a run that is not finished", "resume it with --resume"]);
     resume(folder.path(), "killed", MANY_NODES).done();
     refused("", &["out already holds a finished fit", "choose another --out"]);
     refused("--resume --seed 3", &["--seed is 0 there and 3 here", "resume with those of that run"]);

@@ -156,5 +156,5 @@ fn progress_goes_to_stderr_in_the_form_asked_for() {
     let none = fit(folder.path(), "none", &format!("{flags} --progress none")).done();
     assert_eq!(none.stderr, "");
     let lines = fit(folder.path(), "auto", &flags).done();
-    assert!(lines.stderr.contains("stage one: searches done") && !lines.stderr.contains('\x1b'), "{}", lines.stderr);
+    assert!(lines.stderr.contains("searches done") && !lines.stderr.contains('\x1b'), "{}", lines.stderr);
 }

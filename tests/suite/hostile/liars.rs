@@ -161,8 +161,7 @@ fn worker_that_asks_and_does_not_take_is_thrown_out() {
 
 #[test]
 fn worker_that_reads_nothing_is_too_slow_however_alive_it_seems() {
-    let policy =
-        Policy { heartbeat: Duration::from_millis(100), lost_after: Duration::from_secs(2), ..policy() };
+    let policy = Policy { heartbeat: Duration::from_millis(100), lost_after: Duration::from_secs(2), ..policy() };
     let (leaves, cluster) = run_by(policy, Limits::default());
     let mut liar = join(&cluster.access(), 1);
     let hash = hear(&mut liar, |message| match message {

@@ -15,8 +15,9 @@ impl Case {
     pub(super) fn stored(&self) -> Vec<References> {
         let (pixels, stored) = (self.pixels(), stored(self.name));
         assert_eq!(stored["pixels"], serde_json::json!(pixels), "the stored references are of other pixels");
-        let of_model =
-            |(model, lobes): (_, Vec<&str>)| References::from_json(model, &pixels, stored, |name| lobes.contains(&name));
+        let of_model = |(model, lobes): (_, Vec<&str>)| {
+            References::from_json(model, &pixels, stored, |name| lobes.contains(&name))
+        };
         self.lobes().into_iter().map(of_model).collect()
     }
 }

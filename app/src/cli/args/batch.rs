@@ -25,7 +25,7 @@ pub(crate) struct BatchArgs {
     /// The whole command line, the command first.
     #[arg(skip)]
     pub(crate) typed: Vec<OsString>,
-    /// Folder for the results, one subfolder per fit; it must not already hold a run, unless --resume is given
+    /// Folder for the results, one subfolder per fit; it must not already hold a run, unless --resume or --force is given
     #[arg(long, short, value_name = "DIR", help_heading = "Output")]
     out: PathBuf,
     /// Continue with the other fits when one fails [default]
@@ -38,6 +38,9 @@ pub(crate) struct BatchArgs {
     /// retried. Starts a run if there is none
     #[arg(long, help_heading = "Output")]
     resume: bool,
+    /// Replace files with our names in the folder, never an input and never through a symbolic link
+    #[arg(long, conflicts_with = "resume", help_heading = "Output")]
+    force: bool,
     #[command(flatten)]
     cluster: ClusterArgs,
     /// Where candidates are rendered, judged and polished; the results are the same
@@ -62,6 +65,7 @@ impl BatchArgs {
             fits,
             out: self.out,
             resume: self.resume,
+            force: self.force,
             stage_two: self.stage_two,
             on_failure: if self.fail_fast { OnFailure::FailFast } else { OnFailure::KeepGoing },
             metrics,

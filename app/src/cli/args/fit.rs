@@ -24,7 +24,7 @@ pub(crate) struct FitArgs {
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Output")]
 struct OutputArgs {
-    /// Folder for the results; it must not already hold a run, unless --resume is given
+    /// Folder for the results; it must not already hold a run, unless --resume or --force is given
     #[arg(long, short, value_name = "DIR")]
     out: PathBuf,
     /// Exit with code 1 if the final CSSIM is above X, for example 0.05; 0 is a perfect match
@@ -34,6 +34,9 @@ struct OutputArgs {
     /// checks the results of a finished one
     #[arg(long)]
     resume: bool,
+    /// Replace files with our names in the folder, never an input and never through a symbolic link
+    #[arg(long, conflicts_with = "resume")]
+    force: bool,
 }
 
 #[derive(Debug, Args)]
@@ -56,6 +59,7 @@ impl FitArgs {
             max_cssim: self.output.max_cssim,
             out: self.output.out,
             resume: self.output.resume,
+            force: self.output.force,
             cluster: self.cluster.into_settings()?,
             progress: self.diagnostics.progress,
             metrics: self.diagnostics.metrics,

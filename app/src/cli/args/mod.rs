@@ -72,9 +72,12 @@ impl Command {
 #[derive(Debug, Args)]
 #[command(args_override_self = true, after_long_help = "Example:\n  lookalike demo --out /tmp/demo")]
 pub(crate) struct DemoArgs {
-    /// Folder for the results; files of an earlier demo there are replaced
+    /// Folder for the results; files of an earlier demo there are replaced, no others
     #[arg(long, short, value_name = "DIR", default_value = "lookalike-demo", help_heading = "Output")]
     out: PathBuf,
+    /// Replace files with our names in the folder, also those of no demo
+    #[arg(long, help_heading = "Output")]
+    force: bool,
     /// Worker processes to start: auto starts one per core
     #[arg(long, value_name = "N", default_value_t, help_heading = "Workers")]
     workers: Workers,
@@ -88,7 +91,7 @@ impl DemoArgs {
         if self.workers == Workers::Count(0) {
             bail!("the demo computes with local workers only; give --workers 1 or more");
         }
-        Ok(DemoSettings { out: self.out, workers: self.workers, progress: self.progress, log: None })
+        Ok(DemoSettings { out: self.out, force: self.force, workers: self.workers, progress: self.progress, log: None })
     }
 }
 

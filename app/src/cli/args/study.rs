@@ -11,12 +11,15 @@ pub(crate) struct StudyArgs {
     /// TOML file that names materials, lights and experiments
     #[arg(value_name = "STUDY.toml")]
     study: PathBuf,
-    /// Folder for the results; it must not already hold a run, unless --resume is given
+    /// Folder for the results; it must not already hold a run, unless --resume or --force is given
     #[arg(long, short, value_name = "DIR", help_heading = "Output")]
     out: PathBuf,
     /// Resume the study in the folder without computing complete results again. Of a finished study, write the report again
     #[arg(long, help_heading = "Output")]
     resume: bool,
+    /// Replace files with our names in the folder, never an input and never through a symbolic link
+    #[arg(long, conflicts_with = "resume", help_heading = "Output")]
+    force: bool,
     #[command(flatten)]
     cluster: ClusterArgs,
     /// Submit the run to Slurm as a job that starts the coordinator and the workers, and return
@@ -39,6 +42,7 @@ impl StudyArgs {
             study: self.study,
             out: self.out,
             resume: self.resume,
+            force: self.force,
             metrics: self.diagnostics.metrics,
             cluster: self.cluster.into_settings()?,
             progress: self.diagnostics.progress,

@@ -25,12 +25,13 @@ impl Names {
 }
 
 /// Files that a batch writes beside the folders of its fits. Names that SQLite and unfinished writes derive from them are reserved as well.
-const FILES: [&str; 8] = [
+const FILES: [&str; 9] = [
     "access.json",
     "access.key.pem",
     "lookalike.sbatch",
     "run.lock",
     "run.sqlite",
+    "run.written",
     "status.json",
     "summary.csv",
     "summary.json",

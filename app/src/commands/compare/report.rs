@@ -1,12 +1,9 @@
 //! The outcome of a comparison on stdout: a table for people, or JSON.
 
-use super::{
-    coverage::{Coverage, Object},
-    exposure_source,
-};
+use super::coverage::{Coverage, Object};
 use crate::{
     inputs::{LoadedMask, LoadedPhoto},
-    settings::{CompareSettings, MetricKind},
+    settings::{CompareSettings, DisplayExposure, MetricKind},
 };
 use anyhow::Context;
 use serde_json::{Map, Value, json};
@@ -104,3 +101,12 @@ impl Report<'_> {
 
 /// l_L, c_L, s_L, l_C, l_H.
 const FEATURES: [&str; 5] = ["lightness", "contrast", "structure", "chroma", "hue"];
+
+/// How an exposure was chosen, for people.
+fn exposure_source(asked: &DisplayExposure) -> String {
+    match asked {
+        DisplayExposure::Auto => "auto: 97th percentile of the reference's largest channel to 0.9".to_owned(),
+        DisplayExposure::Value(_) => "as given; 1 unless --display-exposure says otherwise".to_owned(),
+        DisplayExposure::From(path) => format!("from {}", path.display()),
+    }
+}

@@ -1,6 +1,6 @@
 //! A rendering as a file: pixels and what they are.
 
-use super::LoadedMaterial;
+use super::material::LoadedMaterial;
 use crate::{
     inputs::{LoadedEnvironment, LoadedGeometry},
     settings::RenderSettings,

@@ -1,0 +1,332 @@
+//! The one check of an output folder before any work: a run replaces no file that it did not write itself.
+//!
+//! | what is in OUT | new run | `--resume` | `--force` | `demo` |
+//! |---|---|---|---|---|
+//! | a run (journal) | refused | resumed | replaced | replaced if it is a demo |
+//! | a file with one of our names | refused | kept if the run wrote it, else refused | replaced | as a run |
+//! | an input of the run with such a name | refused | refused | refused | refused |
+//! | a symbolic link or a folder with such a name | refused | refused | refused | refused |
+
+use super::ledger::{LEDGER, Ledger, hash_of};
+use crate::problems::Problems;
+use anyhow::bail;
+use lookalike_coordinator::{
+    atomic::draft_of,
+    journal::{JOURNAL_FILE, LOCK_FILE, status::STATUS_FILE},
+};
+use serde_json::Value;
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    fs,
+    io::{ErrorKind, Read},
+    path::{Path, PathBuf},
+};
+
+/// The mark of a finished fit.
+pub(crate) const MARK: &str = "fit.json";
+
+/// The mark of a batch that has begun.
+pub(crate) const BATCH_MARK: &str = "summary.json";
+
+/// What every fit leaves behind.
+pub(crate) const FIT_FILES: [&str; 6] =
+    ["candidates.csv", "match.exr", "match.png", "reference.png", "difference.png", MARK];
+
+/// Where workers find the run.
+pub(crate) const ACCESS_FILE: &str = "access.json";
+
+/// The secret half of [`ACCESS_FILE`].
+const KEY_FILE: &str = "access.key.pem";
+
+/// Files of every run beside its journal. They are written again all the time, so that their hashes say nothing.
+const RUN_FILES: [&str; 3] = [STATUS_FILE, ACCESS_FILE, KEY_FILE];
+
+/// What a run does with what is in its folder.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum OldFiles {
+    /// Refuse them.
+    Refuse,
+    /// Resume the run that wrote them.
+    Resume,
+    /// Replace them.
+    Replace,
+    /// Replace those of a demo.
+    ReplaceDemo,
+}
+
+impl OldFiles {
+    /// As the flags `--resume` and `--force` say.
+    pub(crate) fn of(is_resumed: bool, is_forced: bool) -> Self {
+        match (is_resumed, is_forced) {
+            (_, true) => Self::Replace,
+            (true, false) => Self::Resume,
+            (false, false) => Self::Refuse,
+        }
+    }
+}
+
+/// What a run asks of its folder.
+#[derive(Debug, Clone)]
+pub(crate) struct Claim<'a> {
+    /// The command: `fit`, `batch`, `study` or `demo`.
+    pub(crate) command: &'static str,
+    pub(crate) out: &'a Path,
+    pub(crate) old: OldFiles,
+    /// Names of files in the folder that the run writes.
+    pub(crate) files: Vec<&'static str>,
+    /// Names of files that grow: a hash would say nothing of them.
+    pub(crate) growing: Vec<&'static str>,
+    /// Names of folders in the folder that the run makes and fills.
+    pub(crate) folders: Vec<&'static str>,
+    /// Names of folders in the folder that get the files of a fit each.
+    pub(crate) fits: Vec<&'a str>,
+    /// Files that the run reads.
+    pub(crate) inputs: Vec<&'a Path>,
+    /// The access file that was made beforehand.
+    pub(crate) access: Option<&'a Path>,
+}
+
+impl<'a> Claim<'a> {
+    /// A claim of a folder for the files of one fit.
+    pub(crate) fn of_fit(out: &'a Path, old: OldFiles) -> Self {
+        let (growing, folders, fits, inputs) = Default::default();
+        Self { command: "fit", out, old, files: FIT_FILES.into(), growing, folders, fits, inputs, access: None }
+    }
+
+    /// Refuses the folder if the run would replace what it must not. Changes nothing.
+    ///
+    /// # Errors
+    /// All that is in the way, with what to do.
+    pub(crate) fn check(&self) -> anyhow::Result<()> {
+        self.check_lock()?;
+        self.check_against(&Ledger::read(self.out)?)
+    }
+
+    /// Whether a lock file that is there is one of ours, which the run may write to.
+    pub(super) fn check_lock(&self) -> anyhow::Result<()> {
+        if self.out.exists() && !self.out.is_dir() {
+            bail!("{} is a file: --out takes a folder, which is made if it is not there", self.out.display());
+        }
+        let path = self.out.join(LOCK_FILE);
+        if !is_there(&path) {
+            return Ok(());
+        }
+        let mut words = [0; 8];
+        let is_ours = is_file(&path)
+            && fs::File::open(&path)
+                .and_then(|mut file| file.read(&mut words))
+                .is_ok_and(|n| n == 0 || &words == b"process ");
+        if is_ours { Ok(()) } else { bail!("{}", self.in_the_way(LOCK_FILE)) }
+    }
+
+    /// The check, for a ledger of the folder.
+    pub(super) fn check_against(&self, ledger: &Ledger) -> anyhow::Result<()> {
+        let shown = self.out.display();
+        self.check_inputs(ledger)?;
+        let has_journal = is_there(&self.out.join(JOURNAL_FILE));
+        match self.old {
+            _ if has_journal && !is_file(&self.out.join(JOURNAL_FILE)) => bail!("{}", self.in_the_way(JOURNAL_FILE)),
+            OldFiles::Refuse if has_journal || self.has_mark() => bail!("{}", self.old_run()),
+            OldFiles::Resume if !has_journal && self.command == "fit" && is_there(&self.out.join(MARK)) => bail!(
+                "{shown} holds a finished fit ({MARK}) without the journal of its run, so there is nothing to resume: choose \
+                 another --out, or replace it with --force"
+            ),
+            OldFiles::ReplaceDemo if has_journal || self.names().iter().any(|name| is_there(&self.out.join(name))) => {
+                self.check_demo(ledger)?;
+            }
+            _ => {}
+        }
+        let is_link = |fit: &&str| self.out.join(fit).is_symlink();
+        let mut problems: Vec<String> =
+            self.fits.iter().copied().filter(is_link).map(|fit| self.in_the_way(fit)).collect();
+        for fit in self.fits.iter().filter(|_| self.old != OldFiles::Replace) {
+            let mark = format!("{fit}/{MARK}");
+            let is_taken = is_there(&self.out.join(fit).join(JOURNAL_FILE))
+                || (is_there(&self.out.join(&mark)) && !(self.old == OldFiles::Resume && ledger.has_name(&mark)));
+            if is_taken {
+                problems.push(format!(
+                    "{shown}/{fit} holds a fit that is not of this run: choose another --out, or move that folder elsewhere"
+                ));
+            }
+        }
+        let is_told = |name: &str, problems: &[String]| {
+            problems
+                .iter()
+                .any(|told| name.split_once('/').is_some_and(|(fit, _)| told.contains(&format!("/{fit} holds"))))
+        };
+        for name in self.names() {
+            if is_told(&name, &problems) {
+                continue;
+            }
+            problems.extend(self.problem_with(&name, ledger, has_journal));
+        }
+        Problems::check(problems, &shown.to_string())
+    }
+
+    /// The files that the run replaces, of those that are there.
+    pub(super) fn replaced(&self, ledger: &Ledger) -> Vec<PathBuf> {
+        // Without its mark, a fit is not taken for a finished one while the others go.
+        let names = [MARK.to_owned()].into_iter().chain(self.names()).chain(ledger.names()).chain([LEDGER.to_owned()]);
+        let mut seen = BTreeSet::new();
+        names
+            .filter(|name| seen.insert(name.clone()))
+            .map(|name| self.out.join(name))
+            .filter(|path| is_file(path) && !path.parent().is_some_and(|it| it != self.out && it.is_symlink()))
+            .collect()
+    }
+
+    /// Whether a file is there that only a run leaves behind.
+    fn has_mark(&self) -> bool {
+        match self.command {
+            "batch" => is_there(&self.out.join(BATCH_MARK)),
+            "study" => false,
+            _ => is_there(&self.out.join(MARK)),
+        }
+    }
+
+    /// All names that the run writes, below its folder.
+    fn names(&self) -> Vec<String> {
+        let own = self.files.iter().chain(&self.growing).chain(&self.folders).map(|name| (*name).to_owned());
+        let of_fits = self.fits.iter().flat_map(|fit| FIT_FILES.map(|file| format!("{fit}/{file}")));
+        let own_access = |name: &&str| *name == STATUS_FILE || self.access.is_none();
+        own.chain(of_fits).chain(RUN_FILES.into_iter().filter(own_access).map(str::to_owned)).collect()
+    }
+
+    /// An input is never replaced.
+    fn check_inputs(&self, ledger: &Ledger) -> anyhow::Result<()> {
+        let mut names: BTreeSet<String> = self.names().into_iter().collect();
+        if self.old == OldFiles::Replace {
+            names.extend(ledger.names());
+        }
+        let inputs: BTreeMap<PathBuf, &Path> =
+            self.inputs.iter().filter_map(|input| Some((fs::canonicalize(input).ok()?, *input))).collect();
+        let lines = names.iter().filter_map(|name| {
+            let place = fs::canonicalize(self.out.join(name)).ok()?;
+            let input = inputs.get(&place)?;
+            Some(format!("{} is an input of this run, which would replace it: choose another --out", input.display()))
+        });
+        Problems::check(lines.collect(), &self.out.display().to_string())
+    }
+
+    /// A demo replaces demos only.
+    fn check_demo(&self, ledger: &Ledger) -> anyhow::Result<()> {
+        let generated =
+            fs::read(self.out.join(MARK)).ok().and_then(|bytes| serde_json::from_slice::<Value>(&bytes).ok());
+        let is_demo = match generated {
+            Some(json) => json["inputs"]["photo"]["generated"] == true,
+            None => !is_there(&self.out.join(MARK)) && ledger.is_of("demo"),
+        };
+        if is_demo {
+            return Ok(());
+        }
+        let found = [MARK, JOURNAL_FILE].into_iter().map(str::to_owned).chain(self.names());
+        let found = found.into_iter().find(|name| is_there(&self.out.join(name))).unwrap_or_default();
+        bail!(
+            "{} holds something else than a demo ({found}): choose another folder with --out, or replace it with --force",
+            self.out.display()
+        )
+    }
+
+    /// What is wrong with a file that the run writes, if it is there.
+    fn problem_with(&self, name: &str, ledger: &Ledger, has_journal: bool) -> Option<String> {
+        let path = self.out.join(name);
+        let draft = draft_of(&path);
+        if is_there(&draft) && !fs::symlink_metadata(&draft).is_ok_and(|it| it.is_dir()) {
+            // Drafts are left by processes that were killed.
+            if !is_file(&draft) || !ledger.is_begun() {
+                let name = format!("{name}.partial");
+                return Some(self.in_the_way(&name));
+            }
+        }
+        if !is_there(&path) {
+            return None;
+        }
+        let is_folder = self.folders.contains(&name);
+        let is_kind = if is_folder { path.is_dir() && !path.is_symlink() } else { is_file(&path) };
+        if !is_kind {
+            return Some(self.in_the_way(name));
+        }
+        let is_passing = is_folder || self.growing.contains(&name) || RUN_FILES.contains(&name);
+        let is_fine = match self.old {
+            OldFiles::Replace => !is_folder || ledger.is_begun(),
+            // Of a run that ended before its journal was there.
+            OldFiles::Refuse => RUN_FILES.contains(&name) && ledger.is_begun(),
+            OldFiles::Resume if is_passing => has_journal || ledger.is_begun(),
+            OldFiles::Resume | OldFiles::ReplaceDemo if ledger.is_begun() => {
+                is_passing || self.is_of_run(name, &path, ledger)
+            }
+            OldFiles::Resume => false,
+            // Made before there were ledgers.
+            OldFiles::ReplaceDemo => true,
+        };
+        match (is_fine, self.old) {
+            (true, _) => None,
+            (false, OldFiles::Resume) if has_journal => Some(changed(name, &self.out.display().to_string())),
+            (false, OldFiles::Replace) => Some(format!(
+                "{} holds files that no run here knows of: choose another --out, or move that folder elsewhere",
+                path.display()
+            )),
+            (false, OldFiles::Refuse) if !is_folder => Some(format!(
+                "{} is there already, and this run would replace it: choose another --out, move that file elsewhere, or replace \
+                 it with --force",
+                path.display()
+            )),
+            (false, _) => Some(self.in_the_way(name)),
+        }
+    }
+
+    /// Whether the run in the folder wrote this file.
+    fn is_of_run(&self, name: &str, path: &Path, ledger: &Ledger) -> bool {
+        fs::read(path).is_ok_and(|bytes| ledger.has(name, &hash_of(&bytes)))
+    }
+
+    fn in_the_way(&self, name: &str) -> String {
+        let path = self.out.join(name);
+        let what = match fs::symlink_metadata(&path) {
+            Ok(it) if it.is_symlink() => "is a symbolic link, which is neither followed nor replaced",
+            Ok(it) if it.is_dir() => "is a folder, where this run writes a file or a folder of its own",
+            _ => "is not a file of this run, which would replace it",
+        };
+        format!("{} {what}: choose another --out, or move it elsewhere", path.display())
+    }
+
+    /// Why the run that is there is in the way.
+    fn old_run(&self) -> String {
+        let shown = self.out.display();
+        let has_mark = self.has_mark();
+        match self.command {
+            "batch" if has_mark => format!(
+                "{shown}/{BATCH_MARK} says that a batch was run there already: resume it with --resume, choose another --out, \
+                 or replace it with --force"
+            ),
+            "batch" | "study" => format!(
+                "{shown}/{JOURNAL_FILE} says that a run was begun there already: resume it with --resume, choose another \
+                 --out, or replace it with --force"
+            ),
+            _ if has_mark => format!(
+                "{shown} already holds a finished fit ({MARK}): choose another --out, or replace it with --force"
+            ),
+            _ => format!(
+                "{shown} already holds a run that is not finished ({JOURNAL_FILE}): resume it with --resume, choose another \
+                 --out, or replace it with --force"
+            ),
+        }
+    }
+}
+
+/// Of a file that is not as the run wrote it.
+pub(crate) fn changed(name: &str, out_name: &str) -> String {
+    format!(
+        "{name} is not what the run in {out_name} wrote; keep a changed file elsewhere and remove it here, then --resume makes it again"
+    )
+}
+
+/// Whether there is anything of this name, also a link to nothing.
+pub(super) fn is_there(path: &Path) -> bool {
+    !matches!(fs::symlink_metadata(path), Err(error) if matches!(error.kind(), ErrorKind::NotFound | ErrorKind::NotADirectory))
+}
+
+/// Whether it is a file, and no link to one.
+pub(super) fn is_file(path: &Path) -> bool {
+    fs::symlink_metadata(path).is_ok_and(|it| it.is_file())
+}

@@ -1,0 +1,136 @@
+//! `run.written`: which files a run wrote into its folder, each with the hash of its bytes. A file is replaced only if it is one of
+//! them.
+
+use anyhow::Context;
+use lookalike::graph::BlobHash;
+use std::{
+    collections::BTreeSet,
+    fs::{self, File, OpenOptions},
+    io::Write,
+    path::{Path, PathBuf},
+    sync::{Mutex, PoisonError},
+};
+
+/// The name of the ledger.
+pub(super) const LEDGER: &str = "run.written";
+
+/// What a run wrote.
+#[derive(Debug)]
+pub(super) struct Ledger {
+    path: PathBuf,
+    state: Mutex<State>,
+}
+
+#[derive(Debug, Default)]
+struct State {
+    /// The command that began the run.
+    command: Option<String>,
+    /// Names below the folder, with hashes.
+    written: BTreeSet<(String, String)>,
+    file: Option<File>,
+}
+
+impl Ledger {
+    /// The ledger of a folder; empty where there is none.
+    pub(super) fn read(folder: &Path) -> anyhow::Result<Self> {
+        let path = folder.join(LEDGER);
+        let text = match fs::read_to_string(&path) {
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => String::new(),
+            text => text.with_context(|| format!("cannot read {}", path.display()))?,
+        };
+        let mut state = State::default();
+        // The last line may have been cut off by the end of the process.
+        for line in text.split_inclusive('\n').filter_map(|line| line.strip_suffix('\n')) {
+            match (line.strip_prefix("# lookalike "), line.split_once("  ")) {
+                (Some(command), _) => state.command = Some(command.to_owned()),
+                (None, Some((hash, name))) => _ = state.written.insert((name.to_owned(), hash.to_owned())),
+                (None, None) => {}
+            }
+        }
+        Ok(Self { path, state: Mutex::new(state) })
+    }
+
+    /// Whether a run has begun in the folder.
+    pub(super) fn is_begun(&self) -> bool {
+        self.lock().command.is_some()
+    }
+
+    /// Whether the run in the folder is one of this command.
+    pub(super) fn is_of(&self, command: &str) -> bool {
+        self.lock().command.as_deref() == Some(command)
+    }
+
+    /// Whether the run wrote a file of this name with these bytes.
+    pub(super) fn has(&self, name: &str, hash: &str) -> bool {
+        self.lock().written.contains(&(name.to_owned(), hash.to_owned()))
+    }
+
+    /// Whether the run wrote a file of this name.
+    pub(super) fn has_name(&self, name: &str) -> bool {
+        self.lock().written.range((name.to_owned(), String::new())..).next().is_some_and(|(known, _)| known == name)
+    }
+
+    /// The names of all files that the run wrote.
+    pub(super) fn names(&self) -> BTreeSet<String> {
+        self.lock().written.iter().map(|(name, _)| name.clone()).collect()
+    }
+
+    /// Begins the ledger of a new run.
+    pub(super) fn begin(&self, command: &str) -> anyhow::Result<()> {
+        lookalike_coordinator::atomic::write(&self.path, format!("# lookalike {command}\n").as_bytes())
+            .with_context(|| format!("cannot write {}", self.path.display()))?;
+        *self.lock() = State { command: Some(command.to_owned()), ..State::default() };
+        Ok(())
+    }
+
+    /// Notes a file before it is put in its place.
+    pub(super) fn note(&self, name: &str, hash: &str) -> anyhow::Result<()> {
+        let mut state = self.lock();
+        if !state.written.insert((name.to_owned(), hash.to_owned())) {
+            return Ok(());
+        }
+        let cannot = || format!("cannot write {}", self.path.display());
+        if state.file.is_none() {
+            state.file = Some(OpenOptions::new().append(true).open(&self.path).with_context(cannot)?);
+        }
+        let Some(file) = &mut state.file else { return Ok(()) };
+        file.write_all(format!("{hash}  {name}\n").as_bytes()).with_context(cannot)
+    }
+
+    fn lock(&self) -> std::sync::MutexGuard<'_, State> {
+        // A set and a file, neither of which is left half changed.
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// The hash of a file's bytes, as the ledger and the journal have it.
+pub(super) fn hash_of(bytes: &[u8]) -> String {
+    BlobHash::of(bytes).to_string()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ledger_is_read_back_but_for_a_line_that_was_cut_off() {
+        let folder = tempfile::tempdir().unwrap();
+        let ledger = Ledger::read(folder.path()).unwrap();
+        assert!(!ledger.is_begun());
+        ledger.begin("fit").unwrap();
+        ledger.note("match.exr", "ab").unwrap();
+        ledger.note("a b/match.exr", "cd").unwrap();
+        let path = folder.path().join(LEDGER);
+        let text = fs::read_to_string(&path).unwrap();
+        assert_eq!(text, "# lookalike fit\nab  match.exr\ncd  a b/match.exr\n");
+        fs::write(&path, text + "ef  fit").unwrap();
+        let ledger = Ledger::read(folder.path()).unwrap();
+        assert!(
+            ledger.is_of("fit")
+                && ledger.has("match.exr", "ab")
+                && ledger.has_name("match.exr")
+                && !ledger.has("match.exr", "cd")
+        );
+        assert_eq!(ledger.names().into_iter().collect::<Vec<_>>(), ["a b/match.exr", "match.exr"]);
+    }
+}

@@ -1,0 +1,178 @@
+//! Which files a run may replace: each case of the table in `claim`.
+
+use super::{BATCH_MARK, Claim, ClaimedFolder, FIT_FILES, OldFiles, OutFolder};
+use std::{fs, path::Path};
+use tempfile::TempDir;
+
+const DEMO: &str = r#"{ "inputs": { "photo": { "path": "photo.exr", "generated": true } } }"#;
+const FIT: &str = r#"{ "inputs": { "photo": { "path": "ball.exr" } } }"#;
+
+fn folder(files: &[(&str, &str)]) -> TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, text) in files {
+        let path = folder.path().join(name);
+        fs::create_dir_all(path.parent().unwrap()).unwrap();
+        fs::write(path, text).unwrap();
+    }
+    folder
+}
+
+fn fit(out: &Path, old: OldFiles) -> Claim<'_> {
+    Claim::of_fit(out, old)
+}
+
+fn demo(out: &Path, old: OldFiles) -> Claim<'_> {
+    let files = FIT_FILES.into_iter().chain(["strip.png"]).collect();
+    Claim { command: "demo", files, ..fit(out, old) }
+}
+
+fn begin(claim: &Claim<'_>) -> OutFolder {
+    ClaimedFolder::take(claim).unwrap().begin().unwrap()
+}
+
+#[track_caller]
+fn refused(claim: &Claim<'_>, phrases: &[&str]) {
+    for error in [claim.check().unwrap_err(), ClaimedFolder::take(claim).unwrap_err()] {
+        let text = error.to_string();
+        phrases.iter().for_each(|phrase| assert!(text.contains(phrase), "expected {phrase:?} in: {text}"));
+    }
+}
+
+#[test]
+fn file_of_the_users_is_refused_by_name_and_forced_away() {
+    let folder = folder(&[("candidates.csv", "mine"), ("reference.png", "mine"), ("notes.txt", "mine")]);
+    let out = folder.path();
+    refused(
+        &fit(out, OldFiles::Refuse),
+        &["2 problems", "candidates.csv is there already", "reference.png", "--force"],
+    );
+    refused(&fit(out, OldFiles::Resume), &["candidates.csv is not a file of this run", "choose another --out"]);
+    refused(&demo(out, OldFiles::ReplaceDemo), &["holds something else than a demo (candidates.csv)", "--force"]);
+    assert_eq!(fs::read(out.join("reference.png")).unwrap(), b"mine");
+    let folder = begin(&fit(out, OldFiles::Replace));
+    folder.write("candidates.csv", b"ours").unwrap();
+    assert!(!out.join("reference.png").exists() && out.join("notes.txt").exists());
+}
+
+#[test]
+fn demo_replaces_demos_only() {
+    for text in [FIT, "no JSON"] {
+        let folder = folder(&[("fit.json", text), ("match.exr", "")]);
+        refused(&demo(folder.path(), OldFiles::ReplaceDemo), &["holds something else than a demo (fit.json)"]);
+    }
+    let unfinished = folder(&[("run.sqlite", "")]);
+    refused(&demo(unfinished.path(), OldFiles::ReplaceDemo), &["holds something else than a demo (run.sqlite)"]);
+    // One that was made before there were ledgers.
+    let old = folder(&[("fit.json", DEMO), ("strip.png", "old"), ("run.sqlite", "")]);
+    let out = begin(&demo(old.path(), OldFiles::ReplaceDemo));
+    assert!(!old.path().join("fit.json").exists() && !old.path().join("run.sqlite").exists());
+    // One that was interrupted, and one with a file of the user's.
+    out.write("strip.png", b"new").unwrap();
+    drop(out);
+    drop(begin(&demo(old.path(), OldFiles::ReplaceDemo)));
+    fs::write(old.path().join("strip.png"), "mine").unwrap();
+    fs::write(old.path().join("fit.json"), DEMO).unwrap();
+    refused(&demo(old.path(), OldFiles::ReplaceDemo), &["strip.png is not a file of this run"]);
+    drop(begin(&demo(old.path(), OldFiles::Replace)));
+}
+
+#[test]
+fn input_is_never_replaced() {
+    let folder = folder(&[("own/match.exr", "photo"), ("own/fit.json", FIT)]);
+    let (out, photo) = (folder.path().join("own"), folder.path().join("own/../own/match.exr"));
+    for old in [OldFiles::Refuse, OldFiles::Resume, OldFiles::Replace] {
+        let claim = Claim { inputs: vec![&photo], ..fit(&out, old) };
+        refused(&claim, &["match.exr is an input of this run", "choose another --out"]);
+    }
+    assert_eq!(fs::read(&photo).unwrap(), b"photo");
+    // A demo's photo has a name that a fit does not write, but that a forced fit would remove.
+    let out = folder.path().join("demo");
+    begin(&demo(&out, OldFiles::ReplaceDemo)).write("strip.png", b"photo").unwrap();
+    let photo = out.join("strip.png");
+    refused(&Claim { inputs: vec![&photo], ..fit(&out, OldFiles::Replace) }, &["strip.png is an input of this run"]);
+}
+
+#[cfg(unix)]
+#[test]
+fn links_are_neither_followed_nor_replaced() {
+    use std::os::unix::fs::symlink;
+    for name in ["match.png", "match.png.partial", "run.lock", "run.sqlite", "status.json", "access.json"] {
+        for old in [OldFiles::Refuse, OldFiles::Resume, OldFiles::Replace, OldFiles::ReplaceDemo] {
+            let folder = folder(&[("mine", "precious")]);
+            let out = folder.path().join("out");
+            fs::create_dir(&out).unwrap();
+            symlink(folder.path().join("mine"), out.join(name)).unwrap();
+            let claim = if old == OldFiles::ReplaceDemo { demo(&out, old) } else { fit(&out, old) };
+            refused(&claim, &[name, "choose another"]);
+            assert_eq!(fs::read(folder.path().join("mine")).unwrap(), b"precious");
+        }
+    }
+    let folder = folder(&[("elsewhere/fit.json", ""), ("batch/notes.txt", "")]);
+    symlink(folder.path().join("elsewhere"), folder.path().join("batch/a")).unwrap();
+    let batch = folder.path().join("batch");
+    let claim = Claim { command: "batch", fits: vec!["a"], ..fit(&batch, OldFiles::Replace) };
+    refused(&claim, &["a is a symbolic link"]);
+    let out = begin(&fit(&folder.path().join("out"), OldFiles::Refuse));
+    symlink(folder.path().join("elsewhere"), folder.path().join("out/cells")).unwrap();
+    assert!(out.sub("cells").unwrap_err().to_string().contains("is a symbolic link"));
+}
+
+#[test]
+fn resumed_run_replaces_what_it_wrote_and_nothing_else() {
+    let folder = folder(&[]);
+    let out = begin(&fit(folder.path(), OldFiles::Refuse));
+    out.write("match.png", b"one").unwrap();
+    out.write("match.png", b"two").unwrap();
+    fs::write(folder.path().join("match.exr"), "mine").unwrap();
+    let error = out.write("match.exr", b"ours").unwrap_err().to_string();
+    assert!(error.starts_with("match.exr is not what the run in "), "{error}");
+    drop(out);
+    fs::write(folder.path().join("run.sqlite"), "").unwrap();
+    refused(&fit(folder.path(), OldFiles::Resume), &["match.exr is not what the run in", "--resume makes it again"]);
+    fs::remove_file(folder.path().join("match.exr")).unwrap();
+    // Killed while it wrote: an older version stands, or a draft.
+    fs::write(folder.path().join("match.png"), "one").unwrap();
+    fs::write(folder.path().join("match.exr.partial"), "ha").unwrap();
+    let out = begin(&fit(folder.path(), OldFiles::Resume));
+    out.write("match.png", b"two").unwrap();
+    out.write("match.exr", b"half").unwrap();
+    assert!(!folder.path().join("match.exr.partial").exists());
+    refused_as_unfinished(folder.path());
+}
+
+#[track_caller]
+fn refused_as_unfinished(out: &Path) {
+    refused_while_locked(&fit(out, OldFiles::Refuse), "already holds a run that is not finished (run.sqlite)");
+}
+
+#[track_caller]
+fn refused_while_locked(claim: &Claim<'_>, phrase: &str) {
+    let text = claim.check().unwrap_err().to_string();
+    assert!(text.contains(phrase), "{text}");
+}
+
+#[test]
+fn batch_takes_no_folder_of_another_fit() {
+    let folder = folder(&[("a/fit.json", FIT), ("b/run.sqlite", ""), ("c/match.png", ""), ("d/notes.txt", "")]);
+    let claim = |old| Claim {
+        command: "batch",
+        files: vec!["summary.csv", BATCH_MARK],
+        fits: vec!["a", "b", "c", "d"],
+        ..fit(folder.path(), old)
+    };
+    for old in [OldFiles::Refuse, OldFiles::Resume] {
+        let phrases = ["3 problems", "/a holds a fit that is not of this run", "/b holds a fit", "c/match.png is "];
+        refused(&claim(old), &phrases);
+    }
+    let out = begin(&claim(OldFiles::Replace));
+    out.sub("a").unwrap().write("fit.json", b"{}").unwrap();
+    assert!(folder.path().join("b/run.sqlite").exists() && !folder.path().join("c/match.png").exists());
+}
+
+#[test]
+fn study_takes_no_cells_of_another() {
+    let folder = folder(&[("cells/x.json", "")]);
+    let claim = |old| Claim { command: "study", files: Vec::new(), folders: vec!["cells"], ..fit(folder.path(), old) };
+    refused(&claim(OldFiles::Refuse), &["cells is a folder, where this run writes"]);
+    refused(&claim(OldFiles::Replace), &["cells holds files that no run here knows of"]);
+}

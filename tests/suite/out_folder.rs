@@ -1,0 +1,59 @@
+//! No file of the user's is ever replaced: every command that writes to a folder refuses before any work.
+
+use crate::{
+    fit::scene::{QUICK, folder},
+    program::lookalike,
+};
+use std::fs;
+
+#[test]
+fn every_command_refuses_a_file_that_it_would_replace_and_leaves_it_alone() {
+    let folder = folder();
+    let at = |name: &str| folder.path().join(name);
+    fs::write(at("batch.toml"), "photos = ['photo.exr']\nenvironments = 'map.exr'\n").unwrap();
+    for (name, command) in [
+        ("candidates.csv", format!("fit photo.exr --env map.exr {QUICK}")),
+        ("reference.png", format!("fit photo.exr --env map.exr {QUICK} --resume")),
+        ("summary.csv", "batch batch.toml --progress none".to_owned()),
+        ("photo-map-ggx/match.png", "batch batch.toml --progress none --resume".to_owned()),
+        ("strip.png", "demo --progress none".to_owned()),
+    ] {
+        let file = at("out").join(name);
+        fs::create_dir_all(file.parent().unwrap()).unwrap();
+        fs::write(&file, "mine").unwrap();
+        lookalike(folder.path(), &format!("{command} --out out")).refused(&[name.rsplit('/').next().unwrap(), "--out"]);
+        assert_eq!(fs::read_to_string(&file).unwrap(), "mine");
+        assert!(!at("out/run.sqlite").exists(), "{name} was refused after work had begun");
+        fs::remove_dir_all(at("out")).unwrap();
+    }
+}
+
+#[test]
+fn demo_does_not_replace_a_fit_and_a_fit_not_its_own_photo() {
+    let folder = folder();
+    let at = |name: &str| folder.path().join(name);
+    fs::create_dir(at("own")).unwrap();
+    fs::write(at("own/fit.json"), r#"{ "inputs": { "photo": { "path": "photo.exr" } } }"#).unwrap();
+    fs::copy(at("photo.exr"), at("own/match.exr")).unwrap();
+    let photo = fs::read(at("photo.exr")).unwrap();
+    lookalike(folder.path(), "demo -o own --progress none")
+        .refused(&["own holds something else than a demo (fit.json)"]);
+    for flags in ["", "--resume", "--force"] {
+        lookalike(folder.path(), &format!("fit own/match.exr --env map.exr --out own {QUICK} {flags}"))
+            .refused(&["own/match.exr is an input of this run", "choose another --out"]);
+    }
+    assert!(fs::read(at("own/match.exr")).unwrap() == photo && at("own/fit.json").exists());
+}
+
+#[test]
+fn force_replaces_a_finished_fit_and_its_journal() {
+    let folder = folder();
+    let out = folder.path().join("out");
+    let line = format!("fit photo.exr --env map.exr --out out {QUICK} --polish off");
+    lookalike(folder.path(), &line).done();
+    fs::write(out.join("match.png"), "mine").unwrap();
+    lookalike(folder.path(), &format!("{line} --seed 1")).refused(&["out already holds a finished fit", "--force"]);
+    lookalike(folder.path(), &format!("{line} --seed 1 --force")).done();
+    assert!(fs::read_to_string(out.join("fit.json")).unwrap().contains("\"seed\": 1,"));
+    lookalike(folder.path(), &format!("{line} --seed 1 --resume")).done();
+}
