@@ -5,6 +5,7 @@ use std::time::{Duration, SystemTime};
 
 use lookalike_coordinator::access::Credentials;
 use lookalike_coordinator::events::RunEvent;
+use lookalike_coordinator::policy::Policy;
 use lookalike_coordinator::reactor::Stop;
 use lookalike_coordinator::runner::{RunError, RunnerOptions};
 use lookalike_coordinator::spawn::WorkerCommand;

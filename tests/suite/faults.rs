@@ -6,6 +6,7 @@ use std::time::Duration;
 
 use lookalike::graph::FailureReason;
 use lookalike_coordinator::events::{Departure, RunEvent};
+use lookalike_coordinator::policy::Policy;
 use lookalike_coordinator::runner::{RunError, RunnerOptions};
 use lookalike_tests::cluster::{Cluster, options, policy};
 use lookalike_tests::gate::Gate;

@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use lookalike_coordinator::events::{Departure, RunEvent};
+use lookalike_coordinator::policy::Policy;
 use lookalike_coordinator::runner::RunnerOptions;
 use lookalike_tests::cluster::{Cluster, policy};
 use lookalike_tests::gate::{Gate, Waiting};

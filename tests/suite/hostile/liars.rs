@@ -7,6 +7,7 @@ use lookalike::protocol::{
 };
 use lookalike_coordinator::events::{Departure, RunEvent};
 use lookalike_coordinator::limits::Limits;
+use lookalike_coordinator::policy::Policy;
 use lookalike_coordinator::reactor::Stop;
 use lookalike_coordinator::runner::{RunError, RunnerOptions};
 use lookalike_tests::cluster::{Cluster, options, policy};
