@@ -13,7 +13,8 @@ fn written(data: &StudyData, with_pictures: bool) -> BTreeMap<String, String> {
     if with_pictures {
         pictures(folder.path());
     }
-    write(data, folder.path()).unwrap();
+    fs::create_dir_all(folder.path().join("figures")).unwrap();
+    write(data, folder.path(), |name, bytes| Ok(fs::write(folder.path().join(name), bytes)?)).unwrap();
     let mut files = BTreeMap::new();
     for place in ["", "figures"] {
         for entry in fs::read_dir(folder.path().join(place)).unwrap() {
