@@ -3,8 +3,9 @@
 //! (Workshop on Material Appearance Modeling, 2020), cited below as **\[BP20b\]**.
 //!
 //! This crate is pure: the science ([`math`], [`image`], [`light`], [`scene`], [`brdf`], [`render`], [`metric`],
-//! [`search`], [`fit`]), its steps as a job graph ([`nodes`], [`plan`]), the job graph itself ([`graph`]) and the wire format ([`protocol`]). Nothing in it opens a file or a
-//! socket, reads a clock or an environment variable, or prints.
+//! [`search`], [`fit`]), its steps as nodes of a job graph ([`nodes`], [`plan`]), the job graph ([`graph`]) and the
+//! wire format ([`protocol`]). No code here opens a file or a socket, reads a clock or an environment variable, or
+//! prints.
 //!
 //! Conventions: world right-handed, +Y up; the camera sits on +Z and looks along -Z; directions are unit vectors that
 //! point away from the surface; radiance is linear with Rec. 709 primaries; images are row-major, top left first.

@@ -27,7 +27,7 @@ impl Channels {
         Self { width: codes.width, height: codes.height, alpha, colours: codes.pixels().map(colour).collect() }
     }
 
-    /// Alpha unless it is 1 everywhere (then it is no mask), else the colours, which must be equal.
+    /// Alpha unless it is 1 everywhere (then it does not mark an object), else the colours, which must be equal.
     pub(super) fn into_plane(self, source: &Source<'_>) -> Result<Plane<f32>, ImageError> {
         let place = |at: usize| (at % self.width, at / self.width);
         let alpha = self.alpha.filter(|alpha| alpha.iter().any(|&value| value != 1.0));

@@ -67,7 +67,7 @@ impl Header {
             if line.is_empty() {
                 return Ok(header);
             }
-            // Not an assignment: a comment, or a command that made the picture, which may contain `=`.
+            // Skips comments and the commands that made the picture: they start with `#` or white space, or have no `=`.
             if let Some((key, value)) = line.split_once('=').filter(|_| !line.starts_with(['#', ' ', '\t'])) {
                 header.apply(key.trim(), value.trim(), reader.source)?;
             }
@@ -191,7 +191,7 @@ impl Reader<'_> {
 
     fn take<const N: usize>(&mut self, layout: &Layout, index: usize) -> Result<[u8; N], ImageError> {
         let Some((head, tail)) = self.rest.split_first_chunk::<N>() else {
-            let detail = format!("expected {} scan lines, found the end in scan line {index}", layout.line_count);
+            let detail = format!("expected {} scan lines, but it ends in scan line {index}", layout.line_count);
             return Err(self.source.malformed(FORMAT, detail));
         };
         self.rest = tail;
@@ -215,7 +215,8 @@ impl Reader<'_> {
         (0..4).try_for_each(|channel| self.read_runs(channel, line, layout, index))
     }
 
-    /// One component of a scan line: a count above 128 repeats one byte, others copy.
+    /// Reads one component of a scan line. A count above 128 repeats one byte count - 128 times; a smaller count copies
+    /// as many bytes.
     fn read_runs(
         &mut self,
         channel: usize,
@@ -290,7 +291,8 @@ fn power_of_two(exponent: u64) -> f64 {
 /// `N` positive finite numbers.
 fn factors<const N: usize>(key: &str, value: &str, source: &Source<'_>) -> Result<[f64; N], ImageError> {
     numbers(value).filter(|v: &[f64; N]| v.iter().all(|&x| x > 0.0 && x.is_finite())).ok_or_else(|| {
-        source.malformed(FORMAT, format!("expected {N} positive number(s) in {key}, found `{}`", value.escape_debug()))
+        let expected = if N == 1 { "a positive number".to_owned() } else { format!("{N} positive numbers") };
+        source.malformed(FORMAT, format!("expected {expected} in {key}, found `{}`", value.escape_debug()))
     })
 }
 

@@ -1,4 +1,4 @@
-//! Pearson's chi-square test, for tests that compare samples with the density they claim to follow.
+//! Pearson's chi-square test, for tests that compare samples with their density.
 
 use super::Vec3;
 use super::elementary::{exp, ln, sin_cos};
@@ -39,8 +39,8 @@ pub(crate) fn chi_square(observed: &[u64], expected: &[f64]) -> ChiSquare {
     ChiSquare { statistic, degrees_of_freedom, p_value }
 }
 
-/// Bins on the sphere of directions: `rows` in theta from +Y, `columns` around +Y. The density of a bin is integrated by
-/// a midpoint rule of `quadrature` x `quadrature` points.
+/// Bins on the sphere of directions: `rows` in theta from +Y, `columns` around +Y. The density of a bin is integrated
+/// by a midpoint rule of `quadrature` x `quadrature` points.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct SphereBins {
     pub(crate) rows: usize,

@@ -5,7 +5,7 @@
 //! l_C = 1/(1 + .002 dC^2); l_H = 1/(1 + .008 dH^2); and, optionally, c_C as c_L with the chroma's deviations.
 //! Source: Lissner et al. 2013; the constants are those of the authors' program (`CID.m`).
 //!
-//! Deficits, other than features, keep small differences exact, give identical images a score of exactly 0, and allow
+//! Deficits, unlike features, keep small differences exact, give identical images a score of exactly 0, and allow
 //! windows without a difference to be left out of a sum without changing its bits. By Cauchy and Schwarz |s12| <= s1
 //! s2; enforcing it removes only rounding errors.
 

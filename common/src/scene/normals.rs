@@ -71,7 +71,7 @@ impl NormalMap {
         Ok(Self { width, height, normals, pinhole, warnings: warnings(odd.len(), away) })
     }
 
-    /// What is worth telling about the map.
+    /// Warnings about the map, for the user.
     #[must_use]
     pub fn warnings(&self) -> &[String] {
         &self.warnings

@@ -1,8 +1,8 @@
-//! A point of the object as the camera sees it.
+//! A visible point of the object's surface.
 
 use crate::math::Vec3;
 
-/// A point of the surface as the camera sees it. The normal faces the camera: `normal . view > 0`.
+/// A visible point of the surface. The normal faces the camera: `normal . view > 0`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SurfacePoint {
     /// Unit normal, world.

@@ -39,7 +39,7 @@ pub(super) struct Layer {
 /// Within a part the unnamed layer comes first, then the named ones in alphabetical order.
 ///
 /// # Errors
-/// The expected channels, if there are none of them.
+/// A description of the expected channels, if the file has none of them.
 pub(super) fn select(parts: &[Vec<String>], wanted: Wanted) -> Result<Layer, &'static str> {
     let choices: &[&[&str]] = match wanted {
         Wanted::Colours => &[&["r", "g", "b"], &["y"]],

@@ -30,7 +30,7 @@ pub(super) fn decode(source: &Source<'_>) -> Result<Decoded, ImageError> {
     Ok(decoded)
 }
 
-/// The codes of a PNG, and what its chunks other than the pixels say.
+/// The codes of a PNG, and the content of its other chunks.
 pub(super) fn read(source: &Source<'_>) -> Result<(Codes, Info<'static>), ImageError> {
     let info = read_info(source)?;
     let fault = |error: image::ImageError| source.malformed(FORMAT, error.to_string());
