@@ -4,7 +4,6 @@ use super::{super::preset, choice::choice};
 use crate::settings::{DisplayExposure, ModelName, Preset};
 use clap::{Args, ValueEnum};
 use lookalike::{
-    brdf,
     fit::{Gammas, Integration, JudgedBy, Method, SearchKind},
     render::subset::{SampleCount, Sampling},
 };
@@ -55,9 +54,9 @@ pub(crate) struct MethodArgs {
 }
 
 impl MethodArgs {
-    pub(crate) fn into_method(self) -> anyhow::Result<Method> {
-        Ok(Method {
-            model: brdf::model(self.model.as_str())?,
+    pub(crate) fn into_method(self) -> Method {
+        Method {
+            model: self.model.model(),
             gammas: self.gammas.values(),
             samples: self.samples,
             sampling: self.sampling,
@@ -69,7 +68,7 @@ impl MethodArgs {
             polish: matches!(self.polish, Switch::On),
             judge: self.judge,
             seed: self.seed,
-        })
+        }
     }
 }
 
