@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use lookalike::graph::FailureReason;
 use lookalike_coordinator::events::{Departure, RunEvent};
-use lookalike_coordinator::policy::Policy;
+use lookalike_coordinator::policy::{Policy, Speculation};
 use lookalike_coordinator::runner::{RunError, RunnerOptions};
 use lookalike_tests::cluster::{Cluster, options, policy};
 use lookalike_tests::gate::Gate;
@@ -29,9 +29,11 @@ fn reference() -> Option<Vec<u8>> {
     reference
 }
 
-/// A lease that is short for a worker that was stopped, and long for one that the machine lets wait.
+/// A lease that is short for a stopped worker, and long for one that waits for a processor. With speculation: the last node may be
+/// given to a worker that is still at the gate, and has to run elsewhere then.
 fn impatient() -> Policy {
-    Policy { heartbeat: Duration::from_millis(100), lost_after: Duration::from_secs(3), ..policy() }
+    let speculation = Speculation { after: Duration::from_secs(1), ..Speculation::default() };
+    Policy { heartbeat: Duration::from_millis(100), lost_after: Duration::from_secs(3), speculation, ..policy() }
 }
 
 fn wait_for_drain(cluster: &Cluster) {

@@ -2,14 +2,17 @@
 
 use super::{QUICK, batch, folder, scene, states, summary};
 use crate::program::lookalike;
-use lookalike_tests::process::Process;
+use lookalike_tests::{journal::JournalView, process::Process};
 use std::{fs, path::Path, process::Command};
 use tempfile::TempDir;
 
 const NAMES: [&str; 2] = ["photo-map-ggx", "red-map-ggx"];
 
+/// Two fits. The second has more candidates, so that the first is written well before it.
 fn two() -> TempDir {
-    folder(&format!("photos = ['photo.exr', 'red.exr']\nenvironments = 'map.exr'\n[defaults]\n{QUICK}"))
+    let fits = "[[fit]]\nphoto = 'photo.exr'\nenv = 'map.exr'\n\
+                [[fit]]\nphoto = 'red.exr'\nenv = 'map.exr'\ngammas = '1:3:0.1'\n";
+    folder(&format!("[defaults]\n{QUICK}{fits}"))
 }
 
 /// A fit alone, with settings that the batch does not have.
@@ -23,15 +26,13 @@ fn killed_after_a_fit(folder: &TempDir) -> [&'static str; 2] {
     let mut command = Command::new(env!("CARGO_BIN_EXE_lookalike-under-test"));
     let line = "batch batch.toml --out out --resume --workers 1 --progress json";
     let mut process = Process::start(command.args(line.split(' ')).current_dir(folder.path()).env_remove("RUST_LOG"));
-    let journal = || lookalike_tests::journal::JournalView::of(&folder.path().join("out"));
     let written = "SELECT name FROM fits WHERE outputs IS NOT NULL";
-    let found = process.stderr_until(|_| {
-        folder
-            .path()
-            .join("out/run.sqlite")
-            .exists()
-            .then(|| journal().column::<String>(written))
-            .filter(|f| !f.is_empty())
+    let mut has_finished = false;
+    let found = process.stderr_until(|event| {
+        // Looked at for every event, the journal would keep this test from hearing of the fit in time.
+        has_finished |= event["event"] == "fit-finished";
+        let journal = || JournalView::of(&folder.path().join("out"));
+        has_finished.then(|| journal().column::<String>(written)).filter(|names| !names.is_empty())
     });
     process.kill();
     let found = found.expect("the batch ended before");

@@ -30,7 +30,7 @@ fn start(folder: &TempDir, flags: &str) -> Process {
 }
 
 /// Runs the batch to the first event that `pick` takes and kills its coordinator then.
-fn kill_at(folder: &TempDir, pick: impl Fn(&Value) -> bool) {
+fn kill_at(folder: &TempDir, mut pick: impl FnMut(&Value) -> bool) {
     let mut process = start(folder, "--workers 2");
     let found = process.stderr_until(|event| pick(event).then_some(()));
     assert!(found.is_some(), "the batch ended before");
@@ -43,7 +43,11 @@ fn killed_batch_goes_on_where_it_was_and_ends_with_the_same_results() {
     batch(&folder, "whole", "--workers 2").done();
     let is = |event: &Value, name: &str, kind: &str| event["event"] == name && event["kind"] == kind;
     kill_at(&folder, |event| is(event, "node-finished", "search"));
-    kill_at(&folder, |_| !written(&folder).is_empty());
+    let mut has_finished = false;
+    kill_at(&folder, |event| {
+        has_finished |= event["event"] == "fit-finished";
+        has_finished && !written(&folder).is_empty()
+    });
     let complete = written(&folder);
     let (output, events) = start(&folder, "--workers 2").watch_stderr(|_| ());
     assert_eq!(output.status.code(), Some(0), "{events:?}");
