@@ -115,7 +115,7 @@ Any command but batch, study and access also takes a TOML file whose keys are it
 win over the file; relative paths in the file are relative to it.
 
 Results go to stdout, everything for people to stderr. Exit codes: 0 done; 1 done, but --max-cssim was missed; 2 bad \
-input or usage; 3 the cluster failed; 4 some fits of a batch failed, the others are complete; 130 interrupted.
+input or usage; 3 the run failed; 4 some fits of a batch failed, the others are complete; 130 interrupted.
 
 Examples:
   lookalike demo
