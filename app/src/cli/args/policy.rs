@@ -45,7 +45,7 @@ pub(crate) struct PolicyArgs {
     #[arg(long, value_name = "T", default_value_t = Time(Policy::default().speculation.after))]
     #[arg(help_heading = "Policy", hide_short_help = true)]
     speculate_after: Time,
-    /// The share of transport nodes, from 0 to 1, that is run again on another worker, to compare the outputs bit for bit
+    /// Share of nodes on workers, searches left out, from 0 to 1, to run again on another worker and compare bit for bit
     #[arg(long, value_name = "F", default_value_t = Policy::default().verify_fraction, allow_negative_numbers = true)]
     #[arg(help_heading = "Policy", hide_short_help = true)]
     verify_fraction: f64,
