@@ -128,6 +128,7 @@ fn claim(settings: &BatchSettings) -> Claim<'_> {
     let mut inputs: Vec<&Path> = vec![&settings.manifest];
     for fit in &settings.fits {
         inputs.extend(fit.capture.files());
+        inputs.extend(fit.display_exposure.file());
     }
     inputs.extend(settings.cluster.access.as_deref());
     Claim {

@@ -38,6 +38,7 @@ pub(crate) fn run(settings: FitSettings) -> anyhow::Result<ExitCode> {
 /// What the fit asks of its folder.
 fn claim(settings: &FitSettings) -> Claim<'_> {
     let mut inputs = settings.capture.files();
+    inputs.extend(settings.display_exposure.file());
     inputs.extend(settings.cluster.access.as_deref());
     Claim {
         inputs,

@@ -102,21 +102,23 @@ impl<'a> Claim<'a> {
         self.check_against(&Ledger::read(self.out)?)
     }
 
-    /// Whether a lock file that is there is one of ours, which the run may write to.
+    /// Refuses a folder whose lock file or ledger is not one of ours, which the run may write to.
     pub(super) fn check_lock(&self) -> anyhow::Result<()> {
         if self.out.exists() && !self.out.is_dir() {
             bail!("{} is a file: --out takes a folder, which is made if it is not there", self.out.display());
         }
-        let path = self.out.join(LOCK_FILE);
-        if !is_there(&path) {
-            return Ok(());
+        for (name, beginning) in [(LOCK_FILE, b"process "), (LEDGER, b"# lookal")] {
+            let path = self.out.join(name);
+            let mut words = [0; 8];
+            let is_ours = || {
+                let read = fs::File::open(&path).and_then(|mut file| file.read(&mut words));
+                is_file(&path) && read.is_ok_and(|n| n == 0 || &words == beginning)
+            };
+            if is_there(&path) && !{ is_ours }() {
+                bail!("{}", self.in_the_way(name));
+            }
         }
-        let mut words = [0; 8];
-        let is_ours = is_file(&path)
-            && fs::File::open(&path)
-                .and_then(|mut file| file.read(&mut words))
-                .is_ok_and(|n| n == 0 || &words == b"process ");
-        if is_ours { Ok(()) } else { bail!("{}", self.in_the_way(LOCK_FILE)) }
+        Ok(())
     }
 
     /// The check, for a ledger of the folder.
@@ -166,7 +168,7 @@ impl<'a> Claim<'a> {
     /// The files that the run replaces, of those that are there.
     pub(super) fn replaced(&self, ledger: &Ledger) -> Vec<PathBuf> {
         // Without its mark, a fit is not taken for a finished one while the others go.
-        let names = [MARK.to_owned()].into_iter().chain(self.names()).chain(ledger.names()).chain([LEDGER.to_owned()]);
+        let names = [MARK.to_owned()].into_iter().chain(self.names()).chain(ledger.names());
         let mut seen = BTreeSet::new();
         names
             .filter(|name| seen.insert(name.clone()))
@@ -250,7 +252,7 @@ impl<'a> Claim<'a> {
         let is_fine = match self.old {
             OldFiles::Replace => !is_folder || ledger.is_begun(),
             // Of a run that ended before its journal was there.
-            OldFiles::Refuse => RUN_FILES.contains(&name) && ledger.is_begun(),
+            OldFiles::Refuse => (RUN_FILES.contains(&name) || self.growing.contains(&name)) && ledger.is_begun(),
             OldFiles::Resume if is_passing => has_journal || ledger.is_begun(),
             OldFiles::Resume | OldFiles::ReplaceDemo if ledger.is_begun() => {
                 is_passing || self.is_of_run(name, &path, ledger)

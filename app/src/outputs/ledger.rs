@@ -6,7 +6,7 @@ use lookalike::graph::BlobHash;
 use std::{
     collections::BTreeSet,
     fs::{self, File, OpenOptions},
-    io::Write,
+    io::{self, Read, Seek, SeekFrom, Write},
     path::{Path, PathBuf},
     sync::{Mutex, PoisonError},
 };
@@ -83,18 +83,38 @@ impl Ledger {
         Ok(())
     }
 
-    /// Notes a file before it is put in its place.
+    /// Notes a file before it is put in its place. The line is on the disk before the file is: after a power loss, a file without
+    /// a line would look like the user's.
     pub(super) fn note(&self, name: &str, hash: &str) -> anyhow::Result<()> {
         let mut state = self.lock();
-        if !state.written.insert((name.to_owned(), hash.to_owned())) {
+        let entry = (name.to_owned(), hash.to_owned());
+        if state.written.contains(&entry) {
             return Ok(());
         }
-        let cannot = || format!("cannot write {}", self.path.display());
-        if state.file.is_none() {
-            state.file = Some(OpenOptions::new().append(true).open(&self.path).with_context(cannot)?);
+        // Opened anew after a failure, so that the next line does not continue one that was cut off.
+        let file = state.file.take().map_or_else(|| self.open(), Ok);
+        let noted = file.and_then(|mut file| {
+            file.write_all(format!("{hash}  {name}\n").as_bytes())?;
+            file.sync_data()?;
+            Ok(file)
+        });
+        state.file = Some(noted.with_context(|| format!("cannot write {}", self.path.display()))?);
+        state.written.insert(entry);
+        Ok(())
+    }
+
+    /// The file, ready for the next line: a line that was cut off is ended, so that it is not continued.
+    fn open(&self) -> io::Result<File> {
+        let mut file = OpenOptions::new().read(true).append(true).open(&self.path)?;
+        let mut last = [b'\n'];
+        if file.metadata()?.len() > 0 {
+            file.seek(SeekFrom::End(-1))?;
+            file.read_exact(&mut last)?;
         }
-        let Some(file) = &mut state.file else { return Ok(()) };
-        file.write_all(format!("{hash}  {name}\n").as_bytes()).with_context(cannot)
+        if last != *b"\n" {
+            file.write_all(b"\n")?;
+        }
+        Ok(file)
     }
 
     fn lock(&self) -> std::sync::MutexGuard<'_, State> {
@@ -132,5 +152,8 @@ mod tests {
                 && !ledger.has("match.exr", "cd")
         );
         assert_eq!(ledger.names().into_iter().collect::<Vec<_>>(), ["a b/match.exr", "match.exr"]);
+        ledger.note("match.png", "01").unwrap();
+        let ledger = Ledger::read(folder.path()).unwrap();
+        assert!(ledger.has("match.png", "01") && ledger.names().len() == 3, "a line that was cut off is not continued");
     }
 }

@@ -1,7 +1,11 @@
 //! `--display-exposure`: the exposure of the display transform before the metric (design section 6).
 
 use anyhow::{Context, bail};
-use std::{fmt, path::PathBuf, str::FromStr};
+use std::{
+    fmt,
+    path::{Path, PathBuf},
+    str::FromStr,
+};
 
 /// The factor that radiance is multiplied by before it is shown or scored, the same for both images.
 #[derive(Debug, Clone, PartialEq)]
@@ -12,6 +16,17 @@ pub enum DisplayExposure {
     Value(f64),
     /// The factor stored in a `fit.json` or in the metadata of an image of an earlier run.
     From(PathBuf),
+}
+
+impl DisplayExposure {
+    /// The file that it reads, if any.
+    #[must_use]
+    pub fn file(&self) -> Option<&Path> {
+        match self {
+            Self::From(path) => Some(path),
+            Self::Auto | Self::Value(_) => None,
+        }
+    }
 }
 
 impl FromStr for DisplayExposure {

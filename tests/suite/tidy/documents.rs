@@ -103,7 +103,7 @@ fn links_and_paths_in_documents_resolve() {
 fn commands_and_flags_in_documents_exist() {
     const COMMANDS: [&str; 9] =
         ["access new", "batch", "demo", "fit", "status", "study", "render", "compare", "worker"];
-    const OF_CARGO: [&str; 10] = [
+    const OF_CARGO: [&str; 11] = [
         "--bench",
         "--bin",
         "--example",
@@ -112,6 +112,7 @@ fn commands_and_flags_in_documents_exist() {
         "--locked",
         "--nocapture",
         "--path",
+        "--profile",
         "--release",
         "--test",
     ];
