@@ -110,11 +110,11 @@ impl<'a> Claim<'a> {
         for (name, beginning) in [(LOCK_FILE, b"process "), (LEDGER, b"# lookal")] {
             let path = self.out.join(name);
             let mut words = [0; 8];
-            let is_ours = || {
-                let read = fs::File::open(&path).and_then(|mut file| file.read(&mut words));
-                is_file(&path) && read.is_ok_and(|n| n == 0 || &words == beginning)
-            };
-            if is_there(&path) && !{ is_ours }() {
+            let is_ours = is_file(&path)
+                && fs::File::open(&path)
+                    .and_then(|mut file| file.read(&mut words))
+                    .is_ok_and(|n| n == 0 || &words == beginning);
+            if is_there(&path) && !is_ours {
                 bail!("{}", self.in_the_way(name));
             }
         }

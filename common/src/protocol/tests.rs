@@ -227,11 +227,11 @@ fn unknown_version_is_named_on_both_sides() {
 fn preamble_has_its_golden_bytes_and_refuses_other_protocols() {
     let challenge = Challenge::new([1; 32]);
     let ones = "01".repeat(32);
-    assert_eq!(hex(&challenge.to_bytes()), format!("4c4f4f4b4c494b4504000000{ones}"));
+    assert_eq!(hex(&challenge.to_bytes()), format!("4c4f4f4b4c494b4505000000{ones}"));
     let response = challenge.answer(&key(7), [2; 32]).unwrap();
     let twos = "02".repeat(32);
     let proof = "1a377a2bf07122db57439a15bbd04df8a1872c437783d1da1eafd1103358f852";
-    assert_eq!(hex(&response.to_bytes()), format!("4c4f4f4b4c494b4504000000{twos}{proof}"));
+    assert_eq!(hex(&response.to_bytes()), format!("4c4f4f4b4c494b4505000000{twos}{proof}"));
     assert_eq!(Challenge::from_bytes(&[b'H'; CHALLENGE_BYTES]), Err(HandshakeError::Magic));
     assert_eq!(Response::from_bytes(&[0; RESPONSE_BYTES]), Err(HandshakeError::Magic));
     let mut verdict = response.judge(&challenge, &key(7)).to_bytes();
