@@ -9,7 +9,7 @@ The photos are renderings of network fits of MERL measurements (Sztrajman et al.
 pixels, by `lookalike render --brdf`. Each is fitted by `lookalike fit --model ggx-f90` with 256 samples and seed 0. The difference
 is the absolute difference of the two displayed images, four times as bright. DIR holds probes/ and materials/; the default is
 LOOKALIKE_DATA, else ../shared/data beside the checkout; make_merl.py is looked for in DIR/../tools. Photos and fits that are in the
-work folder already are kept. About 6 minutes on two cores.
+work folder already are kept. About 10 minutes on two cores.
 """
 import argparse
 import json
