@@ -1,8 +1,8 @@
 //! A network namespace for a worker with two cables to this machine; a test can cut one of them.
 //!
 //! ```text
-//!   this machine ---- line ----- worker's namespace     what the worker and its coordinator say
-//!                ---- control --                        what nodes say to the test; never hurt
+//!   this machine ---- line ----- worker's namespace     between worker and coordinator; tests cut it
+//!                ---- control --                        between nodes and test; never cut
 //! ```
 //! Needs root and iproute2. One direction is silenced by a wrong hardware address for the other end: packets leave and are not received.
 //! This needs no packet filter.
@@ -198,7 +198,7 @@ mod tests {
     use std::collections::BTreeSet;
 
     #[test]
-    fn cables_of_a_process_and_of_its_neighbours_have_addresses_of_their_own() {
+    fn cables_of_neighbouring_processes_have_different_addresses() {
         let cables = (0..3).flat_map(|process| (0..16).map(move |serial| number_of(process, serial)));
         assert_eq!(cables.map(|number| Cable::new("n", "l", number).near).collect::<BTreeSet<_>>().len(), 48);
         let last = Cable::new("n", "l", number_of(u32::MAX, 15));

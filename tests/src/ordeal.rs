@@ -1,4 +1,4 @@
-//! A real fit under a seeded mix of faults: workers killed, stopped and drained; a worker whose wire is cut or silent; a coordinator
+//! A real fit under a seeded mix of faults: workers killed, stopped and drained; a worker whose proxy is cut or silent; a coordinator
 //! killed and replaced by another, its journal truncated or damaged in between.
 //!
 //! Faults are a function of the seed and of how many events the coordinator has reported. A seed does not replay exactly, but the same
@@ -89,7 +89,7 @@ impl Fault {
 }
 
 impl Ordeal<'_> {
-    /// Run the fit to its end, with two local workers and one on a wire.
+    /// Run the fit to its end, with two local workers and one behind a proxy.
     ///
     /// # Panics
     /// When it fails, or reports no event for too long.
@@ -212,7 +212,7 @@ impl Run<'_> {
         self.mend();
     }
 
-    /// Connect the wire to the coordinator's address, now and after each resumption.
+    /// Connect the proxy to the coordinator's address, now and after each resumption.
     fn lay_wire(&mut self, coordinator: &str) {
         self.wire.get_or_insert_with(|| Proxy::to(coordinator));
     }

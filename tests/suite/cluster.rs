@@ -165,7 +165,7 @@ fn remote_workers_join_and_end_with_the_run() {
 }
 
 #[test]
-fn without_any_worker_the_run_ends_with_a_named_error() {
+fn run_without_workers_ends_with_an_error() {
     let policy =
         Policy { wait_for_workers: Duration::from_millis(300), remind_every: Duration::from_millis(100), ..policy() };
     let leaves = Leaves::Digests { count: 1, shared_bytes: 1 };

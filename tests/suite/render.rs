@@ -92,7 +92,7 @@ fn light_comes_from_its_direction_in_the_map() {
 }
 
 #[test]
-fn the_file_has_the_same_bytes_on_any_number_of_threads() {
+fn rendered_file_has_the_same_bytes_on_any_number_of_threads() {
     let folder = folder();
     let file = |threads: usize| {
         let flags = format!("render {GLOSSY} --env right.exr --size 24 --samples 32 -o {threads}.exr");

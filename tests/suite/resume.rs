@@ -106,7 +106,7 @@ fn run_of_six_workers_resumed_at_once_by_one_assigns_every_ready_node() {
 }
 
 #[test]
-fn remote_worker_drops_what_it_holds_and_joins_the_next_coordinator_as_a_new_member() {
+fn remote_worker_drops_its_nodes_and_joins_the_next_coordinator_as_a_new_member() {
     let (gate, folder) = (Gate::new(), tempfile::tempdir().unwrap());
     // A single local worker has a thread for each core.
     let threads = available_parallelism().map_or(1, usize::from);

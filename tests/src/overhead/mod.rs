@@ -2,8 +2,8 @@
 //!
 //! ```text
 //!   lookalike-overhead                      every measurement below, each in a process of its own; a table on stderr
-//!   lookalike-overhead round-trip [ROUNDS]  21 nodes that do nothing, again and again
-//!   lookalike-overhead throughput [NODES]   so many of them at once
+//!   lookalike-overhead round-trip [ROUNDS]  rounds of 21 nodes that do no work
+//!   lookalike-overhead throughput [NODES]   this many such nodes at once
 //!   lookalike-overhead worker-killed [NODES]        how soon the nodes of a worker that gets SIGKILL run elsewhere
 //!   lookalike-overhead worker-stopped [NODES]       the same with SIGSTOP
 //!   lookalike-overhead coordinator-killed [NODES]   how soon a coordinator that gets SIGKILL is replaced
@@ -126,7 +126,7 @@ impl NodeType for Nothing {
 /// Sleeps for as long as a short search takes.
 struct Pause;
 
-/// How long.
+/// The duration of a [`Pause`].
 const PAUSE: Duration = Duration::from_millis(20);
 
 impl NodeType for Pause {

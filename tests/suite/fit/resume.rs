@@ -135,7 +135,7 @@ fn resume_with_other_inputs_or_settings_is_refused_with_the_difference() {
 }
 
 #[test]
-fn second_coordinator_in_one_folder_is_refused_and_told_the_process_of_the_first() {
+fn second_coordinator_in_one_folder_is_refused_with_the_process_id_of_the_first() {
     let folder = folder();
     let out = folder.path().join("out");
     fs::create_dir(&out).unwrap();

@@ -49,7 +49,7 @@ fn hello_of_tls_1_2() -> Vec<u8> {
 }
 
 #[test]
-fn client_of_tls_1_2_is_told_that_its_version_is_too_old() {
+fn client_of_tls_1_2_gets_a_protocol_version_alert() {
     let gate = Gate::new();
     let cluster = run_at_the_gate(&gate);
     let mut stream = connect(&cluster.access().address).unwrap();

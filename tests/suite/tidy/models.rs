@@ -43,7 +43,7 @@ fn head_comment_of_a_models_file_is_its_manual_page() {
 }
 
 #[test]
-fn a_model_is_named_in_its_file_and_in_the_registry_only() {
+fn model_is_named_only_in_its_file_and_the_registry() {
     // A model that has a folder may name itself in all of it.
     let own = common().filter(|source| is_of_a_model(&source.code));
     let own: Vec<String> =
