@@ -38,7 +38,7 @@ fn known_materials_are_recovered_under_the_uffizi_gallery() {
 
 /// Prints a table of what the paper's search reaches from the paper's start; asserts nothing.
 #[test]
-fn pattern_search_from_the_papers_start_is_tabulated() {
+fn what_pattern_search_reaches_from_the_papers_start() {
     for probe in [GRACE, RNL, UFFIZI] {
         let Some(environment) = probe.load() else { return };
         let scene = Scene::sphere(256, Camera::Orthographic, environment).unwrap();

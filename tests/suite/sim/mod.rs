@@ -37,7 +37,7 @@ const TWICE: &str = "LOOKALIKE_SIM_TWICE";
 const COUNT: &str = "LOOKALIKE_SIM_SEEDS";
 
 #[test]
-fn simulated_runs_end_correctly_under_all_faults() {
+fn runs_end_correctly_under_all_faults() {
     let count = number(COUNT).unwrap_or(SEEDS);
     let first = number(SEED).unwrap_or(0);
     let mut report = Report::default();
@@ -66,7 +66,7 @@ fn seed_replays_to_the_same_events_at_the_same_times() {
 }
 
 #[test]
-fn requested_seed_is_replayed() {
+fn seed_that_is_asked_for_is_replayed() {
     let Some(seed) = number(SEED) else {
         println!("skipped: {SEED} names no seed to replay");
         return;
