@@ -19,8 +19,8 @@ const FLAGS: &str = "--samples 128 --gammas 1:2:0.5 --seed 5 --polish off";
 /// The fit by this machine alone.
 static LOCAL: Finished = Finished::new(FLAGS);
 
-/// Sets the node of a step in its environment. With `--export=NONE` of the step or its job, only the stand-in's own variables are kept.
-/// SIGTERM is passed on to all processes of the step, as in Slurm.
+/// Sets the node of a step in its environment. With `--export=NONE` of the step or its job, only `SLURM*` and the stand-in's variables
+/// stay. SIGTERM is passed on to all processes of the step, as in Slurm.
 const SRUN: &str = r#"export="${SLURM_EXPORT_ENV:-ALL}"
 for argument; do
   case "$argument" in

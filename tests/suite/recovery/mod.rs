@@ -136,7 +136,7 @@ fn metal_and_plastic_are_recovered_in_a_room() {
     assert!(failures.is_empty(), "{failures:#?}");
 }
 
-/// The paper's search from the paper's start stops at a higher cost than least squares.
+/// The paper's search from the paper's start stops where least squares still improves.
 #[test]
 fn least_squares_reaches_at_most_the_cost_of_pattern_search() {
     let scene = Scene::sphere(64, Camera::Orthographic, synthetic::room_at_dusk(32)).unwrap();
