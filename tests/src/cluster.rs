@@ -18,10 +18,10 @@ use crate::PATIENCE;
 use crate::nodes::registry;
 use crate::plan::{Leaves, TestPlanner};
 
-/// How a run ended: the output of its last node and what it has cost, or its error.
+/// The result of a run: the output of its last node and its summary, or its error.
 pub type Outcome = Result<(Option<Vec<u8>>, RunSummary), RunError>;
 
-/// A run that goes on in a thread.
+/// A run in progress, in its own thread.
 #[derive(Debug)]
 pub struct Cluster {
     folder: TempDir,
@@ -29,8 +29,8 @@ pub struct Cluster {
     thread: JoinHandle<Outcome>,
 }
 
-/// Options for a run with `workers` workers of `program`, which has to be `lookalike-test-cluster`. The access file is set
-/// by [`Cluster::start`].
+/// Options for a run with `workers` workers of `program`, which must be `lookalike-test-cluster`. [`Cluster::start`] sets the access
+/// file.
 #[must_use]
 pub fn options(program: &str, workers: usize) -> RunnerOptions {
     let command = WorkerCommand { program: program.into(), arguments: vec!["worker".into()] };
@@ -42,7 +42,7 @@ pub fn options(program: &str, workers: usize) -> RunnerOptions {
     }
 }
 
-/// The default policy without speculation: a node at a gate runs for as long as the test holds it there, which is not slow.
+/// The default policy without speculation, because a node that a test holds at a gate is not slow.
 #[must_use]
 pub fn policy() -> Policy {
     let defaults = Policy::default();
@@ -68,10 +68,10 @@ impl Cluster {
         Self { folder, events, thread }
     }
 
-    /// Wait for the first event that `pick` takes.
+    /// Wait for the first event for which `pick` returns a value.
     ///
     /// # Panics
-    /// When it does not come in time, or the run ends before.
+    /// When no such event comes in time, or the run ends before.
     pub fn wait_for<T>(&self, mut pick: impl FnMut(&RunEvent) -> Option<T>) -> T {
         loop {
             let event = self.events.recv_timeout(PATIENCE).expect("an event in time");
@@ -81,10 +81,10 @@ impl Cluster {
         }
     }
 
-    /// Watch for so long that nothing happens that `pick` takes.
+    /// Watch for this duration and check that `pick` accepts no event.
     ///
     /// # Panics
-    /// When it does, or the run ends.
+    /// When `pick` accepts an event, or the run ends.
     pub fn assert_none_for(&self, time: Duration, mut pick: impl FnMut(&RunEvent) -> bool) {
         let until = Instant::now() + time;
         loop {
@@ -96,7 +96,7 @@ impl Cluster {
         }
     }
 
-    /// Wait until the coordinator listens, and return where.
+    /// Wait until the coordinator listens, and return its address.
     pub fn address(&self) -> String {
         self.wait_for(|event| match event {
             RunEvent::Listening { address, .. } => Some(address.clone()),
@@ -104,28 +104,28 @@ impl Cluster {
         })
     }
 
-    /// The access file; there once the coordinator listens.
+    /// The path of the access file, which exists once the coordinator listens.
     #[must_use]
     pub fn access_file(&self) -> PathBuf {
         self.folder.path().join("access.json")
     }
 
-    /// What the access file says.
+    /// The content of the access file.
     ///
     /// # Panics
-    /// When it is not there or not one.
+    /// When it does not exist or is not an access file.
     #[must_use]
     pub fn access(&self) -> Access {
         read_access(&self.access_file())
     }
 
-    /// A folder that lives as long as the cluster.
+    /// A folder that exists as long as the cluster.
     #[must_use]
     pub fn folder(&self) -> &Path {
         self.folder.path()
     }
 
-    /// Wait for the end of the run: the events that nobody waited for, and its outcome.
+    /// Wait for the end of the run: the events not yet read by [`Self::wait_for`], and the outcome.
     ///
     /// # Panics
     /// When it does not end in time, or its thread panics.
@@ -166,7 +166,7 @@ impl Cluster {
 /// Read an access file.
 ///
 /// # Panics
-/// When it is not there or not one.
+/// When it does not exist or is not an access file.
 #[must_use]
 pub fn read_access(path: &Path) -> Access {
     Access::parse(&std::fs::read_to_string(path).expect("an access file")).expect("a valid access file")

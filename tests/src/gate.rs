@@ -10,7 +10,7 @@ use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 
 use crate::PATIENCE;
 
-/// Where `gate` nodes wait.
+/// A listener at which `gate` nodes wait.
 #[derive(Debug)]
 pub struct Gate {
     listener: TcpListener,
@@ -24,7 +24,7 @@ pub struct Waiting {
 }
 
 impl Gate {
-    /// A gate that nobody waits at.
+    /// A gate at which no node waits.
     ///
     /// # Panics
     /// When the system has no free port.
@@ -33,7 +33,7 @@ impl Gate {
         Self::at(Ipv4Addr::LOCALHOST.into())
     }
 
-    /// A gate at another address of this machine, which workers elsewhere reach.
+    /// A gate at another address of this machine, which workers in a namespace can reach.
     ///
     /// # Panics
     /// When the address is not this machine's.
@@ -42,7 +42,7 @@ impl Gate {
         Self { listener: TcpListener::bind((address, 0)).expect("a free port") }
     }
 
-    /// The parameters of `gate` nodes.
+    /// The address to give to `gate` nodes as parameters.
     ///
     /// # Panics
     /// When the system does not know its own socket.
@@ -51,7 +51,7 @@ impl Gate {
         self.listener.local_addr().expect("the address of a bound socket")
     }
 
-    /// Whether no `gate` node is executing that was not met yet.
+    /// Whether no `gate` node waits to be returned by [`Self::next`].
     ///
     /// # Panics
     /// When the system does not know its own socket.
@@ -65,8 +65,8 @@ impl Gate {
 
     /// Wait until the next `gate` node executes.
     ///
-    /// A process may be killed after it has connected and before it has sent its id. Its connection is skipped: the node is re-queued
-    /// and comes again.
+    /// A process may be killed after it has connected and before it has sent its id. Its connection is skipped: the node is re-queued and
+    /// another process executes it.
     ///
     /// # Panics
     /// When none comes in time.
@@ -108,18 +108,18 @@ pub fn is_end(error: &io::Error) -> bool {
     ends.contains(&error.kind())
 }
 
-/// Somebody who stands at the gate until told to go.
+/// A thread that decides about each node that waits at the gate.
 #[derive(Debug)]
 pub struct Keeper {
     address: SocketAddr,
     thread: JoinHandle<()>,
 }
 
-/// What a keeper's own process says instead of a process id.
+/// Sent to the gate by [`Keeper::stop`] in place of a process id.
 const LEAVE: u32 = 0;
 
 impl Gate {
-    /// Let somebody decide about every node that comes, in a thread of its own.
+    /// Start a thread that calls `decide` for every node that arrives.
     #[must_use]
     pub fn keep(self, mut decide: impl FnMut(Waiting) + Send + 'static) -> Keeper {
         let address = self.address();
@@ -132,12 +132,12 @@ impl Gate {
 }
 
 impl Keeper {
-    /// Let nobody pass any more.
+    /// Stop the thread; nodes that arrive later wait.
     ///
     /// # Panics
     /// With the keeper's own panic, if it has panicked.
     pub fn stop(self) {
-        // Nobody listens if the keeper has panicked: its panic is the one to report.
+        // The connection fails if the thread has panicked: its panic is the one to report.
         let _ = TcpStream::connect(self.address).and_then(|mut stream| stream.write_all(&LEAVE.to_le_bytes()));
         if let Err(panic) = self.thread.join() {
             std::panic::resume_unwind(panic);
@@ -158,7 +158,7 @@ impl Waiting {
         self.process
     }
 
-    /// Let the node finish. If its process is gone, the node is re-queued and comes to the gate again.
+    /// Let the node finish. If its process has ended, the node is re-queued and another process executes it.
     ///
     /// # Panics
     /// When the socket fails for another reason.
@@ -168,12 +168,12 @@ impl Waiting {
         }
     }
 
-    /// Wait until the process is gone: only its end closes the stream.
+    /// Wait until the process has ended, which closes the stream.
     ///
     /// # Panics
-    /// When it is not gone in time.
+    /// When it does not end in time.
     pub fn wait_for_death(mut self) {
-        // An end or a reset, depending on how it died.
+        // An end of file or a reset, depending on how it was killed.
         match self.stream.read(&mut [0]) {
             Ok(count) => assert_eq!(count, 0, "a node at the gate has nothing more to send"),
             Err(error) => assert!(is_end(&error), "the process has not ended: {error}"),

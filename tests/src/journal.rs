@@ -1,4 +1,4 @@
-//! What the journal of a run says, read as anybody could read it.
+//! The content of a run's journal, read with plain SQL.
 
 use std::fs::OpenOptions;
 use std::path::Path;
@@ -6,7 +6,7 @@ use std::path::Path;
 use rusqlite::types::FromSql;
 use rusqlite::{Connection, OpenFlags};
 
-/// A column of the first row, or of every row, that a query of a journal gives.
+/// An open journal of a run.
 #[derive(Debug)]
 pub struct JournalView(Connection);
 
@@ -14,17 +14,17 @@ impl JournalView {
     /// The journal in a folder of results.
     ///
     /// # Panics
-    /// When there is none.
+    /// When the folder has no journal.
     #[must_use]
     pub fn of(folder: &Path) -> Self {
         let path = folder.join("run.sqlite");
         Self(Connection::open_with_flags(path, OpenFlags::SQLITE_OPEN_READ_ONLY).expect("a journal"))
     }
 
-    /// The number that a query gives.
+    /// The number that a query returns.
     ///
     /// # Panics
-    /// When it gives none.
+    /// When the query returns no number.
     #[must_use]
     pub fn number(&self, query: &str) -> u64 {
         self.0.query_row(query, [], |row| row.get(0)).expect(query)
@@ -41,7 +41,7 @@ impl JournalView {
         rows.collect::<Result<_, _>>().expect(query)
     }
 
-    /// How many nodes were given out in one epoch though an earlier one had acknowledged their output.
+    /// How many nodes were assigned in one epoch although an earlier epoch had acknowledged their output.
     #[must_use]
     pub fn run_twice(&self) -> u64 {
         self.number(
@@ -52,8 +52,8 @@ impl JournalView {
     }
 }
 
-/// Tear the end off the log of a journal whose process is gone, as a machine may that loses its power: this share of it is left. How
-/// many bytes are.
+/// Truncate the log of a journal whose process has ended to this share of its length, as a power failure may. Returns the bytes that
+/// remain.
 ///
 /// # Panics
 /// When there is no log.
@@ -67,7 +67,7 @@ pub fn tear(folder: &Path, share: f64) -> u64 {
     left
 }
 
-/// Damage the bytes of one of the outputs in a journal whose process is gone; `false` if there is none.
+/// Damage the bytes of one output in a journal whose process has ended; `false` if the journal has no output.
 ///
 /// # Panics
 /// When there is no journal.

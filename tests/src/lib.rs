@@ -2,8 +2,8 @@
 
 use std::time::Duration;
 
-/// How long a test waits for an event that normally comes within milliseconds. It fails after that. So long because other programs may
-/// keep every processor busy, and because a test that passes never waits for it.
+/// How long a test waits for an event that normally comes within milliseconds, before it fails. Long, because other programs may occupy
+/// every processor; a passing test never waits that long.
 pub const PATIENCE: Duration = Duration::from_secs(120);
 
 pub mod cluster;

@@ -1,5 +1,5 @@
-//! Light workers: many connections that speak the whole protocol from one process. They execute nodes on the task that reads, so only
-//! short ones will do.
+//! Light workers: many connections that speak the whole protocol from one process. They execute nodes on the task that reads, so nodes
+//! must be short.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -20,16 +20,16 @@ use tokio::time::interval;
 
 use crate::nodes::registry;
 
-/// File descriptors that a process needs for anything else.
+/// File descriptors that this process needs beside the sockets.
 const OTHER_FILES: u64 = 100;
 
-/// What a light worker keeps of decoded inputs.
+/// How many bytes of decoded inputs a light worker keeps.
 const DECODED_BYTES: usize = 1 << 20;
 
-/// Let this process open so many sockets.
+/// Raise this process's limit of file descriptors so that it can open this many sockets.
 ///
 /// # Errors
-/// When the system does not: what to do about it.
+/// When the limit cannot be raised: the message says what to do.
 pub fn allow_sockets(count: u64) -> Result<(), String> {
     let wanted = count + OTHER_FILES;
     let (soft, hard) = getrlimit(Resource::RLIMIT_NOFILE).map_err(|error| error.to_string())?;
@@ -42,7 +42,7 @@ pub fn allow_sockets(count: u64) -> Result<(), String> {
     setrlimit(Resource::RLIMIT_NOFILE, wanted, hard.max(wanted)).map_err(refused)
 }
 
-/// Light workers that are connected, or were.
+/// Light workers, connected or finished.
 #[derive(Debug)]
 pub struct LightWorkers {
     runtime: Runtime,
@@ -50,21 +50,21 @@ pub struct LightWorkers {
 }
 
 impl LightWorkers {
-    /// Let so many workers join.
+    /// Connect this many workers.
     ///
     /// # Panics
-    /// When there is no runtime for them.
+    /// When the runtime cannot be started.
     #[must_use]
     pub fn join(access: &Access, count: u32) -> Self {
         let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(1).enable_all().build();
         let runtime = runtime.expect("a tokio runtime");
-        // Each a process of its own, as far as it says; none is one that could be signalled.
+        // Each worker reports a process id of its own, above those of real processes, so that none can be signalled.
         let processes = (0..count).map(|index| (1 << 30) + index);
         let connections = processes.map(|process| runtime.spawn(work(access.clone(), process))).collect();
         Self { runtime, connections }
     }
 
-    /// Wait until all were told to end.
+    /// Wait until the coordinator has told all of them to end.
     ///
     /// # Panics
     /// When a connection ended in another way.
@@ -76,7 +76,7 @@ impl LightWorkers {
     }
 }
 
-/// One worker, from its connection to the coordinator's word that the run is over.
+/// One worker, from its connection to the coordinator's message that the run is over.
 async fn work(access: Access, process: u32) -> Result<(), WireError> {
     let mut stream = connect(TcpStream::connect(&access.address).await?, access.certificate).await?;
     let channel = channel_binding(stream.get_ref().1).map_err(std::io::Error::other)?;
@@ -101,7 +101,7 @@ struct Worker<S> {
     decoded: Arc<DecodedCache>,
     blobs: BTreeMap<BlobHash, Blob>,
     transfer: Option<IncomingBlob>,
-    /// Assigned nodes, by number; those whose inputs are not there wait.
+    /// Assigned nodes, by number; nodes without all their inputs wait.
     assigned: BTreeMap<u64, Assignment>,
 }
 
@@ -148,7 +148,7 @@ impl<S: tokio::io::AsyncRead + tokio::io::AsyncWrite + Unpin> Worker<S> {
         }
     }
 
-    /// Execute what can be executed.
+    /// Execute the nodes whose inputs are complete.
     async fn execute(&mut self) -> Result<(), WireError> {
         let inputs_of = |assignment: &Assignment| -> Option<Vec<Blob>> {
             assignment.inputs.iter().map(|hash| self.blobs.get(&BlobHash(*hash)).cloned()).collect()

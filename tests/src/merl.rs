@@ -1,4 +1,4 @@
-//! Measured materials that need no file: closed formulas, written in MERL's format.
+//! Materials in MERL's format from closed formulas, without files of measurements.
 
 use lookalike::{
     brdf::Reflectance,
@@ -9,10 +9,10 @@ use std::f64::consts::{FRAC_PI_2, PI};
 /// `theta_h`, `theta_d`, `phi_d`.
 const CELLS: [usize; 3] = [90, 90, 180];
 
-/// Stored values are to be multiplied by these.
+/// Stored values are multiplied by these.
 const SCALE: [f64; 3] = [1.0 / 1500.0, 1.15 / 1500.0, 1.66 / 1500.0];
 
-/// The file of a material: its values at the centres of the cells, -1 below the horizon, as the real files have it.
+/// The file of a material: its values at the centres of the cells, -1 below the horizon, as in the original files.
 #[must_use]
 pub fn file_of(material: &dyn Reflectance) -> Vec<u8> {
     let mut planes: [Vec<u8>; 3] = Default::default();
@@ -33,7 +33,7 @@ pub fn file_of(material: &dyn Reflectance) -> Vec<u8> {
     header.chain(planes.concat()).collect()
 }
 
-/// Light and view, local, normal +Z, at the centre of a cell.
+/// Directions of light and view at the centre of a cell, local, normal +Z.
 fn directions(cell: [usize; 3]) -> (Vec3, Vec3) {
     let centre = |axis: usize| (cell[axis] as f64 + 0.5) / CELLS[axis] as f64;
     let root = centre(0);

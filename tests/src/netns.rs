@@ -1,18 +1,18 @@
-//! A machine of its own for a worker: a network namespace with two cables to this one, of which a test can pull one.
+//! A network namespace for a worker with two cables to this machine; a test can cut one of them.
 //!
 //! ```text
-//!   this machine ---- line ----- worker's namespace     what the worker and its coordinator say
-//!                ---- control --                        what nodes say to the test; never hurt
+//!   this machine ---- line ----- worker's namespace     between worker and coordinator; tests cut it
+//!                ---- control --                        between nodes and test; never cut
 //! ```
-//! Needs root and iproute2. One direction goes silent by a wrong hardware address for the other end: packets leave and nobody takes
-//! them, which needs no packet filter.
+//! Needs root and iproute2. One direction is silenced by a wrong hardware address for the other end: packets leave and are not received.
+//! This needs no packet filter.
 
 use std::net::IpAddr;
 use std::path::Path;
 use std::process::Command;
 use std::sync::atomic::{AtomicU32, Ordering};
 
-/// A namespace, gone when dropped, with all processes in it.
+/// A namespace; dropping it ends all its processes and removes it.
 #[derive(Debug)]
 pub struct Namespace {
     name: String,
@@ -31,22 +31,22 @@ struct Cable {
     far: String,
 }
 
-/// A hardware address that nobody has.
+/// A hardware address that no interface has.
 const NOBODY: &str = "02:00:00:00:00:01";
 
 impl Namespace {
-    /// A namespace; says why there is none where it cannot be made.
+    /// Create a namespace; where that is impossible, `None`, with the reason on stderr.
     #[must_use]
     pub fn new() -> Option<Self> {
         static COUNT: AtomicU32 = AtomicU32::new(0);
-        // Other test processes have other numbers, as far as there are enough.
+        // Other test processes have other ids; the lowest 12 bits are used.
         let (number, serial) = (std::process::id() & 0xfff, COUNT.fetch_add(1, Ordering::Relaxed));
         let name = format!("lk{number}-{serial}");
         if let Err(why) = try_ip(&format!("netns add {name}")) {
             skip(&why);
             return None;
         }
-        // Sixteen cables for each process: more than its tests have at a time.
+        // Sixteen cables for each process: more than its tests use at a time.
         let cable = |kind: &str, index: u32| Cable::new(&name, kind, number_of(number, serial * 2 + index));
         let namespace = Self { line: cable("l", 0), control: cable("c", 1), name };
         let laid = namespace.line.lay(&namespace.name).and_then(|()| namespace.control.lay(&namespace.name));
@@ -59,7 +59,7 @@ impl Namespace {
         }
     }
 
-    /// This machine's address on the line: where a coordinator has to listen.
+    /// This machine's address on the line, where the coordinator must listen.
     ///
     /// # Panics
     /// Never.
@@ -68,7 +68,7 @@ impl Namespace {
         self.line.near.parse().expect("an address")
     }
 
-    /// This machine's address on the control cable: where a gate has to be.
+    /// This machine's address on the control cable, where a gate must listen.
     ///
     /// # Panics
     /// Never.
@@ -77,7 +77,7 @@ impl Namespace {
         self.control.near.parse().expect("an address")
     }
 
-    /// A program that is to run in there. The process is that of the program itself.
+    /// A command that runs in the namespace. The process is that of the program itself.
     #[must_use]
     pub fn command(&self, program: impl AsRef<Path>) -> Command {
         let mut command = Command::new("ip");
@@ -85,35 +85,35 @@ impl Namespace {
         command
     }
 
-    /// Pull the cable: silence both ways, and no end.
+    /// Cut the line: silence in both directions, and no end of the connection.
     ///
     /// # Panics
-    /// When the system does not let us.
+    /// When the command fails.
     pub fn cut(&self) {
         ip(&format!("link set {} down", self.line.here));
     }
 
-    /// Plug the cable in again.
+    /// Restore the line.
     ///
     /// # Panics
-    /// When the system does not let us.
+    /// When the command fails.
     pub fn heal(&self) {
         ip(&format!("link set {} up", self.line.here));
     }
 
-    /// This machine hears no more of what the namespace says on the line; the other way all is well.
+    /// Drop what the namespace sends on the line; the other direction works.
     ///
     /// # Panics
-    /// When the system does not let us.
+    /// When the command fails.
     pub fn mute(&self) {
         let Cable { near, there, .. } = &self.line;
         ip(&format!("-n {} neigh replace {near} lladdr {NOBODY} dev {there} nud permanent", self.name));
     }
 
-    /// The namespace hears no more of what this machine says on the line; the other way all is well.
+    /// Drop what this machine sends on the line; the other direction works.
     ///
     /// # Panics
-    /// When the system does not let us.
+    /// When the command fails.
     pub fn deafen(&self) {
         let Cable { far, here, .. } = &self.line;
         ip(&format!("neigh replace {far} lladdr {NOBODY} dev {here} nud permanent"));
@@ -139,7 +139,7 @@ impl Drop for Namespace {
         for process in pids.split_whitespace() {
             let _ = Command::new("kill").args(["-KILL", process]).status();
         }
-        // The other ends of its cables go with it; those of cables that were not laid into it have to be taken away.
+        // Cables in the namespace are removed with it; cables that were never moved into it have to be deleted.
         for cable in [&self.line, &self.control] {
             let _ = try_ip(&format!("link del {}", cable.here));
         }
@@ -147,13 +147,13 @@ impl Drop for Namespace {
     }
 }
 
-/// The number of a cable among all: there are addresses for 32768 of them.
+/// The number of a cable among all; there are addresses for 32768 cables.
 fn number_of(process: u32, serial: u32) -> u32 {
     (process & 0x7ff) * 16 + serial % 16
 }
 
 impl Cable {
-    /// The cable of this number: four addresses of 198.18.0.0/15 each.
+    /// The cable of this number; each has four addresses of 198.18.0.0/15.
     fn new(namespace: &str, kind: &str, number: u32) -> Self {
         let address = |host: u32| {
             let [_, b, c, d] = (0xc612_0000 + number * 4 + host).to_be_bytes();
@@ -198,7 +198,7 @@ mod tests {
     use std::collections::BTreeSet;
 
     #[test]
-    fn cables_of_a_process_and_of_its_neighbours_have_addresses_of_their_own() {
+    fn cables_of_neighbouring_processes_have_different_addresses() {
         let cables = (0..3).flat_map(|process| (0..16).map(move |serial| number_of(process, serial)));
         assert_eq!(cables.map(|number| Cable::new("n", "l", number).near).collect::<BTreeSet<_>>().len(), 48);
         let last = Cable::new("n", "l", number_of(u32::MAX, 15));

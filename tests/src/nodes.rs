@@ -1,4 +1,4 @@
-//! Node types of the cluster suite: small, pure as far as their outputs go, some of them murderous.
+//! Node types of the cluster suite: small; their outputs are pure functions; some of them abort their process.
 
 use std::io::{Read, Write};
 use std::net::TcpStream;
@@ -14,7 +14,7 @@ pub fn registry() -> Registry {
     Registry::default().with(Digest).with(Grow).with(Fail).with(Panic).with(Abort).with(Gate)
 }
 
-/// Those of fits, but that the outputs of one kind are wrong by one bit.
+/// The node types of fits, of which one kind returns outputs with one wrong bit.
 #[must_use]
 pub fn lying_registry(kind: &str) -> Registry {
     let honest = nodes::registry();
@@ -25,7 +25,7 @@ pub fn lying_registry(kind: &str) -> Registry {
     })
 }
 
-/// A node type of fits, perhaps wrong.
+/// A node type of fits whose outputs may be wrong.
 struct Perhaps {
     kind: &'static str,
     honest: Arc<Registry>,
@@ -39,7 +39,7 @@ impl NodeType for Perhaps {
 
     fn run(&self, parameters: &[u8], inputs: &[Blob], context: &RunContext) -> Result<Vec<u8>, NodeFailure> {
         let mut output = self.honest.run(self.kind, parameters, inputs, context)?.to_vec();
-        // Outputs are mostly numbers: one of them is another one now.
+        // Outputs are mostly numbers; this changes one of them.
         let middle = output.len() / 2;
         output.get_mut(middle).into_iter().for_each(|byte| *byte ^= u8::from(self.lies));
         Ok(output)
@@ -64,7 +64,7 @@ impl NodeType for Digest {
     }
 }
 
-/// As many bytes as the parameters say (eight, little-endian), made from the inputs.
+/// As many bytes as the parameters say (eight bytes, little-endian), made from the inputs.
 struct Grow;
 
 impl NodeType for Grow {
@@ -107,7 +107,7 @@ impl NodeType for Panic {
     }
 }
 
-/// Aborts its process, once if the parameters name a file: the file remembers.
+/// Aborts its process. If the parameters name a file, it creates the file and aborts only once.
 struct Abort;
 
 impl NodeType for Abort {
@@ -128,8 +128,9 @@ impl NodeType for Abort {
     }
 }
 
-/// Tells a listener (its address is the parameters, up to a `#` that makes nodes different) which process it runs in and waits for one byte: a test knows that the
-/// node is executing (and a quarter done), decides how it goes on, and sees the death of the process as the end of the stream.
+/// Sends the id of its process to a listener and waits for one byte. The parameters are the listener's address; text after a `#` makes
+/// nodes different. The test thus knows that the node executes (and is a quarter done), decides when it continues, and sees the end of
+/// the process as the end of the stream.
 struct Gate;
 
 impl NodeType for Gate {

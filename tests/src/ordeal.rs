@@ -1,8 +1,8 @@
-//! A real fit under a seeded mix of everything that may happen to its processes: killed, stopped and drained workers, a worker whose
-//! wire is cut or goes silent, a killed coordinator that another one goes on for, its journal torn or damaged in between.
+//! A real fit under a seeded mix of faults: workers killed, stopped and drained; a worker whose proxy is cut or silent; a coordinator
+//! killed and replaced by another, its journal truncated or damaged in between.
 //!
-//! What happens is a function of the seed and of how many events the coordinator has told of; so a seed does not replay to the
-//! instruction, but the same kinds of faults come at about the same places.
+//! Faults are a function of the seed and of how many events the coordinator has reported. A seed does not replay exactly, but the same
+//! kinds of faults come at about the same events.
 
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -21,41 +21,41 @@ use crate::proxy::Proxy;
 /// How many faults there are in a run, at least and at most.
 const FAULTS: (u64, u64) = (4, 9);
 
-/// How many workers are killed at most: one that dies all the time is given up for good.
+/// The most workers that are killed: the coordinator stops replacing one that keeps dying.
 const MOST_KILLS: u32 = 5;
 
-/// How many coordinators are killed at most.
+/// The most coordinators that are killed.
 const MOST_COORDINATORS: u32 = 3;
 
-/// A fit, and what is to become of it.
+/// A fit and the seed of its faults.
 #[derive(Clone, Debug)]
 pub struct Ordeal<'a> {
     /// The program `lookalike`.
     pub program: &'a str,
     /// A folder with the inputs.
     pub folder: &'a Path,
-    /// All of the command line that shapes the result, such as `fit photo.exr --env map.exr`.
+    /// The part of the command line that determines the result, such as `fit photo.exr --env map.exr`.
     pub arguments: &'a str,
-    /// The folder of results in it.
+    /// The folder of results, below `folder`.
     pub out: &'a str,
-    /// What happens.
+    /// The seed of the faults.
     pub seed: u64,
 }
 
-/// How a fit came through.
+/// What happened in a completed fit.
 #[derive(Clone, Debug, Default)]
 pub struct Ending {
-    /// What was done to it, and how often.
+    /// The faults, and how often each happened.
     pub faults: BTreeMap<&'static str, u32>,
-    /// How many coordinators it has had.
+    /// How many coordinators the fit had.
     pub coordinators: u32,
-    /// How many outputs were damaged: so many may be computed again.
+    /// How many outputs were damaged; as many may be computed again.
     pub damaged: u64,
-    /// How many nodes were given out though an earlier coordinator had acknowledged their outputs.
+    /// How many nodes were assigned although an earlier coordinator had acknowledged their outputs.
     pub run_twice: u64,
 }
 
-/// One thing that may happen.
+/// A kind of fault.
 #[derive(Clone, Copy, Debug)]
 enum Fault {
     KillWorker,
@@ -89,10 +89,10 @@ impl Fault {
 }
 
 impl Ordeal<'_> {
-    /// Run the fit to its end. It has two workers of its own, and one on a wire.
+    /// Run the fit to its end, with two local workers and one behind a proxy.
     ///
     /// # Panics
-    /// When it fails, or nothing is heard of it any more.
+    /// When it fails, or reports no event for too long.
     #[must_use]
     pub fn run(&self) -> Ending {
         let mut run = Run {
@@ -136,15 +136,15 @@ struct Run<'a> {
     ending: Ending,
     /// How many random numbers were drawn.
     chance: u64,
-    /// How many events were told.
+    /// How many events were reported.
     told: u64,
     next_fault: u64,
     faults_left: u64,
-    /// Whether this coordinator has given out a node.
+    /// Whether this coordinator has assigned a node.
     has_begun: bool,
     /// The processes of the workers, by number.
     members: BTreeMap<u64, u32>,
-    /// Processes that were stopped, and when they go on.
+    /// Processes that were stopped, and the event count at which each continues.
     stopped: Vec<(u32, u64)>,
     silent_until: Option<u64>,
     wire: Option<Proxy>,
@@ -152,14 +152,14 @@ struct Run<'a> {
     seen: Processes,
 }
 
-/// What a coordinator came to.
+/// Whether a coordinator continues or was killed.
 enum Fate {
     Goes,
     Killed,
 }
 
 impl Run<'_> {
-    /// Let a coordinator work until it has ended the run (`true`) or is killed.
+    /// Run a coordinator until it has ended the run (`true`) or is killed.
     fn coordinate(&mut self) -> bool {
         self.ending.coordinators += 1;
         self.has_begun = false;
@@ -185,7 +185,7 @@ impl Run<'_> {
         panic!("the coordinator has ended without a word: {:?}", coordinator.output());
     }
 
-    /// Keep track of what is told.
+    /// Record a reported event.
     fn heed(&mut self, event: &Value) {
         self.told += 1;
         let (worker, process) = (event["worker"].as_u64(), event["process"].as_u64());
@@ -196,7 +196,7 @@ impl Run<'_> {
             (Some("worker-joined"), Some(worker), Some(process)) => _ = self.members.insert(worker, process),
             (Some("worker-left"), Some(worker), _) => {
                 if let Some(process) = self.members.remove(&worker) {
-                    // It was stopped, or not heard, for long enough.
+                    // The worker was stopped, or cut off, for longer than its lease.
                     self.stopped
                         .iter_mut()
                         .filter(|(stopped, _)| *stopped == process)
@@ -212,12 +212,12 @@ impl Run<'_> {
         self.mend();
     }
 
-    /// The wire ends where the coordinator listens, now and after each resumption.
+    /// Connect the proxy to the coordinator's address, now and after each resumption.
     fn lay_wire(&mut self, coordinator: &str) {
         self.wire.get_or_insert_with(|| Proxy::to(coordinator));
     }
 
-    /// Let go on what was stopped for long enough, and let another remote worker come when one has ended.
+    /// Continue the processes that were stopped for long enough, and start another remote worker when one has ended.
     fn mend(&mut self) {
         let told = self.told;
         for (process, _) in self.stopped.extract_if(.., |(_, until)| *until <= told) {
@@ -236,7 +236,7 @@ impl Run<'_> {
         }
     }
 
-    /// When its moment has come, let something happen.
+    /// Cause the next fault when its time has come.
     fn perhaps_hurt(&mut self) -> Fate {
         if !self.has_begun || self.faults_left == 0 || self.told < self.next_fault {
             return Fate::Goes;
@@ -271,7 +271,7 @@ impl Run<'_> {
         Fate::Goes
     }
 
-    /// Some worker that is not stopped.
+    /// A random worker that is not stopped.
     fn victim(&mut self) -> Option<u32> {
         let is_stopped = |process: &u32| self.stopped.iter().any(|(stopped, _)| stopped == process);
         let running: Vec<u32> = self.members.values().copied().filter(|process| !is_stopped(process)).collect();
@@ -288,7 +288,7 @@ impl Run<'_> {
         self.ending.faults.get(fault.name()).is_some_and(|count| *count >= most)
     }
 
-    /// What a power cut or a bad disk leaves of a journal.
+    /// Damage the journal as a power failure or a bad disk may.
     fn hurt_the_journal(&mut self) {
         let (out, lot) = (self.ordeal.out(), self.random());
         if lot < 0.4 {
@@ -337,12 +337,12 @@ fn next(events: &Receiver<Value>) -> Option<Value> {
     }
 }
 
-/// All processes that were ever there: none stays behind.
+/// All processes ever started; dropping this kills those that remain.
 #[derive(Debug, Default)]
 struct Processes(Vec<u32>);
 
 impl Processes {
-    /// Signal a process that may have ended meanwhile.
+    /// Signal a process, which may have ended meanwhile.
     fn signal(&self, process: u32, name: &str) {
         if is_worker(process) {
             signal(process, name);
@@ -359,7 +359,7 @@ impl Drop for Processes {
     }
 }
 
-/// Whether a process lives and is a worker: numbers of processes are used again.
+/// Whether a process exists and is a worker; process ids are reused.
 fn is_worker(process: u32) -> bool {
     let line = std::fs::read(format!("/proc/{process}/cmdline")).unwrap_or_default();
     line.split(|byte| *byte == 0).any(|word| word == b"--access")

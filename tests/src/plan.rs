@@ -1,5 +1,5 @@
-//! Plans of the cluster suite: leaves on workers, their digest on the coordinator, a last node on a worker that is added
-//! when the digest is there. The result depends on every output.
+//! Plans of the cluster suite: leaves on workers, their digest on the coordinator, and a last node on a worker, added when the digest is
+//! complete. The result depends on every output.
 
 use lookalike::graph::{
     Blob, Execution, FailureReason, GraphEdit, Input, NodeId, NodeSpec, Placement, PlanError, Planner, run_in_process,
@@ -10,7 +10,7 @@ use crate::nodes::registry;
 /// What the leaves are.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Leaves {
-    /// So many digests of one shared blob of so many bytes.
+    /// This many digests of one shared blob.
     Digests {
         /// How many.
         count: usize,
@@ -22,29 +22,29 @@ pub enum Leaves {
         /// The size of the blob and of each output.
         bytes: usize,
     },
-    /// So many nodes that wait at a gate.
+    /// This many nodes that wait at a gate.
     Gates {
         /// How many.
         count: usize,
         /// Where.
         address: String,
     },
-    /// One node that aborts its process unless this file exists; it makes the file first, unless the name is empty.
+    /// One node that aborts its process unless this file exists; it creates the file before, unless the name is empty.
     Abort {
         /// The file.
         marker: String,
     },
-    /// So many nodes that wait at a gate, and perhaps one more, `murderer`, that always aborts its process. Whatever fails, the others
-    /// go on, and the result is that of those that complete.
+    /// This many nodes that wait at a gate, and possibly one more, `murderer`, that always aborts its process. If one fails, the others
+    /// continue, and the result is that of those that complete.
     Mob {
         /// How many wait at the gate.
         innocents: usize,
-        /// Whether there is a murderer.
+        /// Whether there is a node that always aborts its process.
         has_murderer: bool,
         /// Where the gate is.
         address: String,
     },
-    /// So many nodes that abort whatever process they run in, and a planner that does without them; then a digest of nothing.
+    /// This many nodes that abort any process they run in, and a planner that continues without them; then a digest of nothing.
     Killers {
         /// How many.
         count: usize,
@@ -56,7 +56,7 @@ pub enum Leaves {
     },
     /// One node that panics.
     Panic,
-    /// One node of a kind that nobody knows.
+    /// One node of an unregistered kind.
     Unknown,
     /// One node with an application error.
     Fail {
@@ -65,7 +65,7 @@ pub enum Leaves {
     },
 }
 
-/// Plans and remembers.
+/// Plans the nodes of some leaves and keeps the last output.
 #[derive(Debug)]
 pub struct TestPlanner {
     leaves: Leaves,
@@ -77,13 +77,13 @@ pub struct TestPlanner {
 }
 
 impl TestPlanner {
-    /// A planner that has done nothing yet.
+    /// A planner that has not started.
     #[must_use]
     pub fn new(leaves: Leaves) -> Self {
         Self { leaves, nodes: Vec::new(), open_leaves: 0, digest: None, result: None }
     }
 
-    /// What any run of these leaves has to result in, computed in this process.
+    /// The result that any run of these leaves must have, computed in this process.
     ///
     /// # Panics
     /// When the plan fails.
@@ -95,7 +95,7 @@ impl TestPlanner {
 }
 
 impl TestPlanner {
-    /// When the last leaf is done, their digest is next.
+    /// Count a completed leaf; after the last one, add the digest.
     fn leaf_is_done(&mut self, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
         self.open_leaves -= 1;
         if self.open_leaves == 0 {

@@ -1,11 +1,11 @@
-//! Real processes: to signal them, and to wait for them without ever hanging a test for good.
+//! Real processes: signals to them, and waiting with a time limit.
 
 use serde_json::Value;
 use std::io::{BufRead, BufReader, Write};
 use std::process::{Child, Command, Output, Stdio};
 use std::sync::mpsc::{Receiver, channel};
 
-/// A process that is killed when the test forgets it.
+/// A process that is killed on drop.
 #[derive(Debug)]
 pub struct Process(Option<Child>);
 
@@ -26,8 +26,8 @@ impl Process {
         self.0.as_ref().map_or(0, Child::id)
     }
 
-    /// Read its stderr up to the first line that `pick` takes, each as JSON where it is JSON; `None` if it ends before. What is still
-    /// said after that is lost.
+    /// Read its stderr up to the first line that `pick` accepts; each line as JSON if it is JSON. `None` if the stream ends before. Later
+    /// output is lost.
     ///
     /// # Panics
     /// When it cannot be read.
@@ -39,17 +39,17 @@ impl Process {
         })
     }
 
-    /// Read its stderr in a thread of its own, each line as JSON where it is JSON, for as long as it or another process that shares it
-    /// lives. What is read is copied to `log`.
+    /// Read its stderr in a separate thread; each line as JSON if it is JSON. The thread reads until this process and all that share its
+    /// stderr have ended. Lines are copied to `log`.
     ///
     /// # Panics
-    /// When it is watched already.
+    /// When its stderr is already being read.
     pub fn follow_stderr(&mut self, mut log: impl Write + Send + 'static) -> Receiver<Value> {
         let stderr = self.0.as_mut().and_then(|child| child.stderr.take()).expect("a process that is watched once");
         let (sender, lines) = channel();
         std::thread::spawn(move || {
             for line in BufReader::new(stderr).lines().map_while(Result::ok) {
-                // The log is for whoever looks into a failure, and nobody may listen any more.
+                // The log helps to explain a failure; the receiver may be gone.
                 let _ = writeln!(log, "{line}");
                 let _ = sender.send(serde_json::from_str(&line).unwrap_or(Value::String(line)));
             }
@@ -60,12 +60,12 @@ impl Process {
     /// Whether it has ended.
     ///
     /// # Panics
-    /// When the system does not tell.
+    /// When the system cannot say.
     pub fn has_ended(&mut self) -> bool {
         self.0.as_mut().is_none_or(|child| child.try_wait().expect("a child of ours").is_some())
     }
 
-    /// Kill it with SIGKILL, and wait until it is gone. Processes that it has started are not.
+    /// Kill it with SIGKILL and wait for its end. Processes that it has started continue.
     ///
     /// # Panics
     /// When it cannot be killed.
@@ -75,11 +75,11 @@ impl Process {
         child.wait().expect("an end");
     }
 
-    /// Wait for its end, and for that of all who share its stderr; `watch` is told of each line of it, as part of all lines so far:
-    /// JSON where it is JSON, else a string.
+    /// Wait for its end and that of all processes that share its stderr. `watch` gets all lines so far after each new line: JSON where a
+    /// line is JSON, else a string.
     ///
     /// # Panics
-    /// When it cannot be waited for, or says what is not UTF-8.
+    /// When it cannot be waited for, or its output is not UTF-8.
     #[must_use]
     pub fn watch_stderr(mut self, mut watch: impl FnMut(&[Value])) -> (Output, Vec<Value>) {
         let stderr = self.0.as_mut().and_then(|child| child.stderr.take()).expect("a process that is watched once");
@@ -112,10 +112,10 @@ impl Drop for Process {
     }
 }
 
-/// Kill a process with SIGKILL that may have ended by itself.
+/// Kill a process with SIGKILL; it may have ended already.
 ///
 /// # Panics
-/// When the number is not that of a process of ours.
+/// When the id is 0 or 1.
 pub fn kill_if_alive(process: u32) {
     assert!(process > 1, "not a process of ours: {process}");
     // An error means that it has ended.

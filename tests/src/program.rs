@@ -6,8 +6,8 @@
 //!   lookalike-test-cluster resume COUNT ADDRESS WORKERS ACCESS_FILE
 //!   lookalike-test-cluster liar KIND --access FILE ...
 //! ```
-//! `resume` keeps a journal beside the access file, or goes on with the run in it. `liar` is a worker for fits whose outputs of one
-//! kind of node are wrong by one bit.
+//! `resume` keeps a journal beside the access file, or resumes the run in it. `liar` is a worker for fits whose outputs of one kind of
+//! node are wrong by one bit.
 
 use std::io::Write;
 use std::path::Path;
@@ -55,7 +55,7 @@ pub fn main() -> ExitCode {
     }
     match coordinate(Leaves::Gates { count, address: address.to_owned() }, options) {
         Ok(result) => {
-            // Nobody reads it when the test is over.
+            // A write fails if the test has ended meanwhile.
             let _ = writeln!(std::io::stdout(), "{result:?}");
             ExitCode::SUCCESS
         }

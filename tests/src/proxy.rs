@@ -1,6 +1,6 @@
-//! A wire between a worker and its coordinator in the hands of a test: it counts bytes, stops, stays silent, breaks.
+//! A proxy between a worker and its coordinator, controlled by a test: it counts, holds back and drops bytes and breaks connections.
 //!
-//! Everything on it is encrypted, so what it can tell and do is about bytes and connections, as with a real one.
+//! All traffic is encrypted, so the proxy sees and affects only bytes and connections, as a real network does.
 
 use std::io::{ErrorKind, Read, Write};
 use std::net::{Shutdown, SocketAddr, TcpListener, TcpStream};
@@ -9,10 +9,10 @@ use std::thread;
 
 use crate::PATIENCE;
 
-/// How much is recorded.
+/// The most bytes that are recorded.
 const RECORD_BYTES: usize = 64 << 10;
 
-/// Where bytes go.
+/// A direction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Way {
     /// From the worker to the coordinator.
@@ -21,7 +21,7 @@ pub enum Way {
     Down,
 }
 
-/// A wire that worker after worker may use.
+/// A proxy that several workers may use one after the other.
 #[derive(Debug)]
 pub struct Proxy {
     address: SocketAddr,
@@ -34,23 +34,23 @@ struct Wire {
     changed: Condvar,
 }
 
-/// What has passed and what may, since the last connection began.
+/// Bytes that have passed and may pass, since the last connection began.
 #[derive(Debug, Default)]
 struct State {
     passed: [u64; 2],
     allowed: [Option<u64>; 2],
-    /// Bytes that wait to be allowed.
+    /// Directions in which bytes wait to be allowed.
     stopped: [bool; 2],
     connections: u64,
-    /// What went up first.
+    /// The first bytes that the worker sent.
     record: Vec<u8>,
-    /// Both ends of what is connected.
+    /// Both ends of each connection.
     streams: Vec<TcpStream>,
     is_over: bool,
 }
 
 impl Proxy {
-    /// A wire to this coordinator.
+    /// A proxy for this coordinator.
     ///
     /// # Panics
     /// When the system has no free port.
@@ -64,24 +64,24 @@ impl Proxy {
         Self { address, wire }
     }
 
-    /// What to tell the worker with `--address`.
+    /// The address for the worker's `--address`.
     #[must_use]
     pub fn address(&self) -> String {
         self.address.to_string()
     }
 
-    /// Let only so many bytes through on this way, counted from the begin of each connection; `None`: all. The end of a stream does
-    /// not get past bytes that wait.
+    /// Let at most this many bytes through in this direction, counted from the start of each connection; `None`: all. The end of a stream
+    /// waits behind the bytes that wait.
     pub fn allow(&self, way: Way, bytes: Option<u64>) {
         let mut state = self.wire.lock();
         state.allowed[way as usize] = bytes;
-        // Whoever has to wait still will say so again.
+        // A thread that still has to wait sets this again.
         state.stopped[way as usize] = false;
         drop(state);
         self.wire.changed.notify_all();
     }
 
-    /// Let nothing more through on either way: silence, and no end. Undone by [`heal`](Self::heal).
+    /// Let nothing through in either direction, without ending the connections. Undone by [`heal`](Self::heal).
     pub fn silence(&self) {
         let mut state = self.wire.lock();
         state.allowed = [Some(0), Some(0)];
@@ -94,22 +94,22 @@ impl Proxy {
         self.wire.changed.notify_all();
     }
 
-    /// Wait until bytes have to wait on this way, and return how many have passed.
+    /// Wait until bytes are held back in this direction, and return how many have passed.
     ///
     /// # Panics
-    /// When none come.
+    /// When none arrive in time.
     #[must_use]
     pub fn wait_for_stop(&self, way: Way) -> u64 {
         self.wire.wait_while(|state| !state.stopped[way as usize]).passed[way as usize]
     }
 
-    /// How many bytes have passed on this way since the last connection began.
+    /// How many bytes have passed in this direction since the last connection began.
     #[must_use]
     pub fn passed(&self, way: Way) -> u64 {
         self.wire.lock().passed[way as usize]
     }
 
-    /// The first bytes of all that the last worker has sent, as somebody on the wire sees them: 64 KiB at most.
+    /// The first bytes that the last worker sent, as seen on the network: 64 KiB at most.
     #[must_use]
     pub fn record(&self) -> Vec<u8> {
         self.wire.lock().record.clone()
@@ -124,7 +124,7 @@ impl Proxy {
         self.wire.changed.notify_all();
     }
 
-    /// Break all connections; what waits is lost. New ones may come.
+    /// Break all connections; bytes held back are lost. New connections are accepted.
     pub fn cut(&self) {
         self.wire.lock().cut();
         self.wire.changed.notify_all();
@@ -145,7 +145,7 @@ impl Drop for Proxy {
 
 impl State {
     fn cut(&mut self) {
-        // An error means that it is broken already.
+        // An error means that the connection is broken already.
         self.streams.drain(..).for_each(|stream| _ = stream.shutdown(Shutdown::Both));
     }
 }
@@ -169,7 +169,7 @@ impl Wire {
             if state.is_over {
                 return;
             }
-            // No coordinator at the moment: the worker sees its connection closed.
+            // There is no coordinator at the moment: the worker sees its connection closed.
             let Ok(above) = TcpStream::connect(coordinator) else { continue };
             state.passed = [0, 0];
             state.stopped = [false, false];
@@ -187,7 +187,7 @@ impl Wire {
         }
     }
 
-    /// Carry bytes one way until the end.
+    /// Copy bytes in one direction until the end of the stream.
     fn carry(&self, way: Way, number: u64, mut from: TcpStream, mut to: &TcpStream) {
         let mut buffer = [0; 4096];
         loop {
@@ -209,15 +209,15 @@ impl Wire {
                 }
             }
             if count == 0 {
-                // The other side may still have something to say.
+                // The other direction stays open.
                 let _ = to.shutdown(Shutdown::Write);
                 return;
             }
         }
     }
 
-    /// How many of so many bytes may pass now; waits until one may, and the end of a stream until everything may. `None` when their
-    /// connection is broken.
+    /// How many of these bytes may pass now. Waits until at least one may, and for the end of a stream until everything may. `None` when
+    /// the connection is broken.
     fn take(&self, way: Way, number: u64, bytes: &[u8]) -> Option<usize> {
         let (is_up, way) = (way == Way::Up, way as usize);
         let mut state = self.lock();

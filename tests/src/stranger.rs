@@ -1,5 +1,5 @@
-//! The two ends of a connection in the hands of a test: a client that can say anything to a coordinator, and a coordinator that
-//! can say anything to a worker.
+//! Both ends of a connection, controlled by a test: a client that can send anything to a coordinator, and a coordinator that can send
+//! anything to a worker.
 
 use std::io::{self, Read, Write};
 use std::net::{SocketAddr, TcpListener, TcpStream};
@@ -21,7 +21,7 @@ use rustls::{ClientConnection, ServerConfig, ServerConnection, StreamOwned};
 use crate::PATIENCE;
 use crate::gate::is_end;
 
-/// The process id that liars give.
+/// The process id that false workers report.
 pub const LIAR: u32 = 77;
 
 /// A TLS connection to a coordinator.
@@ -30,17 +30,17 @@ pub type TlsClient = StreamOwned<ClientConnection, TcpStream>;
 /// A TLS connection from a worker.
 pub type TlsServer = StreamOwned<ServerConnection, TcpStream>;
 
-/// Connect without a word.
+/// Connect and send nothing.
 ///
 /// # Errors
-/// When nobody listens.
+/// When no process listens there.
 pub fn connect(address: &str) -> io::Result<TcpStream> {
     let stream = TcpStream::connect(address)?;
     stream.set_read_timeout(Some(PATIENCE))?;
     Ok(stream)
 }
 
-/// Wait until the other side has closed; a reset is as good as an end. What it said before.
+/// Read until the other side closes or resets the connection, and return the bytes.
 ///
 /// # Panics
 /// When it does not close in time.
@@ -79,13 +79,13 @@ pub fn proof_key(stream: &TlsClient, secret: &Secret) -> ProofKey {
     ProofKey::new(secret, &channel_binding(&stream.conn).expect("a connection after its handshake"))
 }
 
-/// Read the challenge, change the answer to it, and return the verdict with what it answers to.
+/// Read the challenge, send the answer after `change` was applied to it, and return the verdict with the answer.
 ///
 /// # Errors
 /// When the connection ends.
 ///
 /// # Panics
-/// When the coordinator does not speak as one.
+/// When the coordinator does not keep to the protocol.
 pub fn greet(
     stream: &mut TlsClient,
     secret: &Secret,
@@ -103,10 +103,10 @@ pub fn greet(
     Ok((challenge, response, Verdict::from_bytes(&verdict).expect("a verdict")))
 }
 
-/// Join as a worker with this many threads that is up to no good.
+/// Join as a false worker with this many threads.
 ///
 /// # Panics
-/// When the coordinator does not let it in.
+/// When the coordinator refuses it.
 #[must_use]
 pub fn join(access: &Access, threads: u32) -> TlsClient {
     let mut stream = connect_tls(access).expect("a TLS connection");
@@ -117,7 +117,7 @@ pub fn join(access: &Access, threads: u32) -> TlsClient {
     stream
 }
 
-/// The hello of a liar that was never here before.
+/// The hello of a false worker that joins for the first time.
 #[must_use]
 pub fn hello(threads: u32) -> Hello {
     static LIARS: AtomicU8 = AtomicU8::new(0);
@@ -128,7 +128,7 @@ pub fn hello(threads: u32) -> Hello {
 /// Send a message.
 ///
 /// # Panics
-/// When the other side is gone.
+/// When the connection is closed.
 pub fn say(stream: &mut impl Write, message: &ToCoordinator) {
     let body = encode_message(message).expect("a message");
     say_frame(stream, FrameTag::Message, &body);
@@ -137,16 +137,16 @@ pub fn say(stream: &mut impl Write, message: &ToCoordinator) {
 /// Send a frame.
 ///
 /// # Panics
-/// When the other side is gone.
+/// When the connection is closed.
 pub fn say_frame(stream: &mut impl Write, tag: FrameTag, body: &[u8]) {
     let header = frame_header(tag, body.len()).expect("a frame");
     stream.write_all(&[&header, body].concat()).expect("somebody who listens");
 }
 
-/// Read messages until `pick` takes one.
+/// Read messages until `pick` returns a value for one.
 ///
 /// # Panics
-/// When it does not come.
+/// When no such message comes.
 pub fn hear<T>(stream: &mut impl Read, mut pick: impl FnMut(ToWorker) -> Option<T>) -> T {
     let mut frames = FrameReader::default();
     let mut chunk = [0; 1024];
@@ -163,14 +163,14 @@ pub fn hear<T>(stream: &mut impl Read, mut pick: impl FnMut(ToWorker) -> Option<
     }
 }
 
-/// A port where somebody listens who only seems to be a coordinator.
+/// A listener that poses as a coordinator.
 #[derive(Debug)]
 pub struct FalseCoordinator {
     listener: TcpListener,
 }
 
 impl FalseCoordinator {
-    /// Listen.
+    /// Listen on a free port.
     ///
     /// # Panics
     /// When the system has no free port.
@@ -179,7 +179,7 @@ impl FalseCoordinator {
         Self { listener: TcpListener::bind("127.0.0.1:0").expect("a free port") }
     }
 
-    /// Where it listens.
+    /// The address on which it listens.
     ///
     /// # Panics
     /// When the system does not know its own socket.
@@ -188,10 +188,10 @@ impl FalseCoordinator {
         self.listener.local_addr().expect("the address of a bound socket")
     }
 
-    /// The next worker that comes.
+    /// The next worker that connects.
     ///
     /// # Panics
-    /// When none does.
+    /// When none connects in time.
     #[must_use]
     pub fn next(&self) -> TcpStream {
         let (stream, _) = self.listener.accept().expect("a worker");
@@ -199,7 +199,7 @@ impl FalseCoordinator {
         stream
     }
 
-    /// The next worker that comes, after a TLS handshake with this configuration.
+    /// The next worker that connects, after a TLS handshake with this configuration.
     ///
     /// # Errors
     /// When the worker refuses the handshake.
@@ -215,10 +215,10 @@ impl FalseCoordinator {
         Ok(StreamOwned::new(connection, stream))
     }
 
-    /// Whether another connection waits.
+    /// Whether another connection waits to be accepted.
     ///
     /// # Panics
-    /// When the socket does not work.
+    /// When the socket fails.
     #[must_use]
     pub fn is_called_again(&self) -> bool {
         self.listener.set_nonblocking(true).expect("a socket");
@@ -234,7 +234,7 @@ impl Default for FalseCoordinator {
     }
 }
 
-/// A new identity, as if made at `now`.
+/// A new identity, as if created at `now`.
 ///
 /// # Panics
 /// When the system gives no random bytes.
@@ -243,7 +243,7 @@ pub fn identity(now: SystemTime) -> Identity {
     Identity::new(now).expect("an identity")
 }
 
-/// The TLS of a coordinator of this identity.
+/// The TLS configuration of a coordinator with this identity.
 ///
 /// # Panics
 /// When rustls does not work.
@@ -252,10 +252,10 @@ pub fn tls_of(identity: &Identity) -> Arc<ServerConfig> {
     Arc::new(server_config(identity).expect("a usable identity"))
 }
 
-/// Tell a worker something.
+/// Send a message to a worker.
 ///
 /// # Panics
-/// When it is gone.
+/// When the connection is closed.
 pub fn tell(stream: &mut impl Write, message: &ToWorker) {
     let body = encode_message(message).expect("a message");
     say_frame(stream, FrameTag::Message, &body);
@@ -276,13 +276,13 @@ pub fn read_message(stream: &mut impl Read) -> ToCoordinator {
     }
 }
 
-/// Read a worker's answer to this challenge, and say a verdict.
+/// Send a worker this challenge, read its answer, and send the verdict that `judge` returns.
 ///
 /// # Errors
 /// When the worker ends the connection before.
 ///
 /// # Panics
-/// When the worker does not speak as one.
+/// When the worker does not keep to the protocol.
 pub fn challenge(
     stream: &mut TlsServer,
     challenge: &Challenge,

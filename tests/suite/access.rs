@@ -1,5 +1,5 @@
-//! An access file made before the run it is for, with the real program: made, taken by a fit, used by a worker that has a copy
-//! of nothing else.
+//! An access file created before its run, with the real program: created, used by a fit, and used by a worker that has a copy without the
+//! key.
 
 use crate::program::{image, lookalike, write_exr};
 use lookalike_tests::process::{Process, stderr};
@@ -25,7 +25,7 @@ fn start(folder: &Path, arguments: &str) -> Process {
 }
 
 #[test]
-fn a_fit_takes_it_and_a_worker_needs_only_the_copy_without_the_key() {
+fn fit_uses_an_access_file_and_its_worker_a_copy_without_the_key() {
     let (folder, elsewhere) = (scene(), tempfile::tempdir().unwrap());
     // A port that was free a moment ago.
     let address = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
@@ -36,13 +36,13 @@ fn a_fit_takes_it_and_a_worker_needs_only_the_copy_without_the_key() {
     for output in [fit.output(), worker.output()] {
         assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
     }
-    // Its own copy would be one more file to keep secret.
+    // A copy in the run's folder would be one more file to keep secret.
     assert!(!folder.path().join("run/access.json").exists());
     assert!(folder.path().join("run/fit.json").exists());
 }
 
 #[test]
-fn a_fit_listens_elsewhere_only_when_it_is_told_to() {
+fn fit_listens_on_another_interface_only_when_told_to() {
     let folder = scene();
     lookalike(folder.path(), "access new --address node7:4100 -o cluster.json").done();
     let answer = lookalike(folder.path(), &format!("{FIT} --workers 0 --access cluster.json"));
@@ -50,7 +50,7 @@ fn a_fit_listens_elsewhere_only_when_it_is_told_to() {
 }
 
 #[test]
-fn a_fit_refuses_an_access_file_without_its_key() {
+fn fit_refuses_an_access_file_without_its_key() {
     let folder = scene();
     lookalike(folder.path(), "access new --address 127.0.0.1:4100 -o cluster.json").done();
     fs::remove_file(folder.path().join("cluster.key.pem")).unwrap();

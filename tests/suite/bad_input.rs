@@ -1,4 +1,4 @@
-//! Files that cannot be used: the real binary says which, why and what to do, with code 2, and never panics.
+//! Unusable files: the real program names the file, the reason and the remedy, exits with code 2, and never panics.
 
 use crate::program::{image, lookalike, write_exr, write_merl, write_png};
 use lookalike::{
@@ -15,7 +15,7 @@ fn grey(width: usize, height: usize) -> Image {
     image(width, height, |_, _| [0.5; 3])
 }
 
-/// A folder of files that can be used, and of some that cannot.
+/// A folder of usable and unusable files.
 fn folder() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);
@@ -41,7 +41,7 @@ fn folder() -> tempfile::TempDir {
 const PAINT: &str = "render --model ggx --params kd=.5,f0=.04,alpha=.1 --size 8 --samples 1 -o out.exr";
 
 #[test]
-fn environment_maps() {
+fn unusable_environment_maps_are_refused() {
     let folder = folder();
     for (file, phrases) in [
         ("missing.exr", &["there is no such file; check the path"][..]),
@@ -66,7 +66,7 @@ fn environment_maps() {
 }
 
 #[test]
-fn measured_materials() {
+fn unusable_measured_materials_are_refused() {
     let folder = folder();
     let at = |name: &str| folder.path().join(name);
     write_merl(&at("good.binary"), [0.1; 3]);
@@ -92,7 +92,7 @@ fn measured_materials() {
 }
 
 #[test]
-fn normal_maps() {
+fn unusable_normal_maps_are_refused() {
     let folder = folder();
     let at = |name: &str| folder.path().join(name);
     write_exr(&at("away.exr"), &image(8, 8, |_, _| [0.0, 0.0, -1.0]));
@@ -113,7 +113,7 @@ fn normal_maps() {
 }
 
 #[test]
-fn images_to_compare() {
+fn unusable_images_to_compare_are_refused() {
     let folder = folder();
     for (files, phrases) in [
         ("missing.exr photo.exr", &["cannot use missing.exr as the reference", "no such file"][..]),
@@ -138,7 +138,7 @@ fn images_to_compare() {
 
 #[cfg(unix)]
 #[test]
-fn a_file_that_may_not_be_read() {
+fn unreadable_file_is_refused() {
     use std::os::unix::fs::PermissionsExt;
     let folder = folder();
     let path = folder.path().join("map.exr");
@@ -160,7 +160,7 @@ fn capture(folder: &Path, photo: &str, mask: Option<&str>, normals: Option<&str>
 }
 
 #[test]
-fn photos_of_a_fit() {
+fn unusable_photos_of_a_fit_are_refused() {
     let folder = folder();
     let at = |name: &str| folder.path().join(name);
     let half_nan = |c: usize, _| if c < 13 { [f32::NAN; 3] } else { [0.5; 3] };
@@ -188,7 +188,7 @@ fn photos_of_a_fit() {
 }
 
 #[test]
-fn a_photo_with_a_few_faults_is_used_without_them() {
+fn photo_with_a_few_bad_pixels_is_used_without_them() {
     let folder = folder();
     let mut photo = grey(24, 24);
     photo.pixels_mut()[12 * 24 + 12] = [f32::INFINITY, 0.0, 0.0];

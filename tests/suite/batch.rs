@@ -1,4 +1,4 @@
-//! `lookalike batch` from end to end: the real binary, its worker processes, its files, on small scenes.
+//! `lookalike batch` from end to end: the real program, its worker processes and its files, on small scenes.
 
 mod ending;
 mod manifest;

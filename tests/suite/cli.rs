@@ -1,4 +1,4 @@
-//! The command line as scripts see it: the real binary, exact exit codes, what goes to stdout and what to stderr.
+//! The command line as scripts use it: the real program, exact exit codes, and the contents of stdout and stderr.
 
 use lookalike::brdf::DEFAULT_MODEL;
 use std::{
@@ -84,7 +84,7 @@ fn every_default_of_a_fit_is_in_its_help() {
 }
 
 #[test]
-fn bad_usage_is_code_two_and_says_what_is_possible() {
+fn bad_usage_is_code_two_and_lists_what_is_possible() {
     let fit = "fit ball.exr --env garden.hdr --out run";
     for (arguments, phrases) in [
         ("fitt".to_owned(), &["unrecognized subcommand 'fitt'", "'fit'"][..]),
@@ -136,7 +136,7 @@ fn commands_and_flags_that_do_not_exist_are_refused_with_the_usage() {
 }
 
 #[test]
-fn an_access_file_is_made_once_with_its_key_beside_it() {
+fn access_file_is_created_once_with_its_key_beside_it() {
     let folder = tempfile::tempdir().unwrap();
     let new = ["access", "new", "--address", "node7:4100", "-o", "cluster.json"];
     let answer = lookalike_in(folder.path(), &new);
@@ -158,7 +158,7 @@ fn an_access_file_is_made_once_with_its_key_beside_it() {
 }
 
 #[test]
-fn a_settings_file_is_blamed_by_line() {
+fn error_in_a_settings_file_names_the_line() {
     let folder = tempfile::tempdir().unwrap();
     let toml = "photo = \"ball.exr\"\nenv = \"garden.hdr\"\n\n# a typing error\nsampels = 3\n";
     fs::write(folder.path().join("fit.toml"), toml).unwrap();

@@ -1,4 +1,4 @@
-//! Real worker processes: whatever happens to them, the result is the one of a run in a single process.
+//! Real worker processes: whatever happens to them, the result is that of a run in a single process.
 
 use std::process::Command;
 use std::time::{Duration, SystemTime};
@@ -21,7 +21,7 @@ fn gates(gate: &Gate, count: usize) -> Leaves {
     Leaves::Gates { count, address: gate.address().to_string() }
 }
 
-/// The result of a plan of gates; to pass a gate gives the same bytes anywhere.
+/// The result of a plan of gates; a gate has the same output in any run.
 fn gates_reference(count: usize) -> Option<Vec<u8>> {
     let gate = Gate::new();
     let leaves = gates(&gate, count);
@@ -55,18 +55,18 @@ fn one_two_and_five_workers_give_the_bytes_of_a_single_process() {
 }
 
 #[test]
-fn large_blob_travels_once_per_worker_and_large_outputs_come_back() {
-    // Beyond one frame, and not a multiple of a part.
+fn large_blob_is_sent_once_per_worker_and_large_outputs_are_returned() {
+    // More than one frame, and not a multiple of a part.
     let leaves = Leaves::Large { bytes: 20_000_001 };
     let (result, summary) = Cluster::start(leaves.clone(), options(PROGRAM, 1)).finish();
     assert_eq!(result, TestPlanner::reference(leaves));
-    // The blob, and the digest of the coordinator.
+    // The blob, and the digest computed by the coordinator.
     assert_eq!((summary.blobs_sent, summary.blob_bytes_sent), (2, 20_000_001 + 32));
     assert_eq!(summary.output_bytes_received, 2 * 20_000_001 + 32);
 }
 
 #[test]
-fn worker_that_is_killed_at_work_is_started_again_and_its_node_runs_again() {
+fn worker_killed_while_executing_is_restarted_and_its_node_is_rerun() {
     let gate = Gate::new();
     let cluster = Cluster::start(gates(&gate, 1), options(PROGRAM, 1));
     let first = gate.next();
@@ -99,7 +99,7 @@ fn node_that_aborts_its_process_once_succeeds_elsewhere() {
 }
 
 #[test]
-fn node_that_always_aborts_its_process_fails_by_name() {
+fn node_that_always_aborts_its_process_fails_and_is_named() {
     let error = Cluster::start(Leaves::Abort { marker: String::new() }, options(PROGRAM, 2)).error();
     let message = error.to_string();
     assert!(message.starts_with("abort \"leaf 0\" failed: 3 worker processes died"), "{message}");
@@ -107,7 +107,7 @@ fn node_that_always_aborts_its_process_fails_by_name() {
 }
 
 #[test]
-fn application_error_ends_the_run_by_name_without_another_attempt() {
+fn application_error_ends_the_run_names_the_node_and_is_not_retried() {
     let leaves = Leaves::Fail { message: "the photo is black".into() };
     let (events, outcome) = Cluster::start(leaves, options(PROGRAM, 2)).outcome();
     let error = outcome.unwrap_err();
@@ -117,7 +117,7 @@ fn application_error_ends_the_run_by_name_without_another_attempt() {
 }
 
 #[test]
-fn panic_and_unknown_kind_are_our_own_mistakes_and_no_bad_input() {
+fn panic_and_unknown_kind_are_reported_as_bugs_not_as_bad_input() {
     let cases = [
         (Leaves::Panic, "panic \"leaf 0\" failed: it panicked: asked to panic; this is a bug in lookalike"),
         (Leaves::Unknown, "nonsense \"leaf 0\" failed: unknown node kind \"nonsense\""),
@@ -131,7 +131,7 @@ fn panic_and_unknown_kind_are_our_own_mistakes_and_no_bad_input() {
 }
 
 #[test]
-fn progress_of_a_node_in_the_coordinators_own_process_is_told_while_it_runs() {
+fn progress_of_a_node_in_the_coordinators_process_is_reported_while_it_runs() {
     let gate = Gate::new();
     let leaves = Leaves::GateHere { address: gate.address().to_string() };
     let cluster = Cluster::start(leaves, options(PROGRAM, 1));
@@ -147,12 +147,12 @@ fn progress_of_a_node_in_the_coordinators_own_process_is_told_while_it_runs() {
 }
 
 #[test]
-fn workers_may_come_from_elsewhere_and_end_with_the_run() {
+fn remote_workers_join_and_end_with_the_run() {
     let gate = Gate::new();
     let cluster = Cluster::start(gates(&gate, 2), local_listener());
     cluster.address();
     let workers = [worker(&cluster), worker(&cluster)];
-    // Each executes one node at a time, so both are needed for two at the gate.
+    // Each worker executes one node at a time, so two nodes at the gate need both.
     let waiting = [gate.next(), gate.next()];
     assert_ne!(waiting[0].process(), waiting[1].process());
     waiting.into_iter().for_each(Waiting::release);
@@ -165,7 +165,7 @@ fn workers_may_come_from_elsewhere_and_end_with_the_run() {
 }
 
 #[test]
-fn without_any_worker_the_run_ends_with_a_named_error() {
+fn run_without_workers_ends_with_an_error() {
     let policy =
         Policy { wait_for_workers: Duration::from_millis(300), remind_every: Duration::from_millis(100), ..policy() };
     let leaves = Leaves::Digests { count: 1, shared_bytes: 1 };
@@ -177,7 +177,7 @@ fn without_any_worker_the_run_ends_with_a_named_error() {
 }
 
 #[test]
-fn worker_program_that_does_not_work_is_an_error_at_once() {
+fn worker_program_that_cannot_start_is_an_error_at_once() {
     let leaves = Leaves::Digests { count: 1, shared_bytes: 1 };
     let with = |program: &str, argument: &str| {
         let command = WorkerCommand { program: program.into(), arguments: vec!["worker".into(), argument.into()] };
@@ -207,7 +207,7 @@ fn killed_coordinator_leaves_no_worker_behind() {
 }
 
 #[test]
-fn interrupted_coordinator_ends_its_workers_and_says_so() {
+fn interrupted_coordinator_ends_its_workers_and_reports_it() {
     for name in ["INT", "TERM"] {
         let (gate, folder) = (Gate::new(), tempfile::tempdir().unwrap());
         let coordinator = coordinator_at_work(&gate, &folder);
@@ -221,10 +221,10 @@ fn interrupted_coordinator_ends_its_workers_and_says_so() {
 }
 
 #[test]
-fn worker_without_a_coordinator_gives_up_by_name() {
+fn worker_without_a_coordinator_gives_up_and_names_the_address() {
     let folder = tempfile::tempdir().unwrap();
     let access = folder.path().join("access.json");
-    // A port where nobody listens any more.
+    // A port where no process listens any more.
     let address = Gate::new().address().to_string();
     Credentials::new(address, SystemTime::now()).unwrap().write(&access).unwrap();
     let output =

@@ -1,4 +1,4 @@
-//! `lookalike compare` as its users see it.
+//! `lookalike compare` on the command line.
 
 use crate::program::{Answer, image, lookalike, write_exr, write_png};
 use lookalike::{
@@ -44,7 +44,7 @@ fn equal_images_score_zero() {
 }
 
 #[test]
-fn the_score_is_the_librarys() {
+fn score_is_that_of_the_library() {
     let folder = folder();
     let found = json(&lookalike(folder.path(), "compare a.exr b.exr --json --display-exposure 1.5").done());
     let judge = Judge::new(&ball(0.0), &[1.0; 1440], 1.5, &JudgeOptions::default()).unwrap();
@@ -61,7 +61,7 @@ fn the_score_is_the_librarys() {
 }
 
 #[test]
-fn a_mask_leaves_the_background_out() {
+fn mask_excludes_the_background() {
     let folder = folder();
     let mut dirty = ball(0.0);
     dirty.pixels_mut().iter_mut().filter(|pixel| pixel[1] == 0.0).for_each(|pixel| *pixel = [0.7, f32::NAN, 0.1]);
@@ -78,7 +78,7 @@ fn a_mask_leaves_the_background_out() {
 }
 
 #[test]
-fn alpha_over_black_tells_the_object_and_keeps_the_score() {
+fn alpha_over_black_marks_the_object_and_keeps_the_score() {
     let folder = folder();
     let bytes = openexr::write(&ball(0.2), Some(&disk()), &[]).unwrap();
     fs::write(folder.path().join("alpha.exr"), bytes).unwrap();
@@ -91,7 +91,7 @@ fn alpha_over_black_tells_the_object_and_keeps_the_score() {
 }
 
 #[test]
-fn the_exposure_is_given_automatic_or_from_an_earlier_run() {
+fn exposure_is_a_value_automatic_or_from_an_earlier_run() {
     let folder = folder();
     let at = |name: &str| folder.path().join(name);
     fs::write(at("fit.json"), r#"{"schema": "lookalike.fit/1", "display_exposure": 1.75}"#).unwrap();
@@ -107,7 +107,7 @@ fn the_exposure_is_given_automatic_or_from_an_earlier_run() {
     assert_eq!(exposure("--display-exposure from:fit.json"), 1.75);
     assert_eq!(exposure("--display-exposure from:match.exr"), 2.5);
     assert_eq!(exposure("--display-exposure from:match.png"), 2.5);
-    // Of 1440 pixels number 1397: of the 616 in the disk all but 43.
+    // Pixel 1397 of the 1440 in ascending order determines it: 43 of the 616 pixels of the disk are brighter.
     let auto = exposure("--display-exposure auto");
     assert!(auto > 1.0 && auto < 2.0, "{auto}");
 
@@ -123,14 +123,14 @@ fn the_exposure_is_given_automatic_or_from_an_earlier_run() {
 }
 
 #[test]
-fn display_values_are_decoded_and_mixing_them_with_radiance_is_said() {
+fn display_values_are_decoded_and_mixing_them_with_radiance_is_warned_of() {
     let folder = folder();
     write_png(&folder.path().join("a.png"), &ball(0.0));
     write_png(&folder.path().join("b.png"), &ball(0.2));
     let both = lookalike(folder.path(), "compare a.png b.png --json").done();
     let linear = lookalike(folder.path(), "compare a.exr b.exr --json").done();
     let (shown, radiance) = (json(&both)["score"].as_f64().unwrap(), json(&linear)["score"].as_f64().unwrap());
-    // Eight bits.
+    // The PNGs have eight bits.
     assert!((shown / radiance - 1.0).abs() < 0.02 && both.stderr.is_empty(), "{shown} {radiance} {}", both.stderr);
     let mixed = lookalike(folder.path(), "compare a.exr b.png").done();
     assert!(mixed.stderr.contains("warning: b.png holds display values, a.exr radiance"), "{}", mixed.stderr);
@@ -139,7 +139,7 @@ fn display_values_are_decoded_and_mixing_them_with_radiance_is_said() {
 }
 
 #[test]
-fn the_map_shows_where_they_differ() {
+fn map_shows_where_the_images_differ() {
     let folder = folder();
     let mut half = ball(0.0);
     half.pixels_mut().iter_mut().enumerate().filter(|(i, p)| i % 40 > 24 && p[1] > 0.0).for_each(|(_, p)| p[2] += 0.4);
@@ -162,7 +162,7 @@ fn read(path: &Path) -> Image {
 }
 
 #[test]
-fn people_get_a_table_with_the_five_features() {
+fn default_output_is_a_table_of_the_five_features() {
     let folder = folder();
     let answer = lookalike(folder.path(), "compare a.exr b.exr").done();
     for phrase in ["cssim of b.exr against a.exr", "lightness ", "contrast ", "structure ", "chroma ", "hue "] {

@@ -1,4 +1,4 @@
-//! Many workers at once: they join, wait without being lost, and share what there is to do.
+//! Many workers at once: they join, stay members while idle, and share the nodes.
 
 use lookalike_coordinator::events::RunEvent;
 use lookalike_coordinator::runner::RunnerOptions;
@@ -25,7 +25,7 @@ fn crowd(workers: u32) {
     let gate = Gate::new();
     let leaves = Leaves::GateHere { address: gate.address().to_string() };
     let mut options = listening();
-    // They come all at once, and do not try again.
+    // All workers connect at once and do not retry.
     options.limits.strangers = options.limits.strangers.max(workers as usize);
     options.policy.heartbeat = Duration::from_millis(500);
     options.policy.lost_after = Duration::from_millis(5000);
@@ -35,7 +35,7 @@ fn crowd(workers: u32) {
     let light = LightWorkers::join(&cluster.access(), workers);
     (0..workers).for_each(|_| cluster.wait_for(joined));
     println!("{workers} workers have joined after {:?}", began.elapsed());
-    // The last node is for one of them; until then they wait.
+    // The last node runs on one of them; until then all wait.
     gate.next().release();
     let (result, summary) = cluster.finish();
     light.finish();
@@ -44,24 +44,24 @@ fn crowd(workers: u32) {
 }
 
 #[test]
-fn hundred_idle_workers_join_and_none_is_lost() {
+fn hundred_idle_workers_join_and_stay() {
     crowd(100);
 }
 
 #[cfg(feature = "slow")]
 #[test]
-fn thousand_idle_workers_join_and_none_is_lost() {
+fn thousand_idle_workers_join_and_stay() {
     crowd(1000);
 }
 
 #[test]
-fn crowd_shares_a_graph_and_its_result_is_that_of_one_process() {
+fn graph_on_many_workers_gives_the_result_of_one_process() {
     let leaves = Leaves::Digests { count: 300, shared_bytes: 100_000 };
     let cluster = Cluster::start(leaves.clone(), listening());
     cluster.address();
     let light = LightWorkers::join(&cluster.access(), 20);
     let (result, summary) = cluster.finish();
-    // Some may have come too late.
+    // Some may have joined after the end of the run.
     drop(light);
     assert_eq!(result, TestPlanner::reference(leaves));
     assert_eq!(summary.requeued_nodes, 0);

@@ -1,4 +1,4 @@
-//! Real workers that are stopped, asked to end, or wrong: nodes are neither lost nor blamed, and results are those of a run in a
+//! Real workers that are stopped, asked to end, or wrong: no node is lost or counted as the cause, and results are those of a run in a
 //! single process.
 
 use std::process::Command;
@@ -19,7 +19,7 @@ fn gates(gate: &Gate, count: usize) -> Leaves {
     Leaves::Gates { count, address: gate.address().to_string() }
 }
 
-/// The result of one gate; to pass it gives the same bytes anywhere.
+/// The result of one gate; a gate has the same output in any run.
 fn reference() -> Option<Vec<u8>> {
     let gate = Gate::new();
     let leaves = gates(&gate, 1);
@@ -29,8 +29,8 @@ fn reference() -> Option<Vec<u8>> {
     reference
 }
 
-/// A lease that is short for a stopped worker, and long for one that waits for a processor. With speculation: the last node may be
-/// given to a worker that is still at the gate, and has to run elsewhere then.
+/// A lease that is short for a stopped worker, and long for one that waits for a processor. With speculation, because the last node may
+/// be assigned to a worker that is still at the gate and then has to run elsewhere.
 fn impatient() -> Policy {
     let speculation = Speculation { after: Duration::from_secs(1), ..Speculation::default() };
     Policy { heartbeat: Duration::from_millis(100), lost_after: Duration::from_secs(3), speculation, ..policy() }
@@ -55,7 +55,7 @@ fn deaths_when_requeued(cluster: &Cluster) -> u32 {
 }
 
 #[test]
-fn worker_that_hangs_is_lost_after_its_lease() {
+fn stopped_worker_is_lost_after_its_lease() {
     let gate = Gate::new();
     let cluster = Cluster::start(gates(&gate, 1), RunnerOptions { policy: impatient(), ..options(PROGRAM, 2) });
     let first = gate.next();
@@ -64,12 +64,12 @@ fn worker_that_hangs_is_lost_after_its_lease() {
     assert_ne!(second.process(), first.process());
     second.release();
     assert_eq!(cluster.finish().0, reference());
-    // The run has ended, and with it the process that could not end itself.
+    // The run has ended, and the coordinator has killed the stopped process.
     first.wait_for_death();
 }
 
 #[test]
-fn worker_that_wakes_up_again_brings_its_result_and_it_counts() {
+fn late_result_of_a_continued_worker_is_accepted() {
     let gate = Gate::new();
     let cluster = Cluster::start(gates(&gate, 1), RunnerOptions { policy: impatient(), ..options(PROGRAM, 2) });
     let first = gate.next();
@@ -78,7 +78,7 @@ fn worker_that_wakes_up_again_brings_its_result_and_it_counts() {
     let second = gate.next();
     signal(first.process(), "CONT");
     first.release();
-    // The second one never answers: it is the result of the first that ends the run.
+    // The second worker never answers: the first worker's result ends the run.
     let (result, summary) = cluster.finish();
     assert_eq!((result, summary.requeued_nodes), (reference(), 1));
     assert_eq!(summary.workers_joined, 3);
@@ -86,7 +86,7 @@ fn worker_that_wakes_up_again_brings_its_result_and_it_counts() {
 }
 
 #[test]
-fn worker_that_is_asked_to_end_finishes_what_it_executes() {
+fn worker_asked_to_end_finishes_its_executing_nodes() {
     for name in ["TERM", "INT"] {
         let gate = Gate::new();
         let listen = Some(([127, 0, 0, 1], 0).into());
@@ -102,7 +102,7 @@ fn worker_that_is_asked_to_end_finishes_what_it_executes() {
         let output = worker.output();
         assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
         assert!(stderr(&output).contains("asked to end: finishing what is being computed"), "{}", stderr(&output));
-        // The last node waits for another one.
+        // The last node needs another worker.
         let another = Process::start(Command::new(PROGRAM).args(["worker", "--access"]).arg(cluster.access_file()));
         let (result, summary) = cluster.finish();
         assert_eq!((result, summary.requeued_nodes), (reference(), 0));
@@ -111,7 +111,7 @@ fn worker_that_is_asked_to_end_finishes_what_it_executes() {
 }
 
 #[test]
-fn worker_that_is_asked_twice_ends_at_once_and_is_not_held_against_its_node() {
+fn worker_asked_twice_ends_at_once_without_a_crash_counted_for_its_node() {
     let gate = Gate::new();
     let cluster = Cluster::start(gates(&gate, 1), options(PROGRAM, 1));
     let first = gate.next();
@@ -126,7 +126,7 @@ fn worker_that_is_asked_twice_ends_at_once_and_is_not_held_against_its_node() {
 }
 
 #[test]
-fn worker_whose_time_to_drain_is_over_hands_back_what_it_executes() {
+fn worker_whose_drain_time_is_over_returns_its_executing_nodes() {
     let gate = Gate::new();
     let policy = Policy { drain_time: Duration::from_millis(300), ..policy() };
     let cluster = Cluster::start(gates(&gate, 1), RunnerOptions { policy, ..options(PROGRAM, 1) });
@@ -140,13 +140,13 @@ fn worker_whose_time_to_drain_is_over_hands_back_what_it_executes() {
 }
 
 #[test]
-fn worker_that_is_killed_while_it_drains_is_not_held_against_its_node() {
+fn worker_killed_while_draining_counts_no_crash_for_its_node() {
     let gate = Gate::new();
     let cluster = Cluster::start(gates(&gate, 1), options(PROGRAM, 1));
     let first = gate.next();
     signal(first.process(), "TERM");
     wait_for_drain(&cluster);
-    // As Slurm does when the time is over.
+    // As Slurm does when the time limit is reached.
     signal(first.process(), "KILL");
     assert_eq!(departure(&cluster), Departure::Lost);
     assert_eq!(deaths_when_requeued(&cluster), 0);
@@ -155,8 +155,8 @@ fn worker_that_is_killed_while_it_drains_is_not_held_against_its_node() {
 }
 
 #[test]
-fn nodes_that_kill_their_workers_fail_one_by_one_and_local_workers_go_on() {
-    // Fifteen deaths at least, more than a local worker that dies of itself is granted.
+fn nodes_that_kill_their_workers_fail_and_local_workers_are_restarted() {
+    // At least fifteen deaths, more than a local worker that dies by itself may have before it is given up.
     let cluster = Cluster::start(Leaves::Killers { count: 3 }, options(PROGRAM, 1));
     let (events, outcome) = cluster.outcome();
     let (result, summary) = outcome.unwrap();
@@ -174,7 +174,7 @@ fn nodes_that_kill_their_workers_fail_one_by_one_and_local_workers_go_on() {
 }
 
 #[test]
-fn run_whose_every_output_is_verified_gives_the_same_bytes() {
+fn run_with_all_outputs_verified_gives_the_same_bytes() {
     let leaves = Leaves::Digests { count: 21, shared_bytes: 300_000 };
     let reference = TestPlanner::reference(leaves.clone());
     for workers in [1, 2, 3] {
@@ -182,13 +182,13 @@ fn run_whose_every_output_is_verified_gives_the_same_bytes() {
         let options = RunnerOptions { policy, ..options(PROGRAM, workers) };
         let (result, summary) = Cluster::start(leaves.clone(), options).finish();
         assert_eq!(result, reference, "{workers} workers");
-        // The digests and the last node; the one of the coordinator is its own.
+        // The digests and the last node; the coordinator does not verify its own node.
         assert_eq!((summary.completed_nodes, summary.verified_nodes), (23, 22));
     }
 }
 
 #[test]
-fn policy_that_makes_no_sense_is_refused_before_anything_is_started() {
+fn inconsistent_policy_is_refused_before_anything_is_started() {
     let policy = Policy { lost_after: Duration::from_secs(1), ..policy() };
     let error = Cluster::start(Leaves::Panic, RunnerOptions { policy, ..options(PROGRAM, 1) }).error();
     assert!(matches!(error, RunError::Policy(_)), "{error}");

@@ -1,4 +1,4 @@
-//! `lookalike fit` from end to end: the real binary, its worker processes, its files, on a small scene that the test makes.
+//! `lookalike fit` from end to end: the real program, its worker processes and its files, on a small scene created by the test.
 
 mod ending;
 mod outputs;

@@ -1,5 +1,5 @@
-//! The networks that the real materials come as: Sztrajman, Rainer, Ritschel & Weyrich, *Neural BRDF Representation and
-//! Importance Sampling* (2021). Written from `make_merl.py` beside the data, made reciprocal as there.
+//! The neural networks of the measured materials: Sztrajman, Rainer, Ritschel & Weyrich, *Neural BRDF Representation and Importance
+//! Sampling* (2021). A port of `make_merl.py`, which is beside the data; made reciprocal in the same way.
 
 use lookalike::math::{
     Rgb, Vec3,

@@ -1,4 +1,4 @@
-//! No file of the user's is ever replaced: every command that writes to a folder refuses before any work.
+//! No file of the user's is replaced: every command that writes to a folder refuses before any work.
 
 use crate::{
     fit::scene::{QUICK, folder},
@@ -7,7 +7,7 @@ use crate::{
 use std::fs;
 
 #[test]
-fn every_command_refuses_a_file_that_it_would_replace_and_leaves_it_alone() {
+fn every_command_refuses_to_replace_a_file_and_leaves_it_unchanged() {
     let folder = folder();
     let at = |name: &str| folder.path().join(name);
     fs::write(at("batch.toml"), "photos = ['photo.exr']\nenvironments = 'map.exr'\n").unwrap();
@@ -29,7 +29,7 @@ fn every_command_refuses_a_file_that_it_would_replace_and_leaves_it_alone() {
 }
 
 #[test]
-fn demo_does_not_replace_a_fit_and_a_fit_not_its_own_photo() {
+fn demo_refuses_to_replace_a_fit_and_a_fit_its_own_photo() {
     let folder = folder();
     let at = |name: &str| folder.path().join(name);
     fs::create_dir(at("own")).unwrap();

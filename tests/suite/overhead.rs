@@ -1,4 +1,4 @@
-//! `lookalike-overhead` measures what it says it does: every node once, none of them twice. How fast is not asserted here.
+//! `lookalike-overhead` measures what it claims: every node runs exactly once. Speed is not asserted here.
 
 use std::process::Command;
 
@@ -13,7 +13,7 @@ fn measure(arguments: &[&str]) -> Value {
 }
 
 #[test]
-fn nodes_are_given_out_once_but_for_a_few_that_are_moved() {
+fn nodes_are_assigned_once_except_a_few_that_are_moved() {
     let found = measure(&["throughput", "3000"]);
     assert_eq!(found["nodes"], 3000, "{found}");
     assert!(found["attempts_beyond_one"].as_u64().unwrap() < 30, "{found}");
@@ -21,7 +21,7 @@ fn nodes_are_given_out_once_but_for_a_few_that_are_moved() {
 }
 
 #[test]
-fn killed_workers_lose_what_they_held_and_killed_coordinators_nothing_that_was_finished() {
+fn killed_worker_loses_its_leases_and_killed_coordinator_no_finished_node() {
     let worker = measure(&["worker-killed", "200"]);
     assert_eq!((&worker["completed"], &worker["finished_nodes_run_twice"]), (&worker["nodes"], &0.into()), "{worker}");
     let coordinator = measure(&["coordinator-killed", "200"]);

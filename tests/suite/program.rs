@@ -1,4 +1,4 @@
-//! The real binary on real files: what the suites of `render`, `compare` and bad input share.
+//! The real program on real files; shared by the modules of the suite.
 
 use lookalike::image::{Image, openexr, png};
 use std::{
@@ -7,7 +7,7 @@ use std::{
     process::{Command, Output},
 };
 
-/// What the program said.
+/// Exit code and output of the program.
 #[derive(Debug)]
 pub(crate) struct Answer {
     pub(crate) code: Option<i32>,
@@ -34,7 +34,7 @@ fn run(command: &mut Command) -> Answer {
 }
 
 impl Answer {
-    /// Asserts that it went well.
+    /// Asserts exit code 0.
     #[track_caller]
     pub(crate) fn done(self) -> Self {
         assert_eq!(self.code, Some(0), "{}", self.stderr);
@@ -78,7 +78,7 @@ pub(crate) fn write_merl(path: &Path, [r, g, b]: [f64; 3]) {
     fs::write(path, bytes).unwrap();
 }
 
-/// Real input, where it is at hand; says so where it is not.
+/// The folder of real input; `None`, with a message, where it does not exist.
 pub(crate) fn data() -> Option<PathBuf> {
     let beside = PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/data"));
     let data = std::env::var_os("LOOKALIKE_DATA").map_or(beside, PathBuf::from);

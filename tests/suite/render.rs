@@ -1,4 +1,4 @@
-//! `lookalike render` as its users see it.
+//! `lookalike render` on the command line.
 
 use crate::program::{data, image, lookalike, lookalike_on_threads, write_exr, write_merl};
 use lookalike::image::{Decoded, decode, metadata as keys};
@@ -27,7 +27,7 @@ fn entry<'a>(decoded: &'a Decoded, key: &str) -> &'a str {
 }
 
 #[test]
-fn a_diffuse_sphere_in_white_light_shows_its_albedo() {
+fn diffuse_sphere_in_white_light_has_its_albedo() {
     let folder = folder();
     let answer =
         lookalike(folder.path(), &format!("render {WHITE} --env white.exr --size 32 --samples 512 -o a.exr")).done();
@@ -50,7 +50,7 @@ fn a_diffuse_sphere_in_white_light_shows_its_albedo() {
 }
 
 #[test]
-fn metadata_tell_what_was_rendered() {
+fn metadata_record_what_was_rendered() {
     let folder = folder();
     let flags = format!("render {GLOSSY} --env white.exr --env-rotation 30 --camera perspective:20 --size 16");
     lookalike(folder.path(), &format!("{flags} --samples 16 --seed 7 -o a.exr")).done();
@@ -73,7 +73,7 @@ fn metadata_tell_what_was_rendered() {
 }
 
 #[test]
-fn light_comes_from_where_the_map_says() {
+fn light_comes_from_its_direction_in_the_map() {
     let folder = folder();
     let luminance = |flags: &str, column: usize, row: usize| {
         lookalike(folder.path(), &format!("render {WHITE} {flags} --size 32 --samples 64 -o side.exr")).done();
@@ -92,7 +92,7 @@ fn light_comes_from_where_the_map_says() {
 }
 
 #[test]
-fn the_file_has_the_same_bytes_on_any_number_of_threads() {
+fn rendered_file_has_the_same_bytes_on_any_number_of_threads() {
     let folder = folder();
     let file = |threads: usize| {
         let flags = format!("render {GLOSSY} --env right.exr --size 24 --samples 32 -o {threads}.exr");
@@ -105,7 +105,7 @@ fn the_file_has_the_same_bytes_on_any_number_of_threads() {
 }
 
 #[test]
-fn a_measured_material_is_rendered_and_named() {
+fn measured_material_is_rendered_and_named_in_metadata() {
     let folder = folder();
     write_merl(&folder.path().join("flat.binary"), [0.3, 0.2, 0.1]);
     lookalike(folder.path(), "render --brdf flat.binary --env white.exr --size 16 --samples 1024 -o a.exr").done();
@@ -127,7 +127,7 @@ fn blake3_of(path: &Path) -> String {
 }
 
 #[test]
-fn a_normal_map_brings_its_size_and_its_shape() {
+fn normal_map_determines_size_and_shape() {
     let folder = folder();
     // The left half faces the camera, the right half is turned to +X; the frame is background.
     let turned = [0.8, 0.0, 0.6];
@@ -142,7 +142,7 @@ fn a_normal_map_brings_its_size_and_its_shape() {
     assert!(answer.stderr.contains("warning: a shape from normals is lit as if convex"), "{}", answer.stderr);
     let decoded = read(&folder.path().join("a.exr"));
     assert_eq!((decoded.image.width(), decoded.image.height()), (20, 12));
-    // Half of the light of a wall that faces the border of the lit half; (1 + cos) / 2 of it when turned by 53 degrees.
+    // Half of the light of a wall that faces the boundary of the lit half; (1 + cos) / 2 of it when turned by 53 degrees.
     let (front, side) = (decoded.image.pixel(5, 6)[0], decoded.image.pixel(15, 6)[0]);
     assert!((front - 0.25).abs() < 0.02 && (side - 0.45).abs() < 0.03, "{front} {side}");
     assert_eq!(decoded.image.pixel(0, 6), [0.0; 3]);
@@ -181,7 +181,7 @@ fn renderings_with_other_seeds_differ_by_their_noise_only() {
 }
 
 #[test]
-fn bad_settings_say_what_to_give() {
+fn bad_settings_are_refused_with_the_valid_values() {
     let folder = folder();
     let render = |flags: &str| lookalike(folder.path(), &format!("render --env white.exr -o a.exr {flags}"));
     for (flags, phrases) in [
@@ -203,9 +203,9 @@ fn bad_settings_say_what_to_give() {
     }
 }
 
-/// The table that `make_merl.py` writes, against the network it was made from.
+/// The table written by `make_merl.py` against the network from which it was made.
 #[test]
-fn a_table_of_a_real_material_agrees_with_the_formula_behind_it() {
+fn table_of_a_real_material_agrees_with_its_network() {
     let Some(data) = data() else { return };
     let folder = tempfile::tempdir().unwrap();
     let network = data.join("materials/gold-metallic-paint3.nbrdf.json");

@@ -1,5 +1,5 @@
-//! Runs whose coordinator was killed, and the next coordinator: local workers end with the first one, remote ones join the second,
-//! only journalled results count, and nothing waits for a worker that does not come back.
+//! Runs whose coordinator was killed, and the next coordinator: local workers end with the first one, remote ones join the second, only
+//! journalled results count, and the run does not wait for a worker that never returns.
 
 use std::fs;
 use std::io::Write;
@@ -19,20 +19,20 @@ use tempfile::TempDir;
 const PROGRAM: &str = env!("CARGO_BIN_EXE_lookalike-test-cluster");
 const WORKER: &str = env!("CARGO_BIN_EXE_lookalike-worker-under-test");
 
-/// How many nodes wait at the gate in the sweep over phases.
+/// How many nodes wait at the gate in the test of all phases.
 const GATES: usize = 4;
 
 /// A resumed run that takes longer hangs.
 const PATIENCE: Duration = Duration::from_secs(60);
 
-/// A run of so many gates with so many local workers, begun or resumed.
+/// A run of this many gates with this many local workers, started or resumed.
 fn coordinator(gate: &Gate, leaves: usize, workers: usize, folder: &TempDir) -> Process {
     let address = gate.address().to_string();
     let arguments = ["resume", &leaves.to_string(), &address, &workers.to_string()].map(str::to_owned);
     Process::start(Command::new(PROGRAM).args(arguments).arg(folder.path().join("access.json")))
 }
 
-/// The end of a resumed run. A run that hangs is killed and fails the test.
+/// The output of a resumed run. A run that hangs is killed and fails the test.
 fn finish(mut coordinator: Process, what: &str) -> Output {
     let until = Instant::now() + PATIENCE;
     while !coordinator.has_ended() {
@@ -42,7 +42,8 @@ fn finish(mut coordinator: Process, what: &str) -> Output {
     coordinator.output()
 }
 
-/// What the program prints at the end of a run of so many gates: the address of the gate is part of the nodes, not of their outputs.
+/// The output printed at the end of a run of this many gates; it does not depend on the gate's address, which is a parameter of the
+/// nodes.
 fn reference(leaves: usize) -> String {
     let gate = Gate::new();
     let address = gate.address().to_string();
@@ -61,7 +62,7 @@ fn kill_and_resume(passed: usize, before: usize, after: usize, expected: &str) {
     let executing: Vec<Waiting> = (0..before.min(GATES - passed)).map(|_| gate.next()).collect();
     first.kill();
     let access = fs::read(folder.path().join("access.json")).unwrap();
-    // At once: its workers may still be ending.
+    // Without delay: workers of the first coordinator may still be ending.
     let second = coordinator(&gate, GATES, after, &folder);
     executing.into_iter().for_each(Waiting::wait_for_death);
     let keeper = gate.keep(Waiting::release);
@@ -83,10 +84,11 @@ fn run_killed_at_every_phase_is_resumed_by_fewer_as_many_and_more_workers() {
     }
 }
 
-/// Six workers were executing when their coordinator was killed, and one was started for the next coordinator within seconds. A node
-/// was kept for a worker that never came back, and the run waited for ever beside an idle worker, in 2 of 8 runs.
+/// A regression in 2 of 8 runs: six workers were executing when their coordinator was killed, and one was started for the next
+/// coordinator within seconds. A node stayed reserved for a worker that never returned, and the run waited for ever although a worker was
+/// idle.
 #[test]
-fn run_of_six_workers_resumed_at_once_by_one_leaves_no_node_ready_beside_an_idle_worker() {
+fn run_of_six_workers_resumed_at_once_by_one_assigns_every_ready_node() {
     let expected = reference(6);
     for _ in 0..4 {
         let (gate, folder) = (Gate::new(), tempfile::tempdir().unwrap());
@@ -104,7 +106,7 @@ fn run_of_six_workers_resumed_at_once_by_one_leaves_no_node_ready_beside_an_idle
 }
 
 #[test]
-fn remote_worker_drops_what_it_holds_and_joins_the_next_coordinator_as_a_new_member() {
+fn remote_worker_drops_its_nodes_and_joins_the_next_coordinator_as_a_new_member() {
     let (gate, folder) = (Gate::new(), tempfile::tempdir().unwrap());
     // A single local worker has a thread for each core.
     let threads = available_parallelism().map_or(1, usize::from);
@@ -119,11 +121,11 @@ fn remote_worker_drops_what_it_holds_and_joins_the_next_coordinator_as_a_new_mem
     assert!([&finishes, &executes].iter().all(|waiting| waiting.process() == remote_id));
     first.kill();
     local.into_iter().for_each(Waiting::wait_for_death);
-    // Finished while there is no coordinator: nobody has journalled it, so it is lost.
+    // The node finishes while there is no coordinator, so its result is not journalled and is lost.
     finishes.release();
     let second = coordinator(&gate, leaves, 1, &folder);
     (0..leaves).for_each(|_| gate.next().release());
-    // The old execution keeps its thread until it ends; its output goes nowhere.
+    // The old execution keeps its thread until it ends; its output is dropped.
     executes.release();
     let output = finish(second, "a remote worker");
     assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
@@ -138,7 +140,7 @@ fn remote_worker_drops_what_it_holds_and_joins_the_next_coordinator_as_a_new_mem
 }
 
 #[test]
-fn coordinator_that_ends_in_order_takes_its_workers_with_it() {
+fn interrupted_coordinator_ends_its_workers_and_is_journalled() {
     for name in ["INT", "TERM"] {
         let (gate, folder) = (Gate::new(), tempfile::tempdir().unwrap());
         let coordinator = coordinator(&gate, 2, 2, &folder);
@@ -153,7 +155,7 @@ fn coordinator_that_ends_in_order_takes_its_workers_with_it() {
 }
 
 #[test]
-fn port_that_somebody_else_has_is_named_with_what_to_do() {
+fn occupied_port_is_named_with_a_remedy() {
     let (gate, folder) = (Gate::new(), tempfile::tempdir().unwrap());
     let first = coordinator(&gate, 2, 2, &folder);
     let workers = [gate.next(), gate.next()];
@@ -176,7 +178,7 @@ fn port_that_somebody_else_has_is_named_with_what_to_do() {
 fn local_worker_ends_with_its_coordinator_and_a_remote_one_tries_to_reconnect() {
     let folder = tempfile::tempdir().unwrap();
     let access = folder.path().join("access.json");
-    // A port where nobody listens any more.
+    // A port where no process listens any more.
     let address = Gate::new().address().to_string();
     Credentials::new(address, SystemTime::now()).unwrap().write(&access).unwrap();
     let worker = |arguments: &[&str]| {

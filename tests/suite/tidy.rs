@@ -1,6 +1,6 @@
-//! The rules of the project that a compiler does not know: which module may import which, what the science must not
-//! touch, what keeps results the same on every machine, what a file looks like. Each reads the sources; each message
-//! says where and what to do instead. ARCHITECTURE.md states the same rules in prose.
+//! The project's rules that the compiler does not check: which module may import which, what the library must not use, what keeps results
+//! the same on every machine, the form of files. Each test reads the sources; each message names the place and the remedy.
+//! ARCHITECTURE.md states the same rules in prose.
 
 mod circles;
 mod contracts;
@@ -15,8 +15,8 @@ use std::collections::BTreeSet;
 use paths::{Found, calls, chain, paths, words};
 use source::{Source, sources};
 
-/// What each module of `common` may import of the others; the longest path that fits a file counts. A tight list: widen
-/// it in the commit that explains why.
+/// The modules of `common` that each module may import; the longest path that fits a file counts. Keep it tight: widen it in the commit
+/// that explains why.
 const MAY_IMPORT: [(&str, &[&str]); 14] = [
     ("choice", &[]),
     ("math", &[]),
@@ -34,7 +34,7 @@ const MAY_IMPORT: [(&str, &[&str]); 14] = [
     ("protocol", &["graph"]),
 ];
 
-/// Parts of the standard library that `common` must not use: it opens nothing, waits for nothing, prints nothing.
+/// Parts of the standard library that `common` must not use: it opens, waits for and prints nothing.
 const WORLD: [&str; 8] = [
     "std::env",
     "std::fs",
@@ -46,7 +46,7 @@ const WORLD: [&str; 8] = [
     "std::time::SystemTime",
 ];
 
-/// Words that mean the same, however they were imported.
+/// Words with the same effect, however they were imported.
 const WORLD_WORDS: [&str; 8] = ["Instant", "SystemTime", "from_file", "stderr", "stdin", "stdout", "to_file", "tokio"];
 
 /// Macros that print.
@@ -58,7 +58,7 @@ const UNPORTABLE: [&str; 27] = [
     "hypot", "ln", "ln_1p", "log", "log10", "log2", "mul_add", "powf", "powi", "sin", "sin_cos", "sinh", "tan", "tanh",
 ];
 
-/// Functions of glam that call them.
+/// Functions of glam that call such methods.
 const UNPORTABLE_OF_GLAM: [&str; 9] = [
     "angle_between",
     "from_axis_angle",
@@ -110,7 +110,7 @@ fn modules_of_the_library_import_in_one_direction() {
                 offences.push(at(&source, &found, &format!("must not be imported by {name}")));
             }
         }
-        // A path of `super` that leaves its module would escape the check above.
+        // A path of `super` that leaves its module would not be seen by the check above.
         let folders = source.path.matches('/').count() - 2 + usize::from(!source.path.ends_with("/mod.rs"));
         for found in paths(&source.code, "super") {
             if found.name.split("::").filter(|name| *name == "super").count() >= folders.max(1) {
@@ -122,7 +122,7 @@ fn modules_of_the_library_import_in_one_direction() {
 }
 
 #[test]
-fn the_library_touches_nothing_outside_itself() {
+fn library_uses_no_files_clocks_threads_or_output() {
     let mut offences = Vec::new();
     for source in common() {
         let used =
@@ -139,7 +139,7 @@ fn the_library_touches_nothing_outside_itself() {
 }
 
 #[test]
-fn results_do_not_depend_on_the_systems_mathematics() {
+fn results_do_not_depend_on_the_systems_math_library() {
     let scientific = |path: &str| path.starts_with("common/src/") || path.starts_with("app/src/demo/");
     let mut offences = Vec::new();
     for source in sources().iter().filter(|source| scientific(&source.path)) {
@@ -178,7 +178,7 @@ fn results_do_not_depend_on_hashing_or_on_threads() {
 }
 
 #[test]
-fn state_machines_know_neither_sockets_nor_clocks() {
+fn state_machines_use_neither_sockets_nor_clocks() {
     const PURE: [&str; 7] = [
         "coordinator/src/actions.rs",
         "coordinator/src/events.rs",
@@ -206,7 +206,7 @@ fn state_machines_know_neither_sockets_nor_clocks() {
     none("state changes are plain functions of (state, event)", offences);
 }
 
-/// What each member may import of ours, its tests left aside. A name that ends with `::` stands for everything in it.
+/// What each member may import from other members, except in tests. A name that ends with `::` stands for everything in it.
 const MEMBERS_MAY_IMPORT: [(&str, &[&str]); 3] = [
     ("worker/src/", &["lookalike::graph::", "lookalike::protocol::"]),
     ("coordinator/src/", &["lookalike::graph::", "lookalike::protocol::", "lookalike_worker::"]),
@@ -235,7 +235,7 @@ fn members_import_what_their_role_allows() {
 }
 
 #[test]
-fn the_rules_read_rust_as_it_is_written() {
+fn comments_and_literals_are_blanked_and_words_found() {
     let blanked =
         source::without_comments_and_strings("a /* b /* c */ */ \"d // \\\" e\" r#\"f\"#; 'g' 'h: '\\'' // i\nj");
     let left: Vec<String> = words(&blanked).map(|(word, _)| word.name).collect();

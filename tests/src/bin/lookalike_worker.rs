@@ -1,4 +1,4 @@
-//! The real `lookalike-worker` under a name of its own, so that cargo hands its path to the suites.
+//! The real `lookalike-worker` as a program of this crate, so that cargo passes its path to the tests.
 
 use std::process::ExitCode;
 

@@ -1,4 +1,4 @@
-//! What the runner itself costs: see `lookalike_tests::overhead`.
+//! Measures the overhead of the runner: see `lookalike_tests::overhead`.
 
 use std::process::ExitCode;
 

@@ -1,9 +1,9 @@
-//! `lookalike-overhead`: what the runner itself costs, with real worker processes, TLS and the journal.
+//! `lookalike-overhead`: the overhead of the runner, with real worker processes, TLS and the journal.
 //!
 //! ```text
 //!   lookalike-overhead                      every measurement below, each in a process of its own; a table on stderr
-//!   lookalike-overhead round-trip [ROUNDS]  21 nodes that do nothing, again and again
-//!   lookalike-overhead throughput [NODES]   so many of them at once
+//!   lookalike-overhead round-trip [ROUNDS]  rounds of 21 nodes that do no work
+//!   lookalike-overhead throughput [NODES]   this many such nodes at once
 //!   lookalike-overhead worker-killed [NODES]        how soon the nodes of a worker that gets SIGKILL run elsewhere
 //!   lookalike-overhead worker-stopped [NODES]       the same with SIGSTOP
 //!   lookalike-overhead coordinator-killed [NODES]   how soon a coordinator that gets SIGKILL is replaced
@@ -25,13 +25,13 @@ use serde_json::Value;
 /// How many workers there are.
 const WORKERS: usize = 2;
 
-/// How many nodes make one round trip: a fit has so many searches.
+/// How many nodes make one round trip: the number of searches of a fit.
 const ROUND: usize = 21;
 
 /// Measurements of what happens when a process is killed or stopped.
 const FAULTS: [&str; 3] = ["worker-killed", "worker-stopped", "coordinator-killed"];
 
-/// What can go wrong; the program tells it and ends.
+/// Errors are printed by the program, which then ends.
 type Result<T> = std::result::Result<T, Box<dyn std::error::Error>>;
 
 /// The program.
@@ -48,7 +48,7 @@ pub fn main() -> ExitCode {
         ["round-trip", rounds] => number(rounds).and_then(run::round_trip).and_then(|found| print(&found)),
         ["throughput"] => run::throughput(10_000).and_then(|found| print(&found)),
         ["throughput", nodes] => number(nodes).and_then(run::throughput).and_then(|found| print(&found)),
-        // What `coordinator-killed` kills.
+        // The process that `coordinator-killed` kills.
         ["coordinate", folder, nodes] => number(nodes).and_then(|nodes| recovery::coordinate(folder.as_ref(), nodes)),
         [fault, ref nodes @ ..] if FAULTS.contains(&fault) => nodes
             .first()
@@ -66,7 +66,7 @@ pub fn main() -> ExitCode {
     match outcome {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            // Who does not listen misses it.
+            // A write fails if stderr is closed.
             let _ = writeln!(std::io::stderr(), "error: {error}");
             ExitCode::FAILURE
         }
@@ -123,10 +123,10 @@ impl NodeType for Nothing {
     }
 }
 
-/// Computes for as long as a short search does, for all that anybody can tell.
+/// Sleeps for as long as a short search takes.
 struct Pause;
 
-/// How long.
+/// The duration of a [`Pause`].
 const PAUSE: Duration = Duration::from_millis(20);
 
 impl NodeType for Pause {

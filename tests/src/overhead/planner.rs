@@ -1,4 +1,4 @@
-//! Rounds of nodes, each begun when the one before is complete, and how long each took.
+//! Rounds of nodes, each begun when the one before is complete, and the time that each took.
 
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -10,12 +10,12 @@ use nix::sys::resource::{UsageWho, getrusage};
 
 use super::{ROUND, WORKERS};
 
-/// How many rounds go before the first one that counts, at least.
+/// The fewest rounds before the first one that counts.
 const WARM_UP: usize = 50;
 
 /// Plans rounds, and times them.
 pub(super) struct Rounds {
-    /// How many workers have joined, as far as the observer has told.
+    /// How many workers have joined, as reported by the observer.
     joined: Arc<AtomicUsize>,
     /// The sizes of the rounds to come.
     sizes: VecDeque<usize>,
@@ -40,7 +40,7 @@ pub(super) struct Round {
 }
 
 impl Rounds {
-    /// Measure rounds of these sizes, once all workers have joined and something was done before.
+    /// Measure rounds of these sizes, once all workers have joined and the warm-up is over.
     pub(super) fn new(sizes: impl IntoIterator<Item = usize>, joined: Arc<AtomicUsize>) -> Self {
         Self {
             joined,
@@ -102,13 +102,13 @@ impl Planner for Rounds {
     }
 }
 
-/// A node that nobody waits for, unlike any other.
+/// A node whose output no other node uses, different from any other.
 pub(super) fn node(kind: &str, number: u64) -> NodeSpec {
     let (label, parameters) = (format!("{kind} {number}"), number.to_le_bytes().to_vec());
     NodeSpec { kind: kind.into(), label, parameters, inputs: Vec::new(), placement: Placement::Worker, priority: 0 }
 }
 
-/// The processor time that somebody has used.
+/// The processor time used by this process or its children.
 pub(super) fn cpu_time(who: UsageWho) -> Duration {
     let Ok(usage) = getrusage(who) else { return Duration::ZERO };
     let of = |time: nix::sys::time::TimeVal| {

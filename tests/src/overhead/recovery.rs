@@ -1,4 +1,4 @@
-//! How soon a run goes on when one of its processes is killed or stopped.
+//! How soon a run continues after one of its processes was killed or stopped.
 
 use std::io::{BufRead, BufReader, Write};
 use std::path::Path;
@@ -18,13 +18,13 @@ use super::run::{drive, options, rounded};
 use super::{PAUSE, Result, WORKERS};
 use crate::journal::JournalView;
 
-/// How many nodes there are by default: some seconds of work for two threads.
+/// The default number of nodes: some seconds of work for two threads.
 pub(super) const NODES: usize = 500;
 
-/// How many are done before something happens.
+/// How many nodes are done before the fault.
 const BEFORE: usize = 50;
 
-/// So many nodes that take a moment each.
+/// This many nodes that take a short time each.
 struct Pauses(usize);
 
 impl Planner for Pauses {
@@ -37,7 +37,7 @@ impl Planner for Pauses {
     }
 }
 
-/// What was seen of a run whose worker is sent a signal.
+/// Times recorded of a run whose worker is sent a signal.
 #[derive(Default)]
 struct Seen {
     processes: Vec<u32>,
@@ -57,7 +57,7 @@ impl Seen {
                 let victim = self.processes.first().and_then(|process| i32::try_from(*process).ok());
                 if let Some(victim) = victim.filter(|_| self.finished >= BEFORE && self.sent.is_none()) {
                     self.sent = Some(Instant::now());
-                    // A process that is gone is missed in the result.
+                    // If the process is gone already, the result lacks the fault and shows it.
                     let _ = kill(Pid::from_raw(victim), signal);
                 }
             }
@@ -81,7 +81,7 @@ pub(super) fn worker_is_sent(name: &str, nodes: usize) -> Result<Value> {
     let (_, summary) = drive(options(folder.path(), false)?, Pauses(nodes), observer)?;
     let seen = seen.lock().unwrap_or_else(PoisonError::into_inner);
     if signal == Signal::SIGSTOP {
-        // Whom nobody hears cannot be told to end.
+        // A stopped worker cannot be told to end.
         let victim = seen.processes.first().and_then(|process| i32::try_from(*process).ok());
         victim.into_iter().for_each(|victim| _ = kill(Pid::from_raw(victim), Signal::SIGKILL));
     }
@@ -141,7 +141,7 @@ pub(super) fn coordinator_is_killed(nodes: usize) -> Result<Value> {
     }))
 }
 
-/// A coordinator in a process of its own, which tells what happens line by line.
+/// A coordinator in a process of its own, which reports events line by line.
 struct Coordinator {
     child: Child,
     lines: BufReader<std::process::ChildStdout>,
@@ -177,7 +177,7 @@ impl Drop for Coordinator {
     }
 }
 
-/// Coordinate the run in this folder, and tell what happens.
+/// Coordinate the run in this folder and print its events.
 pub(super) fn coordinate(folder: &Path, nodes: usize) -> Result<()> {
     drive(options(folder, true)?, Pauses(nodes), |event| {
         let word = match event {
@@ -185,7 +185,7 @@ pub(super) fn coordinate(folder: &Path, nodes: usize) -> Result<()> {
             RunEvent::NodeFinished { .. } => "finished",
             _ => return,
         };
-        // Nobody reads it when the measurement is over.
+        // A write fails when the measurement is over.
         let _ = writeln!(std::io::stdout(), "{word}");
     })?;
     Ok(())

@@ -1,4 +1,4 @@
-//! How long nodes take that do nothing.
+//! The time that nodes without work take.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -17,7 +17,7 @@ use serde_json::{Value, json};
 use super::planner::{Rounds, cpu_time};
 use super::{ROUND, Result, WORKERS, registry};
 
-/// Rounds of nodes that do nothing.
+/// Rounds of nodes that do no work.
 pub(super) fn round_trip(rounds: usize) -> Result<Value> {
     let folder = tempfile::tempdir()?;
     let (planner, _) = measure(std::iter::repeat_n(ROUND, rounds.max(1)), folder.path())?;
@@ -36,7 +36,7 @@ pub(super) fn round_trip(rounds: usize) -> Result<Value> {
     }))
 }
 
-/// Many nodes that do nothing.
+/// Many nodes that do no work.
 pub(super) fn throughput(nodes: usize) -> Result<Value> {
     let folder = tempfile::tempdir()?;
     let (planner, summary) = measure([nodes.max(10)], folder.path())?;
@@ -96,12 +96,12 @@ fn micros(time: Duration, nodes: usize) -> f64 {
     time.as_secs_f64() * 1e6 / nodes as f64
 }
 
-/// Three digits behind the point are more than was measured.
+/// Rounded to three decimals: more digits were not measured.
 pub(super) fn rounded(value: f64) -> f64 {
     (value * 1e3).round() / 1e3
 }
 
-/// The most memory that this process had at a time.
+/// The peak memory of this process.
 fn peak_kib() -> Result<f64> {
     let status = std::fs::read_to_string("/proc/self/status")?;
     let line =

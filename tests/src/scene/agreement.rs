@@ -16,9 +16,9 @@ use lookalike::{
 };
 use serde_json::{Map, Value, json};
 
-/// Deviations of one term of one lobe at one width. All are shares of the mean radiance over the whole object: of the term's own, but
-/// for what no surface shows alone. The share of the `F5` part is that of a dielectric with F0 = 0.04 and no diffuse part; the share of a
-/// lobe that adjusts another one ([`Expected::adjusts`](lookalike::brdf::Expected::adjusts)) is that of their sum.
+/// Deviations of one term of one lobe at one width. All are shares of the mean radiance of that term over the whole object, with two
+/// exceptions, because no surface shows these terms alone. The `F5` part is relative to a dielectric with F0 = 0.04 and no diffuse part.
+/// A lobe that adjusts another one ([`Expected::adjusts`](lookalike::brdf::Expected::adjusts)) is relative to their sum.
 #[derive(Debug, Clone, Copy)]
 pub struct Agreement {
     /// Lobe of the model.
@@ -66,13 +66,13 @@ struct Entry {
     lobe: usize,
     width: f64,
     reference: Reference,
-    /// Mean radiance over the object of the parts that the reference's channels hold.
+    /// Mean radiance over the object of the parts in the reference's channels.
     level: Rgb,
 }
 
 impl References {
-    /// Integrates every lobe whose name passes `keep`; the main one at each of `widths`, which are mid-knots of `knots`, any other that
-    /// has a width at the nearest mid-knots of its own grid.
+    /// Integrates every lobe whose name passes `keep`. The main lobe is integrated at each of `widths`, which are mid-knots of `knots`;
+    /// any other lobe that has a width, at the nearest mid-knots of its own grid.
     #[must_use]
     pub fn new(
         scene: &Scene,
@@ -110,13 +110,13 @@ impl References {
         Self { model, pixels: pixels.to_vec(), entries }
     }
 
-    /// The model whose lobes they are of.
+    /// The model of these lobes.
     #[must_use]
     pub fn model(&self) -> &'static dyn Model {
         self.model
     }
 
-    /// As they are stored, by lobe.
+    /// The references in stored form, by lobe.
     #[must_use]
     pub fn to_json(&self) -> Map<String, Value> {
         let mut lobes = Map::new();
@@ -131,7 +131,7 @@ impl References {
     /// The stored references of every lobe whose name passes `keep`.
     ///
     /// # Panics
-    /// When there are none of such a lobe.
+    /// When such a lobe has no stored reference.
     #[must_use]
     pub fn from_json(model: &'static dyn Model, pixels: &[Pixel], stored: &Value, keep: impl Fn(&str) -> bool) -> Self {
         let mut entries = Vec::new();
@@ -175,12 +175,12 @@ impl References {
     }
 }
 
-/// What one channel of a [`SplitLobe`] reference holds, by a table: the same part of the lobe under the same channel of the light.
+/// One channel of a [`SplitLobe`] reference by a table: the same part of the lobe under the same channel of the light.
 fn part(model: &dyn Model, table: &TransportTable, lobe: usize, width: f64, channel: usize) -> Vec<f64> {
     let lobes = model.lobes();
     let first: usize = lobes[..lobe].iter().map(|b| lobe_terms(b.lobe)).sum();
     let mut planes = vec![table.planes(); term_count(model)];
-    // Terms depend on the widths alone.
+    // Terms depend only on the widths.
     let (mut parameters, _) = flat_bounds(model.parameters());
     if let Some(of) = lobes[lobe].width {
         parameters[of.entry] = (of.inverse)(width);
@@ -194,7 +194,7 @@ fn part(model: &dyn Model, table: &TransportTable, lobe: usize, width: f64, chan
     (0..table.pixels).map(|p| terms.clone().map(|t| planes[t][channel][p]).sum()).collect()
 }
 
-/// The whole object for mean radiances: a sphere in few pixels, any other shape as it is.
+/// A table of the whole object for mean radiances: a sphere in few pixels, any other shape at full size.
 fn coarse_table(scene: &Scene, model: &'static dyn Model) -> TransportTable {
     let plan = TransportPlan {
         model,
@@ -212,15 +212,15 @@ fn coarse_table(scene: &Scene, model: &'static dyn Model) -> TransportTable {
 /// Reflectance at normal incidence of the darkest common surface.
 const DIELECTRIC_F0: f64 = 0.04;
 
-/// Pixels per side of the coarse object: mean radiances to a percent.
+/// Pixels per side of the coarse object; mean radiances are accurate to 1 %.
 const COARSE: usize = 32;
 
 fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len() as f64
 }
 
-/// The widths half-way (in their logarithm) between neighbouring knots, one for each of the widths asked for: where interpolation is
-/// worst.
+/// The widths half-way (in their logarithm) between neighbouring knots, where interpolation is worst; one for each of the widths
+/// requested.
 #[must_use]
 pub fn mid_knots(knots: &Knots, near: &[f64]) -> Vec<f64> {
     let widths = knots.widths();

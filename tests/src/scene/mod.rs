@@ -1,4 +1,4 @@
-//! Scenes, what the slow reference says of them, and how far transport tables are from it.
+//! Scenes, references by the slow integrator, and the deviations of transport tables from them.
 
 pub mod agreement;
 pub mod photograph;
@@ -18,14 +18,14 @@ use lookalike::{
 };
 use std::sync::Arc;
 
-/// A shape under a light, with what both ways of integrating need of the light.
+/// A shape under a light, with the light prepared for both integrators.
 #[derive(Debug)]
 pub struct Scene {
     /// The shape and the camera.
     pub geometry: Geometry,
-    /// The light as tables see it.
+    /// The light for tables.
     pub pyramid: LightPyramid,
-    /// The light as the direct integrator sees it.
+    /// The light for the direct integrator.
     pub light: LightDistribution,
 }
 

@@ -1,8 +1,8 @@
-//! Photographs of known materials: the pixels of stage one with measured-like noise.
+//! Photographs of known materials: the pixels of stage one with noise like that of measurements.
 //!
-//! They are rendered by quadrature that is far finer in every respect than the tables of stage one (nodes, positions in the pixel,
-//! widths), without interpolation between widths to speak of. The direct integrator, against which both are tested in the suite
-//! `physics`, would need hours for pixels whose own noise is small beside the noise that is added.
+//! They are rendered by quadrature that is far finer than the tables of stage one in nodes, positions in the pixel and widths, so that
+//! interpolation between widths is negligible. The direct integrator, against which both are tested in the suite `physics`, would need
+//! hours until its noise is small beside the noise that is added.
 
 use super::Scene;
 use lookalike::{
@@ -20,7 +20,7 @@ use lookalike::{
 };
 use rayon::prelude::*;
 
-/// What stage one sees of a photograph.
+/// The data of a photograph that stage one uses.
 #[derive(Debug)]
 pub struct Photograph {
     /// Pixels with their weights.
@@ -33,7 +33,7 @@ pub struct Photograph {
     pub variance: f64,
 }
 
-/// How a photograph is taken.
+/// Settings of a photograph.
 #[derive(Debug, Clone, Copy)]
 pub struct Exposure {
     /// Standard deviation of the Gaussian noise, as a share of mean luminance over the object.
@@ -45,7 +45,7 @@ pub struct Exposure {
 }
 
 impl Photograph {
-    /// Photographs a material: importance sampling sees a cheap rendering, the pixels drawn are integrated well.
+    /// Photographs a material: importance sampling uses a cheap rendering; the pixels drawn are integrated accurately.
     ///
     /// # Panics
     /// When the object reflects no light.
@@ -88,10 +88,10 @@ fn radiance(scene: &Scene, material: &Material, pixels: &[Pixel]) -> Vec<Rgb> {
     (0..pixels.len()).map(|p| Rgb::new(planes[0][p], planes[1][p], planes[2][p])).collect()
 }
 
-/// Of the photograph: a tenth of the errors of stage one.
+/// Accuracy of the photograph: a tenth of the errors of stage one.
 const FINE: Accuracy = Accuracy { tolerance: 1e-5, footprint: 0.25 };
 
-/// Samples per pixel of the rendering that importance sampling sees.
+/// Samples per pixel of the rendering that importance sampling uses.
 const CHEAP_SAMPLES: u32 = 64;
 
 /// Three independent standard normal numbers for a pixel (Box & Muller 1958).

@@ -1,4 +1,4 @@
-//! How far noise moves a fit: the linear prediction of the parameters' standard deviations.
+//! How far noise moves the result of a fit: the linear prediction of the parameters' standard deviations.
 //!
 //! Eq. 1 weighs pixels by `W = diag(w)`, which is not the inverse of the noise's covariance `S`. The minimum moves by
 //! `-(J'WJ)^-1 J'W n`, so its covariance is the sandwich `(J'WJ)^-1 (J'W S W J) (J'WJ)^-1`; with `W = S^-1` it would

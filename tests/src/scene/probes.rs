@@ -1,7 +1,7 @@
 //! The real light probes that development uses; they are not part of the project.
 //!
-//! They are looked for in the folder that the environment variable `LOOKALIKE_DATA` names, else in `../shared/data`
-//! beside the workspace. A test that finds none says so and passes.
+//! They are read from the folder that the environment variable `LOOKALIKE_DATA` names, else from `../shared/data` beside the workspace. A
+//! test that finds none prints so and passes.
 
 use lookalike::{
     image::decode,
@@ -28,10 +28,10 @@ pub const NOON_GRASS: Probe = Probe("noon_grass_1k.hdr");
 pub const ALL: [Probe; 5] = [GRACE, RNL, UFFIZI, STUDIO, NOON_GRASS];
 
 impl Probe {
-    /// The map, or `None` with a message on stderr when the file is not there.
+    /// The map, or `None` with a message on stderr when the file does not exist.
     ///
     /// # Panics
-    /// When the file is there and cannot be read.
+    /// When the file exists and cannot be read.
     #[must_use]
     pub fn load(self) -> Option<Environment> {
         let path = folder().join("probes").join(self.0);

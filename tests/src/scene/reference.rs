@@ -1,4 +1,4 @@
-//! What the direct integrator says, with its own standard error.
+//! Radiance by the direct integrator, with its own standard error.
 
 use super::Scene;
 use lookalike::{
@@ -9,11 +9,11 @@ use lookalike::{
 use rayon::prelude::*;
 use serde_json::{Value, json};
 
-/// Independent randomisations behind a standard error.
+/// How many independent randomisations a standard error is computed from.
 pub const RANDOMISATIONS: u32 = 8;
 
-/// A lobe split as tables split it, the parts in different channels: red `1 - F5`, green `F5`, blue the whole lobe. So one rendering
-/// is the reference of every term, each under one channel of the light.
+/// A lobe split as tables split it, the parts in different channels: red `1 - F5`, green `F5`, blue the whole lobe. One rendering thus
+/// gives the reference of every term, each under one channel of the light.
 #[derive(Debug, Clone, Copy)]
 pub struct SplitLobe {
     /// The lobe.
@@ -52,21 +52,21 @@ pub struct Reference {
     pub standard_error: Rgb,
 }
 
-/// How long a reference is integrated.
+/// The sample counts and the target error of a reference.
 #[derive(Debug, Clone, Copy)]
 pub struct Effort {
-    /// Samples per pixel at first, over all randomisations.
+    /// Samples per pixel at the start, over all randomisations.
     pub first: u32,
     /// A pixel gets four times the samples as long as its standard error, in any channel, is above this share of `level`.
     pub standard_error: f64,
     /// The scale of errors, per channel: mean radiance over the object.
     pub level: Rgb,
-    /// No pixel gets more samples than this.
+    /// The most samples that a pixel gets.
     pub most: u32,
 }
 
 impl Reference {
-    /// Integrates `pixels`; `seed` tells references apart, every one has seeds of its own.
+    /// Integrates `pixels`; references with different `seed` use different random numbers.
     #[must_use]
     pub fn new(scene: &Scene, pixels: &[Pixel], reflectance: &dyn Reflectance, effort: Effort, seed: u64) -> Self {
         let estimate = |pixel: Pixel, samples: u32| Estimate::new(scene, pixel, reflectance, samples, seed);
@@ -89,17 +89,17 @@ impl Reference {
         Self { radiance, variance, standard_error: Rgb::from_array(mean_variance.to_array().map(f64::sqrt)) }
     }
 
-    /// As it is stored: mean and variance of each pixel, red, green, blue.
+    /// The stored form: mean and variance of each pixel, red, green, blue.
     #[must_use]
     pub fn to_json(&self) -> Value {
         json!({ "mean": self.radiance.iter().map(|rgb| rounded(*rgb, 6)).collect::<Vec<_>>(),
                 "variance": self.variance.iter().map(|rgb| rounded(*rgb, 2)).collect::<Vec<_>>() })
     }
 
-    /// What [`to_json`](Self::to_json) stored.
+    /// Reads the form that [`to_json`](Self::to_json) writes.
     ///
     /// # Panics
-    /// When it is something else.
+    /// When the value has another form.
     #[must_use]
     pub fn from_json(stored: &Value) -> Self {
         let list = |name: &str| stored[name].as_array().expect(name).iter().map(rgb).collect();
@@ -107,13 +107,13 @@ impl Reference {
     }
 }
 
-/// A colour to so many significant digits.
+/// A colour rounded to this many significant digits.
 #[must_use]
 pub(super) fn rounded(colour: Rgb, digits: usize) -> [f64; 3] {
     colour.to_array().map(|x| format!("{x:.*e}", digits - 1).parse().expect("a number"))
 }
 
-/// What [`rounded`] gave.
+/// Reads a colour stored by [`rounded`].
 pub(super) fn rgb(stored: &Value) -> Rgb {
     Rgb::from_array(std::array::from_fn(|channel| stored[channel].as_f64().expect("three numbers")))
 }

@@ -1,4 +1,4 @@
-//! Light that needs no file: closed formulas with the difficulties of real probes.
+//! Light from closed formulas, without files, with the difficulties of real probes.
 
 use lookalike::{image::Image, light::Environment, math::to_f32};
 
@@ -12,7 +12,7 @@ pub fn room(n: usize) -> Environment {
     furnished(n, [500.0, 450.0, 400.0])
 }
 
-/// The same room without the sun, for checks that would need very many samples beside it.
+/// The same room without the sun, for checks that would need very many samples with it.
 ///
 /// # Panics
 /// When `n` is below 16.

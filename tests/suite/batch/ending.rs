@@ -1,4 +1,4 @@
-//! How a batch ends when not all goes well: which fits have results, which code.
+//! How a batch ends when a fit fails or misses its score: which fits have results, and the exit code.
 
 use super::{QUICK, batch, folder, states, summary};
 use crate::program::lookalike;
@@ -7,13 +7,13 @@ use serde_json::{Value, json};
 use std::process::{Command, Output};
 use tempfile::TempDir;
 
-/// Three fits; the second fails when it is to be judged.
+/// Three fits; judging of the second fails.
 fn one_fails() -> String {
     format!("photos = ['photo.exr', 'tiny.exr', 'red.exr']\nenvironments = 'map.exr'\n[defaults]\n{QUICK}")
 }
 
 #[test]
-fn failed_fit_is_code_four_and_the_others_are_complete() {
+fn failed_fit_is_code_four_and_the_others_complete() {
     let folder = folder(&one_fails());
     let answer = batch(&folder, "out", "--workers 1");
     assert_eq!(answer.code, Some(4), "{}", answer.stderr);
@@ -40,7 +40,7 @@ fn failed_fit_is_code_four_and_the_others_are_complete() {
             assert_eq!(fit[field], summary[field], "{field}");
         }
     }
-    // Where nobody can tell whether there is a lock, it is the same.
+    // Without the lock file the state is the same.
     std::fs::remove_file(out.join("run.lock")).unwrap();
     assert!(lookalike(folder.path(), "status out").done().stdout.contains("ended: 1 of 3 fits failed"));
 }
@@ -68,7 +68,7 @@ fn fail_fast_ends_the_batch_with_code_four() {
     assert_eq!(super::states(&super::summary(&folder.path().join("on"))), ["done", "failed", "done"]);
 }
 
-/// Runs one fit of a batch, whose summaries cannot be written from its first worker on; `act` is told of its process then.
+/// Runs one fit of a batch whose summaries cannot be written after its first worker has joined; `act` then gets the id of the process.
 fn without_summaries(folder: &TempDir, act: impl Fn(u32)) -> (Output, Vec<Value>) {
     let mut command = Command::new(env!("CARGO_BIN_EXE_lookalike-under-test"));
     let line = "batch batch.toml --out out --workers 1 --progress json";
@@ -83,7 +83,7 @@ fn without_summaries(folder: &TempDir, act: impl Fn(u32)) -> (Output, Vec<Value>
 }
 
 #[test]
-fn summaries_that_cannot_be_written_are_code_three_unless_something_was_wrong_before() {
+fn unwritable_summaries_are_code_three_unless_the_batch_was_interrupted() {
     let manifest = format!("photos = 'photo.exr'\nenvironments = 'map.exr'\n[defaults]\n{QUICK}");
     let whole = folder(&manifest);
     let (output, events) = without_summaries(&whole, |_| ());

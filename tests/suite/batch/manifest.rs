@@ -1,10 +1,10 @@
-//! Manifests and inputs that cannot be used: refused with code 2 before any work, all that is wrong at once.
+//! Unusable manifests and inputs: refused with code 2 before any work, with all mistakes in one message.
 
 use super::{QUICK, batch, folder};
 use std::fs;
 
 #[test]
-fn mistakes_in_the_manifest_are_told_with_their_lines() {
+fn mistakes_in_the_manifest_are_reported_with_their_lines() {
     let folder = folder("photos = 'none/*.exr'\nenvironments = 'map.exr'\n[defaults]\nsampels = 3\n");
     batch(&folder, "out", "").refused(&[
         "error: batch.toml: 2 problems",
@@ -15,7 +15,7 @@ fn mistakes_in_the_manifest_are_told_with_their_lines() {
 }
 
 #[test]
-fn inputs_that_cannot_be_used_are_told_all_at_once_with_the_fits_that_want_them() {
+fn unusable_inputs_are_reported_together_with_the_fits_that_use_them() {
     let folder = folder(&format!(
         "photos = ['photo.exr', 'not-there.exr']\nenvironments = ['map.exr', 'photo.exr']\n[defaults]\n{QUICK}\
          [[fit]]\nname = 'masked'\nphoto = 'photo.exr'\nenv = 'map.exr'\nmask = 'tiny.exr'\n\
@@ -34,7 +34,7 @@ fn inputs_that_cannot_be_used_are_told_all_at_once_with_the_fits_that_want_them(
 }
 
 #[test]
-fn folder_of_an_earlier_batch_is_left_alone() {
+fn folder_of_an_earlier_batch_is_refused_and_unchanged() {
     let folder = folder(&format!("photos = 'photo.exr'\nenvironments = 'map.exr'\n[defaults]\n{QUICK}"));
     fs::create_dir(folder.path().join("out")).unwrap();
     fs::write(folder.path().join("out/summary.json"), "precious").unwrap();

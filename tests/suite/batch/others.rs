@@ -1,4 +1,4 @@
-//! Folders of fits that hold what the batch did not write: neither taken for its results nor written over.
+//! Fits in the output folder that the batch did not write: neither taken for its results nor replaced.
 
 use super::{QUICK, batch, folder, scene, states, summary};
 use crate::program::lookalike;
@@ -15,13 +15,13 @@ fn two() -> TempDir {
     folder(&format!("[defaults]\n{QUICK}{fits}"))
 }
 
-/// A fit alone, with settings that the batch does not have.
+/// A single fit, with settings that differ from those of the batch.
 fn alone(folder: &TempDir, out: &str) {
     let flags = "--samples 16 --gammas 1 --polish off --workers 1 --progress none";
     lookalike(folder.path(), &format!("fit photo.exr --env map.exr --out {out} {flags}")).done();
 }
 
-/// The batch with `--resume`, killed as soon as its journal has a fit that is written: its name, and that of the other one.
+/// Kills a batch with `--resume` as soon as its journal has a written fit. Returns the name of that fit and of the other one.
 fn killed_after_a_fit(folder: &TempDir) -> [&'static str; 2] {
     let mut command = Command::new(env!("CARGO_BIN_EXE_lookalike-under-test"));
     let line = "batch batch.toml --out out --resume --workers 1 --progress json";
@@ -29,7 +29,7 @@ fn killed_after_a_fit(folder: &TempDir) -> [&'static str; 2] {
     let written = "SELECT name FROM fits WHERE outputs IS NOT NULL";
     let mut has_finished = false;
     let found = process.stderr_until(|event| {
-        // Looked at for every event, the journal would keep this test from hearing of the fit in time.
+        // The journal is opened only after `fit-finished`: opening it at every event would be too slow to see the fit in time.
         has_finished |= event["event"] == "fit-finished";
         let journal = || JournalView::of(&folder.path().join("out"));
         has_finished.then(|| journal().column::<String>(written)).filter(|names| !names.is_empty())
@@ -50,7 +50,7 @@ fn copy(from: &Path, to: &Path, files: &[&str]) {
 const FILES: [&str; 6] = ["candidates.csv", "match.exr", "match.png", "reference.png", "difference.png", "fit.json"];
 
 #[test]
-fn results_without_a_journal_are_nobodys_and_refused_all_at_once() {
+fn results_that_the_run_did_not_write_are_refused_together() {
     let folder = two();
     for name in NAMES {
         alone(&folder, &format!("out/{name}"));
@@ -66,7 +66,7 @@ fn results_without_a_journal_are_nobodys_and_refused_all_at_once() {
     }
     assert_eq!(fs::read(folder.path().join("out/photo-map-ggx/fit.json")).unwrap(), before);
     assert!(!folder.path().join("out/run.sqlite").exists() && !folder.path().join("out/summary.json").exists());
-    // A fit that is not finished is somebody's as well, and the mark of a finished one is enough.
+    // An unfinished fit is also refused, and so is a folder with only the files of a finished one.
     fs::remove_dir_all(folder.path().join("out/red-map-ggx")).unwrap();
     fs::remove_file(folder.path().join("out/photo-map-ggx/run.sqlite")).unwrap();
     batch(&folder, "out", "").refused(&["out/photo-map-ggx holds a fit that is not of this run"]);
@@ -76,7 +76,7 @@ fn results_without_a_journal_are_nobodys_and_refused_all_at_once() {
 }
 
 #[test]
-fn batch_that_is_gone_on_with_takes_only_what_its_journal_says_it_wrote() {
+fn resumed_batch_accepts_only_results_written_according_to_its_journal() {
     let folder = two();
     let [written, open] = killed_after_a_fit(&folder);
     alone(&folder, "alone");
@@ -91,7 +91,7 @@ fn batch_that_is_gone_on_with_takes_only_what_its_journal_says_it_wrote() {
     batch(&folder, "out", "--resume")
         .refused(&[&format!("{written}/match.exr is not what the run in out wrote; keep a changed file elsewhere")]);
     fs::write(at(written).join("match.exr"), kept).unwrap();
-    // A fit that the run did not write stays, also without a journal of its own.
+    // A fit that the run did not write is refused even without a journal.
     let foreign = fs::read(at(open).join("fit.json")).unwrap();
     batch(&folder, "out", "--resume").refused(&[&format!("out/{open} holds a fit that is not of this run")]);
     assert!(fs::read(at(open).join("fit.json")).unwrap() == foreign);

@@ -1,4 +1,4 @@
-//! What a batch leaves in its folder.
+//! The summaries that a batch writes.
 
 use super::{QUICK, batch, folder, scene, summary};
 use serde_json::json;

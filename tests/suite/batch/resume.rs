@@ -1,5 +1,4 @@
-//! A batch that is resumed: what is complete stays, what was acknowledged is not computed again, and the results are those of a
-//! run that nobody disturbed.
+//! A resumed batch: complete fits stay, acknowledged nodes are not computed again, and the results are those of an undisturbed run.
 
 use super::{QUICK, batch, folder, scene, states, summary};
 use lookalike_tests::{
@@ -17,7 +16,7 @@ fn four() -> TempDir {
     folder(&format!("{product}[defaults]\n{QUICK}"))
 }
 
-/// The fits that the journal of `out` says are written.
+/// The fits that are written according to the journal of `out`.
 fn written(folder: &TempDir) -> Vec<String> {
     let journal = JournalView::of(&folder.path().join("out"));
     journal.column("SELECT name FROM fits WHERE outputs IS NOT NULL ORDER BY number")
@@ -29,7 +28,7 @@ fn start(folder: &TempDir, flags: &str) -> Process {
     Process::start(command.args(line.split_whitespace()).current_dir(folder.path()).env_remove("RUST_LOG"))
 }
 
-/// Runs the batch to the first event that `pick` takes and kills its coordinator then.
+/// Runs the batch to the first event that `pick` accepts and then kills its coordinator.
 fn kill_at(folder: &TempDir, mut pick: impl FnMut(&Value) -> bool) {
     let mut process = start(folder, "--workers 2");
     let found = process.stderr_until(|event| pick(event).then_some(()));
@@ -38,7 +37,7 @@ fn kill_at(folder: &TempDir, mut pick: impl FnMut(&Value) -> bool) {
 }
 
 #[test]
-fn killed_batch_goes_on_where_it_was_and_ends_with_the_same_results() {
+fn killed_batch_resumes_and_ends_with_the_same_results() {
     let folder = four();
     batch(&folder, "whole", "--workers 2").done();
     let is = |event: &Value, name: &str, kind: &str| event["event"] == name && event["kind"] == kind;
@@ -72,11 +71,11 @@ fn killed_batch_goes_on_where_it_was_and_ends_with_the_same_results() {
     };
     assert_eq!(numbers("whole"), numbers("out"));
 
-    // Finished: nothing is left to do.
+    // The batch is finished: no fit is run.
     let again = batch(&folder, "out", "--resume --workers 1").done();
     assert!(again.stderr.contains("out is finished, and its results are as it wrote them"), "{}", again.stderr);
     assert!(again.stdout.contains("4 of 4 done"), "{}", again.stdout);
-    // Unless something is missing: that fit alone is run.
+    // If a file is missing, only its fit is run.
     fs::remove_file(at("out").join("red-map-ggx/match.exr")).unwrap();
     let (output, events) = start(&folder, "--workers 1").watch_stderr(|_| ());
     assert_eq!(output.status.code(), Some(0), "{events:?}");
@@ -87,9 +86,9 @@ fn killed_batch_goes_on_where_it_was_and_ends_with_the_same_results() {
 }
 
 #[test]
-fn outputs_of_fits_that_are_written_leave_the_journal_while_the_batch_goes_on() {
+fn outputs_of_written_fits_are_deleted_from_the_journal_during_the_batch() {
     let folder = four();
-    // The first two fits are complete, and something of the others has ended after that.
+    // The first two fits are complete, and a node has finished after that.
     let mut process = start(&folder, "--workers 1");
     let coordinator = process.id();
     let mut complete = 0;
@@ -105,7 +104,7 @@ fn outputs_of_fits_that_are_written_leave_the_journal_while_the_batch_goes_on() 
 }
 
 #[test]
-fn changed_settings_inputs_and_fits_are_refused_by_name() {
+fn changed_settings_inputs_and_fits_are_refused_and_named() {
     let folder = four();
     kill_at(&folder, |event| event["event"] == "node-finished");
     let refused = |flags: &str, phrase: &str| batch(&folder, "out", flags).refused(&[phrase]);
@@ -120,7 +119,7 @@ fn changed_settings_inputs_and_fits_are_refused_by_name() {
 }
 
 #[test]
-fn failed_fits_are_tried_again() {
+fn failed_fits_are_retried_on_resume() {
     let folder = folder(&format!("photos = ['photo.exr', 'tiny.exr']\nenvironments = 'map.exr'\n[defaults]\n{QUICK}"));
     assert_eq!(batch(&folder, "out", "--workers 1").code, Some(4));
     let (output, events) = start(&folder, "--workers 1").watch_stderr(|_| ());

@@ -1,4 +1,4 @@
-//! A fit of a batch is the same fit as alone, bit for bit, wherever its second stage runs and whatever it shares with others.
+//! A fit in a batch has the same bits as a single fit, wherever its second stage runs and whatever it shares with other fits.
 
 use super::{batch, folder, scene, states, summary};
 use crate::program::lookalike;
@@ -7,7 +7,7 @@ use std::fs;
 const PICTURES: [&str; 5] = ["match.exr", "match.png", "reference.png", "difference.png", "candidates.csv"];
 
 #[test]
-fn fits_of_a_batch_are_the_fits_alone_wherever_they_are_judged() {
+fn fits_of_a_batch_equal_single_fits_wherever_they_are_judged() {
     let manifest = format!(
         "photos = ['photo.exr', 'red.exr']\nenvironments = 'map.exr'\nmodels = ['ggx', 'cook-torrance']\n[defaults]\nsamples = 32\ngammas = '1:2:0.5'\n\
          [[fit]]\nname = 'again'\nphoto = 'photo.exr'\nenv = 'map.exr'\njudge = 'object'\n"

@@ -1,4 +1,4 @@
-//! Watching a batch: the stream of progress, the metrics, fits that end early.
+//! Progress of a batch: the event stream, the metrics, and the order in which fits end.
 
 use super::{QUICK, folder};
 use lookalike_tests::process::{Process, signal};
@@ -27,7 +27,7 @@ fn is(event: &Value, name: &str) -> bool {
 }
 
 #[test]
-fn early_fits_end_early_and_the_stream_says_so() {
+fn fits_end_in_about_their_order_and_events_report_it() {
     let photos = "'photo.exr', 'red.exr', 'tiny.exr'";
     let sets = ["a", "b", "c", "d"]
         .map(|name| format!("[[set]]\nname = '{name}'\nphotos = [{photos}]\nseed = {}\n", name.as_bytes()[0]));
@@ -35,10 +35,10 @@ fn early_fits_end_early_and_the_stream_says_so() {
     let out = folder.path().join("out");
     let mut partial = None;
     let mut command = command(&folder, "--workers 1");
-    // As many threads as fits may wait for each other to be judged.
+    // The number of threads limits how many fits wait to be judged.
     let process = Process::start(command.env("RAYON_NUM_THREADS", "2"));
     let (output, events) = process.watch_stderr(|events| {
-        // Results are there while the batch goes on.
+        // Results of a fit are written while the batch runs.
         let event = &events[events.len() - 1];
         if partial.is_none() && is(event, "fit-finished") {
             let name = event["fit"].as_str().unwrap();
@@ -63,7 +63,7 @@ fn early_fits_end_early_and_the_stream_says_so() {
         let fits = &event["fits"];
         assert_eq!(fits["done"].as_u64().unwrap() + fits["failed"].as_u64().unwrap(), count, "{event}");
     }
-    // Early ones end early: nobody ends more than the few that are under way at a time before its turn.
+    // Fits end in about their order: at most four places from their own, because only a few run at a time.
     for (place, event) in (0..).zip(&ends) {
         let number = event["number"].as_i64().unwrap();
         assert!((number - place).abs() <= 4, "{event} as the {place}th");
@@ -75,7 +75,7 @@ fn early_fits_end_early_and_the_stream_says_so() {
     assert!(is(events.last().unwrap(), "finished"));
 }
 
-/// The page that an address serves.
+/// The page served at an address.
 fn scrape(address: &str) -> String {
     let mut stream = TcpStream::connect(address).unwrap();
     stream.write_all(b"GET /metrics HTTP/1.1\r\nHost: localhost\r\n\r\n").unwrap();
@@ -87,7 +87,7 @@ fn scrape(address: &str) -> String {
 }
 
 #[test]
-fn metrics_tell_what_waits_for_workers() {
+fn metrics_report_fits_that_wait_for_workers() {
     let models = "models = ['ggx', 'cook-torrance']";
     let folder =
         folder(&format!("photos = ['photo.exr', 'red.exr']\nenvironments = 'map.exr'\n{models}\n[defaults]\n{QUICK}"));
@@ -99,7 +99,7 @@ fn metrics_tell_what_waits_for_workers() {
         if let Some(text) = event["text"].as_str().and_then(|text| text.strip_prefix("metrics at http://")) {
             address = text.strip_suffix("/metrics").map(str::to_owned);
         }
-        // One node is not enough for a worker: the second fit begins as soon as it is read, though no node ends here.
+        // The second fit starts as soon as it is read, although no node finishes here, because one ready node is not enough for a worker.
         let started = events.iter().filter(|event| is(event, "fit-started")).count();
         let is_planned = events.iter().any(|event| is(event, "node-added") && event["kind"] == "search");
         if page.is_none() && started == 2 && is_planned {
@@ -126,7 +126,7 @@ fn metrics_tell_what_waits_for_workers() {
 }
 
 #[test]
-fn batch_goes_on_when_nobody_reads_its_progress_any_more() {
+fn batch_continues_when_its_progress_is_no_longer_read() {
     let folder = folder(&format!("photos = 'photo.exr'\nenvironments = 'map.exr'\n[defaults]\n{QUICK}"));
     let mut process = start(&folder, "--workers 1");
     let found = process.stderr_until(|event| is(event, "worker-joined").then_some(()));

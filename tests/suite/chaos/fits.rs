@@ -1,4 +1,4 @@
-//! A fit whose coordinator and workers all died, as when a machine loses its power, and whose journal has suffered.
+//! A fit whose coordinator and workers were all killed, as by a power failure, and whose journal was truncated or damaged.
 
 use std::fs;
 use std::path::Path;
@@ -10,7 +10,7 @@ use lookalike_tests::process::{Process, kill_if_alive};
 use super::random::FILES;
 use crate::fit::scene::{MANY_NODES as FLAGS, MANY_NODES_FIT, fit, folder, without_timing};
 
-/// Kill a fit and its workers after so many nodes.
+/// Kill a fit and its workers after this many finished nodes.
 fn kill_all_after(folder: &Path, out: &str, finished: usize) {
     let line = format!("fit photo.exr --env map.exr --out {out} {FLAGS} --progress json");
     let mut command = Command::new(env!("CARGO_BIN_EXE_lookalike-under-test"));
@@ -45,13 +45,13 @@ fn assert_same(whole: &Path, out: &Path, what: &str) {
 }
 
 #[test]
-fn journal_that_was_torn_or_damaged_costs_what_it_has_lost_and_nothing_else() {
+fn truncated_or_damaged_journal_loses_only_its_lost_records() {
     let folder = folder();
     let at = |name: &str| folder.path().join(name);
     MANY_NODES_FIT.copy_to(&at("whole"));
     kill_all_after(folder.path(), "killed", 9);
     let resume = |out: &str| fit(folder.path(), out, &format!("{FLAGS} --progress none --resume")).done();
-    // What is left of the log; the last one lacks a byte.
+    // The shares of the log that remain; the largest lacks one byte.
     let shares = if cfg!(feature = "slow") { (0..20).map(|n| f64::from(n) / 19.0).collect() } else { vec![0.0, 0.6] };
     let mut recalled = Vec::new();
     for (index, share) in shares.into_iter().enumerate() {
@@ -61,7 +61,7 @@ fn journal_that_was_torn_or_damaged_costs_what_it_has_lost_and_nothing_else() {
         resume(&out);
         assert_same(&at("whole"), &at(&out), &format!("{left} bytes of the log"));
         let journal = JournalView::of(&at(&out));
-        // Whatever is torn, the number of a coordinator is never given again: workers may still answer to it.
+        // However much is lost, the number of a coordinator is never used again: workers may still answer to it.
         assert_eq!(journal.number("SELECT max(epoch) FROM epochs"), 2, "{left} bytes of the log");
         assert_eq!(journal.run_twice(), 0, "{left} bytes of the log");
         recalled.push(journal.number("SELECT count(*) FROM node_list WHERE epoch = 2 AND state = 'recalled'"));

@@ -1,5 +1,5 @@
-//! Faults that happen to real processes, at every moment that can be told from outside: the result is always the one of a run in a
-//! single process, nothing is lost, and nothing that was acknowledged is done twice.
+//! Faults of real processes at every moment that can be observed from outside: the result is that of a run in a single process, nothing
+//! is lost, and nothing acknowledged is done twice.
 
 mod fits;
 mod network;
@@ -24,7 +24,7 @@ fn gates(gate: &Gate, count: usize) -> Leaves {
     Leaves::Gates { count, address: gate.address().to_string() }
 }
 
-/// The result of a plan of gates; to pass a gate gives the same bytes anywhere.
+/// The result of a plan of gates; a gate has the same output in any run.
 fn gates_reference(count: usize) -> Option<Vec<u8>> {
     let gate = Gate::new();
     let leaves = gates(&gate, count);
@@ -34,7 +34,7 @@ fn gates_reference(count: usize) -> Option<Vec<u8>> {
     reference
 }
 
-/// A run without workers of its own.
+/// A run without local workers.
 fn run_for_others(leaves: Leaves, options: RunnerOptions) -> (Cluster, String) {
     let listen = options.listen.or(Some(([127, 0, 0, 1], 0).into()));
     let cluster = Cluster::start(leaves, RunnerOptions { listen, ..options });
@@ -46,7 +46,7 @@ fn without_workers() -> RunnerOptions {
     options(PROGRAM, 0)
 }
 
-/// A worker of one thread that finds its coordinator at this address.
+/// A worker with one thread that connects to its coordinator at this address.
 fn worker_at(access: &Path, address: &str) -> Process {
     let mut command = Command::new(PROGRAM);
     Process::start(command.args(["worker", "--threads", "1", "--address", address, "--access"]).arg(access))
@@ -59,7 +59,7 @@ fn departure(cluster: &Cluster) -> Departure {
     })
 }
 
-/// Wait until a node is taken back: how many workers have died of it, as far as anybody knows.
+/// Wait until a node is re-queued: how many worker deaths are counted for it.
 fn deaths_when_requeued(cluster: &Cluster) -> u32 {
     cluster.wait_for(|event| match event {
         RunEvent::NodeRequeued { crashes, .. } => Some(*crashes),

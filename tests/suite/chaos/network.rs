@@ -1,4 +1,4 @@
-//! A worker on a machine of its own, and what may happen to the line to it. Needs root and iproute2; skipped with a message else.
+//! A worker in a network namespace, and faults of the line to it. Needs root and iproute2; without them the tests print so and pass.
 
 use std::time::Duration;
 
@@ -25,7 +25,7 @@ struct Scene {
     namespace: Namespace,
 }
 
-/// `None` where there are no namespaces.
+/// `None` where namespaces cannot be created.
 fn scene(nodes: usize, lost_after: Duration) -> Option<Scene> {
     let namespace = Namespace::new()?;
     let gate = Gate::at(namespace.control());
@@ -41,11 +41,11 @@ fn scene(nodes: usize, lost_after: Duration) -> Option<Scene> {
     Some(Scene { worker, waiting, gate, cluster, namespace })
 }
 
-/// A lease that is short for a worker that cannot be heard, and long for one that the machine lets wait.
+/// A lease that is short for a worker that cannot be reached, and long for one that waits for a processor.
 const SHORT: Duration = Duration::from_secs(3);
 
 #[test]
-fn line_cut_for_less_than_the_lease_delays_the_result_and_nothing_else() {
+fn line_cut_for_less_than_the_lease_only_delays_the_result() {
     let Some(Scene { worker, waiting, gate, cluster, namespace }) = scene(1, Duration::from_secs(20)) else { return };
     namespace.cut();
     waiting.release();
@@ -60,7 +60,7 @@ fn line_cut_for_less_than_the_lease_delays_the_result_and_nothing_else() {
 }
 
 #[test]
-fn line_cut_for_longer_than_the_lease_gives_the_node_to_another_and_the_late_result_is_equal() {
+fn line_cut_for_longer_than_the_lease_reruns_the_node_and_the_late_result_is_a_duplicate() {
     let Some(Scene { worker, waiting, gate, cluster, namespace }) = scene(3, SHORT) else { return };
     namespace.cut();
     assert_eq!(departure(&cluster), Departure::Silent);
@@ -72,7 +72,7 @@ fn line_cut_for_longer_than_the_lease_gives_the_node_to_another_and_the_late_res
     wait_for_start(&cluster);
     wait_for_start(&cluster);
     namespace.heal();
-    // By itself it notices that its connection is dead, comes back with its result, and takes the third node.
+    // The worker detects the dead connection by itself, reconnects, returns its result, and is assigned the third node.
     wait_for_worker(&cluster);
     // No other node has two results yet.
     cluster.wait_for(|event| matches!(event, RunEvent::DuplicateResult { .. }).then_some(()));
@@ -83,7 +83,7 @@ fn line_cut_for_longer_than_the_lease_gives_the_node_to_another_and_the_late_res
     let (result, summary) = cluster.finish();
     keeper.stop();
     assert_eq!(result, gates_reference(3));
-    // The third node may have been on the other worker, which may begin with it before it hears that it was moved.
+    // The third node may have been assigned to the other worker, which may start it before it learns that the node was moved.
     assert!((1..=2).contains(&summary.duplicate_results), "{summary:?}");
     assert_eq!((summary.requeued_nodes, summary.suspected_nodes), (1, 0), "{summary:?}");
     for worker in [worker, other] {
@@ -92,30 +92,30 @@ fn line_cut_for_longer_than_the_lease_gives_the_node_to_another_and_the_late_res
 }
 
 #[test]
-fn worker_that_is_not_heard_though_it_hears_is_lost_and_comes_back() {
+fn worker_that_can_only_receive_is_lost_and_rejoins() {
     let Some(Scene { worker, waiting, gate, cluster, namespace }) = scene(1, SHORT) else { return };
     namespace.mute();
     assert_eq!(departure(&cluster), Departure::Silent);
     namespace.hear();
-    // It finds out that it was given up, comes back, and goes on with what it has in hand.
+    // The worker learns that it was declared lost, reconnects, and continues its executing node.
     wait_for_worker(&cluster);
     wait_for_start(&cluster);
     waiting.release();
     let (result, summary) = cluster.finish();
     assert_eq!(result, gates_reference(1));
     assert_eq!((summary.workers_joined, summary.requeued_nodes, summary.suspected_nodes), (2, 1, 0));
-    // It was not run a second time.
+    // The node was not rerun.
     assert!(gate.is_deserted());
     assert_eq!(worker.output().status.code(), Some(0));
 }
 
 #[test]
-fn worker_that_hears_nothing_though_it_is_heard_still_brings_its_result() {
+fn worker_that_can_only_send_still_delivers_its_result() {
     let Some(Scene { worker, waiting, gate, cluster, namespace }) = scene(1, Duration::from_secs(20)) else { return };
     namespace.deafen();
     waiting.release();
     cluster.wait_for(|event| matches!(event, RunEvent::NodeFinished { .. }).then_some(()));
-    // The receipt, and the last node, are on their way until it hears again.
+    // The acknowledgement and the last node are delayed until the direction works again.
     cluster.assert_none_for(Duration::from_millis(300), |event| matches!(event, RunEvent::WorkerLeft { .. }));
     namespace.hear();
     let (result, summary) = cluster.finish();
@@ -126,10 +126,10 @@ fn worker_that_hears_nothing_though_it_is_heard_still_brings_its_result() {
 }
 
 #[test]
-fn machine_that_vanishes_with_its_worker_leaves_half_a_connection_and_loses_no_node() {
+fn machine_that_vanishes_leaves_a_half_open_connection_and_loses_no_node() {
     let Some(Scene { worker, waiting, gate, cluster, namespace }) = scene(1, SHORT) else { return };
     namespace.cut();
-    // Nobody hears of its end.
+    // The coordinator is not told of its end.
     worker.kill();
     waiting.wait_for_death();
     assert_eq!(departure(&cluster), Departure::Silent);

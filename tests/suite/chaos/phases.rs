@@ -1,4 +1,4 @@
-//! A worker's life, and its end at each point of it: a wire that stops after so many bytes says where it is.
+//! A worker killed at each point of its session; a proxy that stops after a number of bytes determines the point.
 
 use std::time::Duration;
 
@@ -16,7 +16,7 @@ use super::{
     wait_for_worker, without_workers, worker_at,
 };
 
-/// No heartbeat comes in between: what goes up the wire is what the test is about.
+/// No heartbeat is sent during a test, so the bytes from the worker are those that the test is about.
 fn quiet() -> RunnerOptions {
     let policy = Policy { heartbeat: Duration::from_secs(60), lost_after: Duration::from_secs(300), ..policy() };
     RunnerOptions { policy, ..without_workers() }
@@ -26,12 +26,12 @@ fn quiet() -> RunnerOptions {
 const SHARED_BYTES: usize = 300_000;
 
 #[test]
-fn worker_killed_at_any_byte_of_handshake_or_transfer_costs_nothing_and_is_held_against_nobody() {
+fn worker_killed_at_any_byte_of_handshake_or_transfer_counts_no_crash() {
     let leaves = Leaves::Digests { count: 3, shared_bytes: SHARED_BYTES };
     let (cluster, address) = run_for_others(leaves.clone(), quiet());
     let proxy = Proxy::to(&address);
-    // The worker's hello of TLS is more than 200 bytes, and it says 150 more before it asks for the blob; the coordinator says less
-    // than 2000 before the blob.
+    // The worker's TLS hello is more than 200 bytes, and the worker sends 150 more before it requests the blob; the coordinator sends
+    // less than 2000 bytes before the blob.
     let up = [0, 1, 100, 200, 250, 300, 350].map(|bytes| (Way::Up, bytes));
     let down = [0, 1, 200, 600, 800, 1000, 2_500, 20_000, 65_536, 150_000, 290_000].map(|bytes| (Way::Down, bytes));
     for (way, bytes) in up.into_iter().chain(down) {
@@ -50,12 +50,12 @@ fn worker_killed_at_any_byte_of_handshake_or_transfer_costs_nothing_and_is_held_
     assert_eq!(worker.output().status.code(), Some(0));
     let blamed = |event: &&RunEvent| matches!(event, RunEvent::NodeRequeued { crashes: 1.., .. });
     assert!(!events.iter().any(|event| blamed(&event)), "{events:?}");
-    // Those that had got as far as the blob held leases.
+    // Workers that had got as far as the blob held leases.
     assert!(summary.requeued_nodes >= 5, "{summary:?}");
     assert_eq!((summary.suspected_nodes, summary.duplicate_results), (0, 0));
 }
 
-/// A run of so many gates, and a worker on a wire that waits at the first.
+/// A run of this many gates, and a worker behind a proxy that waits at the first gate.
 fn at_the_gate(gate: &Gate, count: usize, options: RunnerOptions) -> (Cluster, Proxy, Process, Waiting) {
     let (cluster, address) = run_for_others(gates(gate, count), options);
     let proxy = Proxy::to(&address);
@@ -66,15 +66,15 @@ fn at_the_gate(gate: &Gate, count: usize, options: RunnerOptions) -> (Cluster, P
 }
 
 #[test]
-fn worker_killed_before_and_after_its_result_is_on_the_wire_has_its_node_run_again_only_if_nobody_has_it() {
+fn node_of_a_killed_worker_is_rerun_unless_its_whole_result_arrived() {
     let gate = Gate::new();
     let (cluster, proxy, worker, waiting) = at_the_gate(&gate, 1, quiet());
-    // At work.
+    // Killed while it executes.
     worker.kill();
     assert_eq!(departure(&cluster), Departure::Lost);
     assert_eq!(deaths_when_requeued(&cluster), 1);
     waiting.wait_for_death();
-    // Its result is on the wire, and is lost with it.
+    // Killed while its whole result is held back; the result is lost with it.
     let worker = worker_at(&cluster.access_file(), &proxy.address());
     let waiting = gate.next();
     wait_for_start(&cluster);
@@ -84,7 +84,7 @@ fn worker_killed_before_and_after_its_result_is_on_the_wire_has_its_node_run_aga
     worker.kill();
     proxy.cut();
     assert_eq!(deaths_when_requeued(&cluster), 2);
-    // Half of its result has arrived: no half is ever taken for a whole.
+    // Killed when half of its result has arrived: half a result is never accepted.
     proxy.heal();
     let worker = worker_at(&cluster.access_file(), &proxy.address());
     let waiting = gate.next();
@@ -95,16 +95,16 @@ fn worker_killed_before_and_after_its_result_is_on_the_wire_has_its_node_run_aga
     worker.kill();
     proxy.cut();
     assert_eq!(deaths_when_requeued(&cluster), 3);
-    // It has arrived.
+    // Killed after its result has arrived.
     proxy.heal();
     let worker = worker_at(&cluster.access_file(), &proxy.address());
     let waiting = gate.next();
     wait_for_start(&cluster);
-    // Nothing more reaches it, so it does not run the last node as well.
+    // The proxy lets nothing more through to the worker, so it does not execute the last node.
     proxy.allow(Way::Down, Some(proxy.passed(Way::Down)));
     waiting.release();
     assert_eq!(wait_for_result(&cluster), "leaf 0");
-    // With this the last node is given to it.
+    // The last node is assigned to it now.
     assert_eq!(wait_for_result(&cluster), "of all leaves");
     worker.kill();
     proxy.cut();
@@ -119,7 +119,7 @@ fn worker_killed_before_and_after_its_result_is_on_the_wire_has_its_node_run_aga
 }
 
 #[test]
-fn result_whose_receipt_was_lost_comes_again_and_is_dropped() {
+fn result_whose_acknowledgement_was_lost_is_resent_and_dropped() {
     let gate = Gate::new();
     let (cluster, proxy, worker, waiting) = at_the_gate(&gate, 2, quiet());
     proxy.allow(Way::Down, Some(proxy.passed(Way::Down)));
@@ -129,7 +129,7 @@ fn result_whose_receipt_was_lost_comes_again_and_is_dropped() {
     let _ = proxy.wait_for_stop(Way::Down);
     proxy.renew();
     wait_for_worker(&cluster);
-    // It goes on with the second node, as one that is given to it now.
+    // It continues with the second node, which is assigned to it again.
     wait_for_start(&cluster);
     second.release();
     let keeper = gate.keep(Waiting::release);
@@ -141,7 +141,7 @@ fn result_whose_receipt_was_lost_comes_again_and_is_dropped() {
 }
 
 #[test]
-fn worker_cut_off_for_longer_than_its_lease_brings_an_equal_result_later_and_it_is_dropped() {
+fn late_equal_result_after_a_lost_lease_is_dropped() {
     let gate = Gate::new();
     // One lease at a time.
     let policy = Policy {
@@ -152,7 +152,7 @@ fn worker_cut_off_for_longer_than_its_lease_brings_an_equal_result_later_and_it_
     };
     let options = RunnerOptions { policy, ..without_workers() };
     let (cluster, proxy, worker, first) = at_the_gate(&gate, 3, options);
-    // It is alive, and so is its connection: nothing comes through.
+    // The worker and its connection are alive, but no bytes pass.
     proxy.silence();
     assert_eq!(departure(&cluster), Departure::Silent);
     assert_eq!(deaths_when_requeued(&cluster), 0);
@@ -164,7 +164,7 @@ fn worker_cut_off_for_longer_than_its_lease_brings_an_equal_result_later_and_it_
     let second = gate.next();
     wait_for_start(&cluster);
     proxy.renew();
-    // It brings the first node, and then begins with the third one.
+    // It returns the first node and then starts the third.
     let third = gate.next();
     wait_for_start(&cluster);
     let keeper = gate.keep(Waiting::release);

@@ -1,5 +1,5 @@
-//! Real fits under seeded mixes of all faults. `LOOKALIKE_CHAOS_RUNS=N` says how many (1; 50 with `--features slow`),
-//! `LOOKALIKE_CHAOS_SEED=S` begins with another seed than 1: a run that failed is repeated with its seed and `LOOKALIKE_CHAOS_RUNS=1`.
+//! Real fits under seeded mixes of all faults. `LOOKALIKE_CHAOS_RUNS=N` is the number of fits (default 1; 50 with `--features slow`),
+//! `LOOKALIKE_CHAOS_SEED=S` the first seed (default 1). Repeat a failed fit with its seed and `LOOKALIKE_CHAOS_RUNS=1`.
 
 use std::any::Any;
 use std::fs;
@@ -27,7 +27,7 @@ pub(super) fn setting(name: &str, otherwise: u64) -> u64 {
 }
 
 #[test]
-fn fits_under_all_faults_at_random_lose_nothing_do_nothing_twice_and_give_the_same_bits() {
+fn fits_under_random_faults_lose_and_repeat_no_node_and_give_the_same_bits() {
     let folder = folder_of_size(SIZE);
     fit(folder.path(), "whole", &format!("{FLAGS} --workers 1 --progress none")).done();
     let first = setting("LOOKALIKE_CHAOS_SEED", 1);
@@ -40,7 +40,7 @@ fn fits_under_all_faults_at_random_lose_nothing_do_nothing_twice_and_give_the_sa
     }
 }
 
-/// Whether a fit survives this seed; if not, says why.
+/// Whether a fit survives this seed; if not, prints the reason.
 fn survives(folder: &TempDir, seed: u64) -> bool {
     let (out, begin) = (format!("run{seed}"), Instant::now());
     let arguments = format!("fit photo.exr --env map.exr {FLAGS}");
@@ -61,7 +61,7 @@ fn survives(folder: &TempDir, seed: u64) -> bool {
     }
 }
 
-/// What is wrong with the end of a fit.
+/// Checks the results of a fit.
 fn judge(folder: &Path, out: &str, ending: Ending) -> Result<Ending, String> {
     let [whole, there] = ["whole", out].map(|name| folder.join(name));
     if without_timing(&whole) != without_timing(&there) {

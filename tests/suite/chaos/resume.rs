@@ -1,5 +1,6 @@
-//! Fits that are killed at random and resumed by another number of workers, until they end: none hangs, each has the same bits.
-//! `LOOKALIKE_RESUME_RUNS=N` says how many (2; 200 with `--features slow`), `LOOKALIKE_CHAOS_SEED=S` begins with another seed than 1.
+//! Fits that are killed at random and resumed with another number of workers until they end: none hangs, each has the same bits.
+//! `LOOKALIKE_RESUME_RUNS=N` is the number of fits (default 2; 200 with `--features slow`), `LOOKALIKE_CHAOS_SEED=S` the first seed
+//! (default 1).
 
 use std::process::Command;
 use std::sync::mpsc::RecvTimeoutError;
@@ -22,13 +23,13 @@ const FLAGS: &str = "--samples 32 --gammas 1:2:0.2 --seed 5 --polish off";
 /// Columns and rows of the photo.
 const SIZE: usize = 24;
 
-/// A run that says nothing for longer hangs.
+/// A run that prints nothing for longer hangs.
 const PATIENCE: Duration = Duration::from_secs(60);
 
 /// The most workers of a coordinator, and the most coordinators that are killed in a run.
 const MOST: (u64, u64) = (6, 3);
 
-/// What the runs came to.
+/// Counts over all runs.
 #[derive(Debug, Default)]
 struct Figures {
     runs: u64,
@@ -39,7 +40,7 @@ struct Figures {
 }
 
 #[test]
-fn fits_killed_at_random_and_resumed_by_other_numbers_of_workers_never_hang_and_give_the_same_bits() {
+fn fits_killed_at_random_and_resumed_by_other_worker_counts_end_with_the_same_bits() {
     let folder = folder_of_size(SIZE);
     fit(folder.path(), "whole", &format!("{FLAGS} --workers 1 --progress none")).done();
     let first = setting("LOOKALIKE_CHAOS_SEED", 1);
@@ -70,7 +71,7 @@ fn one_run(folder: &Path, seed: u64, figures: &mut Figures) {
     let kills = draw(1, MOST.1);
     for coordinator in 0..=kills {
         let workers = draw(1, MOST.0);
-        // Somewhere from its first event to beyond the last one of a short run.
+        // Between the first event and a few after the last one of a short run.
         let kill_after = (coordinator < kills).then(|| draw(1, 70));
         match coordinate(folder, &out, workers, kill_after) {
             End::Killed => figures.kills += 1,
@@ -93,7 +94,7 @@ fn one_run(folder: &Path, seed: u64, figures: &mut Figures) {
     fs::remove_dir_all(there).unwrap();
 }
 
-/// Begin or resume the fit with so many workers; kill its coordinator after so many events.
+/// Start or resume the fit with this many workers; kill its coordinator after `kill_after` events.
 fn coordinate(folder: &Path, out: &str, workers: u64, kill_after: Option<u64>) -> End {
     let line = format!("fit photo.exr --env map.exr --out {out} {FLAGS} --workers {workers} --resume --progress json");
     let mut command = Command::new(env!("CARGO_BIN_EXE_lookalike-under-test"));

@@ -1,4 +1,4 @@
-//! A node that kills its workers, and somebody who does: the first fails by name, whom the second hits does not.
+//! A node that kills its workers, and workers killed from outside: the first makes the node fail by name, the second fails no node.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -13,7 +13,7 @@ use lookalike_tests::process::signal;
 
 use super::PROGRAM;
 
-/// Kills processes that wait at the gate at random, so many at most, and lets the others pass. How many it has killed is counted.
+/// Kills processes that wait at the gate at random, `kills` at most, and lets the others pass. `killed` counts them.
 fn storm(gate: Gate, seed: u64, kills: u32, killed: Arc<AtomicU32>) -> Keeper {
     let mut arrivals = 0;
     gate.keep(move |waiting: Waiting| {
@@ -31,7 +31,7 @@ fn storm(gate: Gate, seed: u64, kills: u32, killed: Arc<AtomicU32>) -> Keeper {
 /// The result, and the nodes that failed with the reason.
 type Ending = (Option<Vec<u8>>, BTreeMap<String, String>);
 
-/// What becomes of a run of innocent nodes, and perhaps a murderer, under so many kills.
+/// The outcome of a run of gates, possibly with a node that kills its workers, under this many kills.
 fn run(seed: u64, innocents: usize, has_murderer: bool, kills: u32) -> Ending {
     let (gate, killed) = (Gate::new(), Arc::new(AtomicU32::new(0)));
     let leaves = Leaves::Mob { innocents, has_murderer, address: gate.address().to_string() };
@@ -48,20 +48,20 @@ fn run(seed: u64, innocents: usize, has_murderer: bool, kills: u32) -> Ending {
 }
 
 #[test]
-fn node_that_kills_its_workers_fails_by_name_and_all_others_complete() {
+fn node_that_kills_its_workers_fails_and_all_others_complete() {
     let (calm, failed) = run(1, 6, true, 0);
     assert_eq!(failed.len(), 1, "{failed:?}");
     assert!(failed["murderer"].contains("3 worker processes died"), "{failed:?}");
-    // The innocents' result is that of a run without a murderer.
+    // The result of the other nodes is that of a run without the failing node.
     let (innocent, failed) = run(2, 6, false, 0);
     assert!(failed.is_empty() && calm.is_some() && calm == innocent, "{failed:?}");
 }
 
-/// Seeds of storms. The fifth has a murderer.
+/// Seeds of storms. The run of seed 5 has a node that kills its workers.
 const SEEDS: &[u64] = if cfg!(feature = "slow") { &[4, 5] } else { &[5] };
 
 #[test]
-fn random_kills_from_outside_bring_no_innocent_node_to_failure_and_do_not_save_the_guilty() {
+fn random_kills_from_outside_fail_no_node_except_one_that_kills_its_workers() {
     let (calm, _) = run(3, 8, false, 0);
     for &seed in SEEDS {
         let (result, failed) = run(seed, 8, seed == 5, 6);

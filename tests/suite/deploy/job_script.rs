@@ -1,4 +1,4 @@
-//! The job script of Slurm on stand-ins: `srun` runs its command here, `scontrol` and `squeue` say what the test wants them to.
+//! Slurm's job script on stand-ins: `srun` runs its command on this machine, `scontrol` and `squeue` print what the test specifies.
 
 use super::source;
 use crate::fit::scene::{Finished, folder, without_timing};
@@ -13,13 +13,14 @@ use std::{
 };
 use tempfile::TempDir;
 
-/// Several shards of the subset's table, so that something can die between them.
+/// Several shards of the subset's table, so that a process can be killed between them.
 const FLAGS: &str = "--samples 128 --gammas 1:2:0.5 --seed 5 --polish off";
 
-/// The fit of this machine alone.
+/// The fit by this machine alone.
 static LOCAL: Finished = Finished::new(FLAGS);
 
-/// The node that a step is for is in its environment, of which only Slurm's own is there if the step or its job says so. What ends the step is told to all its processes, as Slurm would have it.
+/// Sets the node of a step in its environment. With `--export=NONE` of the step or its job, only `SLURM*` and the stand-in's variables
+/// stay. SIGTERM is passed on to all processes of the step, as in Slurm.
 const SRUN: &str = r#"export="${SLURM_EXPORT_ENV:-ALL}"
 for argument; do
   case "$argument" in
@@ -38,16 +39,16 @@ setsid "$@" &
 trap 'kill -TERM -$!; wait $!' TERM
 wait $!"#;
 
-/// Lists of hosts are written out; what was requeued is noted.
+/// Expands lists of hosts and records requeued jobs.
 const SCONTROL: &str = r#"case "$1" in
   show) echo "$3" | tr , '\n' ;;
   requeue) echo "$2" >> "$SITE/requeued" ;;
 esac"#;
 
-/// The nodes of the job.
+/// Prints the nodes of the job.
 const SQUEUE: &str = r#"cat "$SITE/nodes""#;
 
-/// A folder with the scene of a fit, and a site of Slurm in it that has two nodes.
+/// A folder with the scene of a fit and a stand-in for Slurm with two nodes.
 fn site() -> TempDir {
     let folder = folder();
     fs::create_dir(folder.path().join("bin")).unwrap();
@@ -77,7 +78,7 @@ fn line(out: &str) -> String {
     format!("fit photo.exr --env map.exr --out {out} --progress json {FLAGS}")
 }
 
-/// Runs the job; `act` is told of the script's process and of each event or message, once all before it.
+/// Runs the job; `act` gets the id of the script's process and all events and messages so far, after each new one.
 fn watch(mut command: Command, mut act: impl FnMut(u32, &[Value])) -> (Output, Vec<Value>) {
     let process = Process::start(&mut command);
     let script = process.id();
@@ -92,7 +93,7 @@ fn says(events: &[Value], words: &str) -> bool {
     events.iter().any(|event| event.as_str().is_some_and(|line| line.contains(words)))
 }
 
-/// The process that a process has started with this word in its command line.
+/// The child process of a process that has this word in its command line.
 fn child(parent: u32, word: &str) -> u32 {
     let listed = Command::new("ps").args(["-o", "pid=,args=", "--ppid", &parent.to_string()]).output().unwrap();
     let listed = String::from_utf8(listed.stdout).unwrap();
@@ -100,7 +101,7 @@ fn child(parent: u32, word: &str) -> u32 {
     found.and_then(|line| line.split_whitespace().next()?.parse().ok()).unwrap_or_else(|| panic!("{word}: {listed}"))
 }
 
-/// The results of the job are those of a fit of this machine alone.
+/// Asserts that the results of the job are those of a fit by this machine alone.
 fn assert_same_as_local(site: &Path, out: &str) {
     LOCAL.copy_to(&site.join("local"));
     assert_eq!(without_timing(&site.join("local")), without_timing(&site.join(out)));
@@ -109,7 +110,7 @@ fn assert_same_as_local(site: &Path, out: &str) {
 #[test]
 fn task_of_an_array_runs_a_worker_on_each_node_and_leaves_the_same_results() {
     let site = site();
-    // As sbatch --export=NONE would have it, and for the steps as well.
+    // As with `sbatch --export=NONE`, also for the steps.
     let job = job(site.path(), &line("run-%a"), &[("SLURM_ARRAY_TASK_ID", "3"), ("SLURM_EXPORT_ENV", "NONE")]);
     let (output, events) = watch(job, |_, _| ());
     assert_eq!(output.status.code(), Some(0), "{events:?}");
@@ -120,7 +121,7 @@ fn task_of_an_array_runs_a_worker_on_each_node_and_leaves_the_same_results() {
 }
 
 #[test]
-fn folder_and_address_are_understood_in_all_their_spellings() {
+fn folder_and_address_are_accepted_in_all_spellings() {
     let site = site();
     let taken = TcpListener::bind("127.0.0.1:0").unwrap();
     let port = taken.local_addr().unwrap().port();
@@ -134,7 +135,7 @@ fn folder_and_address_are_understood_in_all_their_spellings() {
 }
 
 #[test]
-fn killed_worker_and_killed_coordinator_are_started_again_and_leave_no_trace() {
+fn killed_worker_and_coordinator_are_restarted_and_results_are_the_same() {
     let site = site();
     let (mut worker, mut coordinator) = (None, None);
     let (output, events) = watch(job(site.path(), &line("run"), &[]), |script, events| {
@@ -159,7 +160,7 @@ fn killed_worker_and_killed_coordinator_are_started_again_and_leave_no_trace() {
 }
 
 #[test]
-fn time_limit_gives_the_job_back_and_its_next_turn_goes_on() {
+fn time_limit_requeues_the_job_and_its_restart_resumes_the_run() {
     let site = site();
     let mut warned = false;
     let (output, events) = watch(job(site.path(), &line("run"), &[]), |script, events| {
@@ -178,7 +179,7 @@ fn time_limit_gives_the_job_back_and_its_next_turn_goes_on() {
 }
 
 #[test]
-fn job_that_was_given_back_too_often_says_so_and_stays() {
+fn job_requeued_too_often_reports_it_and_ends() {
     let site = site();
     let environment = [("SLURM_RESTART_COUNT", "2"), ("LOOKALIKE_MAX_RESTARTS", "2")];
     let mut warned = false;
@@ -194,7 +195,7 @@ fn job_that_was_given_back_too_often_says_so_and_stays() {
 }
 
 #[test]
-fn command_lines_that_cannot_work_are_refused_before_anything_is_started() {
+fn invalid_command_lines_are_refused_before_anything_is_started() {
     let site = site();
     let cases = [
         ("", "expected a command line of lookalike"),

@@ -1,17 +1,17 @@
-//! The files for Kubernetes say what the program understands, and fit together. That they are what the API takes is checked by
-//! `.ci/run` where a validator is installed.
+//! The files for Kubernetes use existing flags and are consistent with each other. `.ci/run` checks them against the API where a
+//! validator is installed.
 
 use super::source;
 use serde_json::Value;
 use std::{collections::BTreeSet, fs, process::Command};
 
-/// All objects of the folder, without kustomize's own file.
+/// All objects of the folder, except kustomize's own file.
 fn objects() -> Vec<Value> {
     let [kustomization] = &documents("kustomization.yaml")[..] else { panic!("one document") };
     let files: Vec<&str> = list(&kustomization["resources"]).iter().map(|name| name.as_str().unwrap()).collect();
     let entries = fs::read_dir(source("deploy/kubernetes")).unwrap();
     let mut there: Vec<String> = entries.map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
-    // A pod for people is applied by hand.
+    // The pod for copying files is applied by hand.
     there.retain(|name| !["copy.yaml", "kustomization.yaml"].contains(&name.as_str()));
     let (named, there) = (files.iter().copied().collect::<BTreeSet<_>>(), there.iter().map(String::as_str).collect());
     assert_eq!(named, there, "the files that kustomization.yaml names");
@@ -33,7 +33,7 @@ fn pod(job: &str) -> Value {
     object("Job", job)["spec"]["template"].clone()
 }
 
-/// The one container of a pod.
+/// The only container of a pod.
 fn container(pod: &Value) -> Value {
     let [container] = list(&pod["spec"]["containers"]) else { panic!("one container") };
     container.clone()
@@ -64,7 +64,7 @@ fn help(command: &str) -> String {
 const JOBS: [&str; 2] = ["lookalike-coordinator", "lookalike-workers"];
 
 #[test]
-fn containers_give_the_program_flags_that_it_has() {
+fn containers_use_existing_flags() {
     for job in JOBS {
         let arguments = arguments(&container(&pod(job)));
         let help = help(&arguments[0]);
@@ -82,7 +82,7 @@ fn containers_give_the_program_flags_that_it_has() {
 }
 
 #[test]
-fn workers_find_the_coordinator_by_the_service_and_may_talk_to_it() {
+fn workers_reach_the_coordinator_through_the_service_and_the_network_policies() {
     let (coordinator, workers) = (pod(JOBS[0]), pod(JOBS[1]));
     let port = |name: &str| {
         let container = container(&coordinator);
@@ -150,29 +150,29 @@ fn pods_run_without_privileges_as_the_user_of_the_image() {
 }
 
 #[test]
-fn ends_that_trying_again_would_not_change_fail_the_job_at_once() {
+fn exit_codes_that_a_retry_cannot_change_fail_the_job_at_once() {
     let spec = object("Job", JOBS[0])["spec"].clone();
     let rules = list(&spec["podFailurePolicy"]["rules"]);
     let final_codes = rules.iter().find(|rule| rule["action"] == "FailJob").unwrap()["onExitCodes"]["values"].clone();
-    // Of the exit codes of `lookalike --help`; 3 and 130 and deaths are tried again.
+    // Exit codes of `lookalike --help`; 3, 130 and deaths by a signal are retried.
     assert_eq!(final_codes, serde_json::json!([1, 2, 4]));
     assert!(arguments(&container(&pod(JOBS[0]))).contains(&"--resume".to_owned()));
 }
 
 #[test]
-fn jobs_end_after_failures_of_their_own_and_none_of_their_nodes() {
+fn jobs_end_after_their_own_failures_but_not_after_node_disruptions() {
     for job in JOBS {
         let spec = object("Job", job)["spec"].clone();
         let rules = list(&spec["podFailurePolicy"]["rules"]);
         let ignored = rules.iter().find(|rule| rule["action"] == "Ignore").unwrap();
         assert_eq!(ignored["onPodConditions"][0]["type"], "DisruptionTarget", "{job}");
-        // What the API demands of a Job with such a policy.
+        // The API requires this of a Job with such a policy.
         assert_eq!(
             (&spec["podReplacementPolicy"], &spec["template"]["spec"]["restartPolicy"]),
             (&"Failed".into(), &"Never".into()),
             "{job}"
         );
-        // Workers look for a coordinator that is gone for 30 minutes at a time.
+        // Each worker tries to reach a missing coordinator for 30 minutes.
         assert!(spec["backoffLimit"].as_u64().unwrap() <= 20, "{job}");
     }
     let document = fs::read_to_string(source("docs/cluster.md")).unwrap();
@@ -180,7 +180,7 @@ fn jobs_end_after_failures_of_their_own_and_none_of_their_nodes() {
 }
 
 #[test]
-fn liveness_is_that_of_the_loop_at_the_port_of_the_metrics() {
+fn liveness_probe_uses_the_port_of_the_metrics() {
     let probe = container(&pod(JOBS[0]))["livenessProbe"]["httpGet"].clone();
     assert_eq!(probe, serde_json::json!({ "path": "/healthz", "port": "metrics" }));
 }

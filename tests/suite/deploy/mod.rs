@@ -1,5 +1,5 @@
-//! What is under `deploy/`: the job script on stand-ins for Slurm's commands and, with `--features slow`, on a real Slurm; and the
-//! files for Kubernetes against the command line and against each other.
+//! The files under `deploy/`: the job script on stand-ins for Slurm's commands and, with `--features slow`, on a real Slurm; the files
+//! for Kubernetes against the command line and each other.
 
 mod job_script;
 mod kubernetes;

@@ -6,7 +6,7 @@ use lookalike_tests::merl;
 use std::{fs, os::unix::fs::PermissionsExt, path::Path, process::Command};
 use tempfile::TempDir;
 
-/// A folder with a scene, a manifest of two fits, and an `sbatch` that says this.
+/// A folder with a scene, a manifest of two fits, and this script as `sbatch`.
 fn site(sbatch: &str) -> TempDir {
     let folder = folder();
     let manifest = "photos = [\"photo.exr\"]\nenvironments = [\"map.exr\"]\nmodels = [\"ggx\", \"cook-torrance\"]\n";
@@ -41,12 +41,12 @@ fn batch_is_submitted_with_its_command_line_and_the_options_behind_the_dashes() 
     let script = fs::read_to_string(site.path().join("run/lookalike.sbatch")).unwrap();
     assert!(script.contains("\n#SBATCH --nodes=2 -p long\n"), "{script}");
     assert!(script.contains("\nset -- batch two.toml --out run --samples 32\n"), "{script}");
-    // Nothing runs yet: the same may be submitted again.
+    // No job runs yet: the same batch may be submitted again.
     assert_eq!(say(site.path(), line).0, Some(0));
 }
 
 #[test]
-fn study_is_submitted_as_a_batch_is() {
+fn study_is_submitted_like_a_batch() {
     let site = site("echo 4711");
     let (code, stdout, stderr) = say(site.path(), "study study.toml -o run --slurm -- --nodes=2");
     assert_eq!((code, stdout.as_str()), (Some(0), "4711\n"), "{stderr}");
@@ -56,7 +56,7 @@ fn study_is_submitted_as_a_batch_is() {
 }
 
 #[test]
-fn what_is_wrong_is_told_before_anything_is_submitted() {
+fn mistakes_are_reported_before_anything_is_submitted() {
     let site = site("touch submitted; echo 4711");
     for (line, words) in [
         ("batch two.toml --out run --slurm --workers 3", "--workers"),
@@ -82,7 +82,7 @@ fn what_is_wrong_is_told_before_anything_is_submitted() {
 }
 
 #[test]
-fn refusal_of_slurm_is_told_in_its_own_words() {
+fn refusal_by_slurm_is_reported_verbatim() {
     let site = site("echo 'sbatch: error: invalid partition specified: gold' >&2; exit 1");
     let (code, stdout, stderr) = say(site.path(), "batch two.toml --out run --slurm -- -p gold");
     assert_eq!((code, stdout.as_str()), (Some(3), ""), "{stderr}");

@@ -1,4 +1,4 @@
-//! How a fit ends when it does not end well: exit codes, messages, no process left behind.
+//! How a fit ends when it fails: exit codes, messages, and no process left.
 
 use super::scene::{QUICK, QUICK_POLISHED, fit, folder};
 use lookalike_tests::{
@@ -9,7 +9,7 @@ use serde_json::Value;
 use std::{fs, process::Command};
 
 #[test]
-fn missed_max_cssim_is_exit_code_one_with_all_results() {
+fn missed_max_cssim_is_code_one_with_all_results_written() {
     let folder = folder();
     let answer = fit(folder.path(), "out", &format!("{QUICK_POLISHED} --max-cssim 0"));
     assert_eq!(answer.code, Some(1), "{}", answer.stderr);
@@ -19,7 +19,7 @@ fn missed_max_cssim_is_exit_code_one_with_all_results() {
 }
 
 #[test]
-fn stream_says_finished_when_all_is_written() {
+fn finished_event_is_sent_when_all_is_written() {
     let folder = folder();
     let mut command = Command::new(env!("CARGO_BIN_EXE_lookalike-under-test"));
     let line = format!("fit photo.exr --env map.exr --out out {QUICK} --progress json");
@@ -36,7 +36,7 @@ fn stream_says_finished_when_all_is_written() {
 }
 
 #[test]
-fn results_that_cannot_be_written_are_code_three_and_come_with_resume() {
+fn unwritable_results_are_code_three_and_are_written_on_resume() {
     let folder = folder();
     let blocked = folder.path().join("out/match.exr.partial");
     fs::create_dir_all(&blocked).unwrap();
@@ -49,7 +49,7 @@ fn results_that_cannot_be_written_are_code_three_and_come_with_resume() {
 }
 
 #[test]
-fn folder_of_a_finished_fit_is_left_alone() {
+fn folder_of_a_finished_fit_is_refused_and_unchanged() {
     let folder = folder();
     fs::create_dir(folder.path().join("out")).unwrap();
     fs::write(folder.path().join("out/fit.json"), "precious").unwrap();
@@ -58,16 +58,16 @@ fn folder_of_a_finished_fit_is_left_alone() {
 }
 
 #[test]
-fn results_that_cannot_be_written_are_refused_before_any_work() {
+fn output_folder_that_cannot_be_created_is_refused_before_any_work() {
     let folder = folder();
-    // Below a file: not even a superuser can write there.
+    // Below a file: not even root can write there.
     fit(folder.path(), "photo.exr/below", QUICK)
         .refused(&["cannot write results to photo.exr/below", "choose a folder you may write to with --out"]);
     fit(folder.path(), "photo.exr", QUICK).refused(&["photo.exr is a file: --out takes a folder"]);
 }
 
 #[test]
-fn unknown_model_is_refused_with_the_known_ones() {
+fn unknown_model_is_refused_with_a_list_of_models() {
     let folder = folder();
     let answer = fit(folder.path(), "out", &format!("{QUICK} --model phong"));
     answer.refused(&["--model", "phong", "ggx, ggx-f90, cook-torrance"]);
@@ -83,7 +83,7 @@ fn interrupt_ends_every_process_with_code_130() {
         let process = Process::start(command.args(line.split_whitespace()).current_dir(folder.path()));
         let coordinator = process.id();
         let mut sent = false;
-        // Workers share stderr with the coordinator: it ends when the last of them is gone.
+        // Workers share stderr with the coordinator, so the stream ends after the last process.
         let (output, events) = process.watch_stderr(|events| {
             let started = |e: &Value| e["event"] == "node-started" && e["kind"] == kind;
             if !sent && events.last().is_some_and(started) {
@@ -102,7 +102,7 @@ fn interrupt_ends_every_process_with_code_130() {
 }
 
 #[test]
-fn local_workers_log_as_the_coordinator_is_told_to() {
+fn local_workers_use_the_log_filter_of_the_coordinator() {
     let folder = folder();
     let joined = "INFO lookalike_worker::session: joined";
     let flags = format!("{QUICK} --gammas 1");

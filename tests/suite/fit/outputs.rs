@@ -1,4 +1,4 @@
-//! What a fit leaves in its folder and says on its outputs: the contract of design section 10.
+//! The files and output of a fit, as specified in design section 10.
 
 use super::scene::{POLISHED, QUICK, SIZE, fit, fit_json, folder, number, picture};
 use lookalike::image::{Encoding, content_hash, metadata as keys};
@@ -20,7 +20,7 @@ fn check_ggx(parameters: &Value) {
 }
 
 #[test]
-fn fit_json_has_the_shape_of_the_contract() {
+fn fit_json_has_the_documented_fields() {
     let folder = folder();
     let answer = fit(folder.path(), "out", "--samples 32 --workers 2 --seed 3 --progress none").done();
     let json = fit_json(&folder.path().join("out"));
@@ -66,7 +66,7 @@ fn fit_json_has_the_shape_of_the_contract() {
     assert_eq!(answer.stdout.contains("the photo does not determine"), open, "{}", answer.stdout);
     let polished = &json["polished"];
     assert!(number(&polished["cssim"]) <= lowest && number(&polished["cssim_object"]) > 0.0);
-    // Twice the limit, where polish had to begin again from the winner.
+    // Twice the limit, because polish may restart from the winner.
     let most = 2 * lookalike::fit::MAX_EVALUATIONS as u64;
     assert!((1..=most).contains(&polished["evaluations"].as_u64().unwrap()));
     assert!(polished["explored"].as_u64().unwrap() > 0);
@@ -106,7 +106,7 @@ fn candidates_csv_has_the_numbers_of_fit_json() {
 }
 
 #[test]
-fn pictures_have_the_size_of_the_photo_and_say_what_they_are() {
+fn pictures_have_the_size_of_the_photo_and_describe_themselves_in_metadata() {
     let folder = POLISHED.copy();
     let out = folder.path().join("out");
     for file in ["match.exr", "match.png", "reference.png", "difference.png"] {
@@ -121,7 +121,7 @@ fn pictures_have_the_size_of_the_photo_and_say_what_they_are() {
     let parameters: Value = serde_json::from_str(&entry(keys::PARAMETERS).unwrap()).unwrap();
     assert_eq!(parameters, json["polished"]["parameters"]);
 
-    // The displayed pictures are the linear ones, exposed: up to half a code and the clipping at white.
+    // The displayed pictures are the linear ones after exposure, up to half a code and the clipping at white.
     let shown = picture(&out.join("match.png"));
     assert_eq!(shown.encoding, Encoding::Srgb);
     let exposure = number(&json["display_exposure"]);
@@ -129,13 +129,13 @@ fn pictures_have_the_size_of_the_photo_and_say_what_they_are() {
         let expected = (f64::from(*linear) * exposure).clamp(0.0, 1.0);
         assert!((f64::from(*shown) - expected).abs() < 0.005, "{shown} {expected}");
     }
-    // Outside the object everything is black, inside nothing is.
+    // Outside the object all pixels are black, inside none is.
     assert_eq!(matched.image.pixel(0, 0), [0.0; 3]);
     assert!(matched.image.pixel(SIZE / 2, SIZE / 2)[0] > 0.0);
 }
 
 #[test]
-fn score_of_the_files_is_the_score_that_was_reported() {
+fn score_of_the_written_pictures_is_the_reported_score() {
     let folder = POLISHED.copy();
     let json = fit_json(&folder.path().join("out"));
     let exposure = &json["display_exposure"];

@@ -1,4 +1,4 @@
-//! A fit whose coordinator is killed at any point and that is resumed: the same bits, and nothing done twice.
+//! A fit whose coordinator is killed at any point and resumed: the same bits, and no node done twice.
 
 use super::scene::{Finished, MANY_NODES, MANY_NODES_FIT, QUICK, QUICK_FIT, fit, folder, without_timing};
 use crate::program::Answer;
@@ -10,13 +10,13 @@ use std::{fs, path::Path, process::Command};
 /// [`MANY_NODES`], exploration and polish: at least 16 nodes.
 const WITH_POLISH: &str = "--samples 128 --gammas 1:2:0.2 --seed 5 --workers 2";
 
-/// The fit of [`WITH_POLISH`] that nothing disturbed.
+/// The undisturbed fit of [`WITH_POLISH`].
 static WHOLE: Finished = Finished::new(WITH_POLISH);
 
 /// After how many finished nodes a fit is killed; 0 is when the first worker joins.
 const KILLS: &[usize] = if cfg!(feature = "slow") { &[0, 1, 4, 7, 11, 13] } else { &[1, 11] };
 
-/// Starts a fit and kills it with SIGKILL as soon as so many nodes are told to be finished; 0 is when the first worker joins.
+/// Starts a fit and kills it with SIGKILL after this many finished nodes; 0 is when the first worker joins.
 fn kill_after(folder: &Path, out: &str, flags: &str, finished: usize) {
     let line = format!("fit photo.exr --env map.exr --out {out} {flags} --progress json --resume");
     let mut command = Command::new(env!("CARGO_BIN_EXE_lookalike-under-test"));
@@ -42,7 +42,7 @@ fn status(folder: &Path, out: &str) -> Value {
 }
 
 #[test]
-fn killed_anywhere_and_resumed_a_fit_gives_the_same_bits_and_does_nothing_twice() {
+fn fit_killed_anywhere_and_resumed_gives_the_same_bits_and_repeats_no_node() {
     let folder = folder();
     let out = |name: &str| folder.path().join(name);
     WHOLE.copy_to(&folder.path().join("whole"));
@@ -70,7 +70,7 @@ fn killed_anywhere_and_resumed_a_fit_gives_the_same_bits_and_does_nothing_twice(
 }
 
 #[test]
-fn fit_that_is_killed_time_and_again_still_ends() {
+fn fit_that_is_killed_repeatedly_still_ends() {
     let folder = folder();
     MANY_NODES_FIT.copy_to(&folder.path().join("whole"));
     for _ in 0..3 {
@@ -84,7 +84,7 @@ fn fit_that_is_killed_time_and_again_still_ends() {
 }
 
 #[test]
-fn finished_fit_is_verified_and_not_done_again() {
+fn finished_fit_is_verified_and_not_repeated() {
     let folder = QUICK_FIT.copy();
     let out = folder.path().join("out");
     let before = fs::read(out.join("fit.json")).unwrap();
@@ -98,7 +98,7 @@ fn finished_fit_is_verified_and_not_done_again() {
     let told = fit(folder.path(), "out", &format!("{QUICK} --resume --progress json")).done().stderr;
     let events: Vec<Value> = told.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
     assert_eq!(events.iter().map(|event| &event["event"]).collect::<Vec<_>>(), ["start", "message", "finished"]);
-    // A changed file is somebody's; a missing one can be made again.
+    // A changed file may be the user's; a missing one is written again.
     fs::write(out.join("candidates.csv"), "mine").unwrap();
     fit(folder.path(), "out", &format!("{QUICK} --resume"))
         .refused(&["candidates.csv is not what the run in out wrote", "--resume makes it again"]);
@@ -110,7 +110,7 @@ fn finished_fit_is_verified_and_not_done_again() {
 }
 
 #[test]
-fn run_with_other_inputs_or_settings_is_refused_with_what_differs() {
+fn resume_with_other_inputs_or_settings_is_refused_with_the_difference() {
     let folder = QUICK_FIT.copy();
     let refused =
         |flags: &str, phrases: &[&str]| fit(folder.path(), "out", &format!("{QUICK} {flags}")).refused(phrases);
@@ -123,7 +123,7 @@ fn run_with_other_inputs_or_settings_is_refused_with_what_differs() {
     refused("--resume --gammas 1:2:0.25", &["--gammas is 1:2:0.5 there and 1:2:0.25 here"]);
     refused("--resume --env-rotation 90", &["--env-rotation is 0.0 there and 90.0 here"]);
     fs::copy(folder.path().join("map.exr"), folder.path().join("copy.exr")).unwrap();
-    // The same content under another name is the same input; what workers there are does not matter.
+    // The same content under another name is the same input; the settings of workers do not matter.
     let line = format!("fit photo.exr --env copy.exr --out out {QUICK} --resume --workers 2 --grace 5s");
     crate::program::lookalike(folder.path(), &line).done();
     let line = format!("fit photo.exr --env photo.exr --env-mapping mirror-ball --out out {QUICK} --resume");
@@ -135,7 +135,7 @@ fn run_with_other_inputs_or_settings_is_refused_with_what_differs() {
 }
 
 #[test]
-fn second_coordinator_in_one_folder_is_refused_and_told_who_is_there() {
+fn second_coordinator_in_one_folder_is_refused_with_the_process_id_of_the_first() {
     let folder = folder();
     let out = folder.path().join("out");
     fs::create_dir(&out).unwrap();
@@ -149,7 +149,7 @@ fn second_coordinator_in_one_folder_is_refused_and_told_who_is_there() {
 }
 
 #[test]
-fn file_that_is_no_journal_is_refused() {
+fn file_that_is_not_a_journal_is_refused() {
     let folder = folder();
     fs::create_dir(folder.path().join("out")).unwrap();
     fs::write(folder.path().join("out/run.sqlite"), "a letter to somebody".repeat(100)).unwrap();
@@ -159,7 +159,7 @@ fn file_that_is_no_journal_is_refused() {
     crate::program::lookalike(folder.path(), "status nowhere").refused(&["expected a run in nowhere"]);
 }
 
-/// A small file system of its own, gone when dropped.
+/// A small file system, unmounted on drop.
 struct SmallDisk<'a>(&'a Path);
 
 impl<'a> SmallDisk<'a> {
@@ -180,13 +180,13 @@ impl<'a> SmallDisk<'a> {
 
 impl Drop for SmallDisk<'_> {
     fn drop(&mut self) {
-        // Nothing that holds it open outlives the test; if it does, the folder's removal will say so.
+        // If a file on it is still open, removing the folder fails and shows it.
         let _ = Command::new("umount").arg(self.0).status();
     }
 }
 
 #[test]
-fn full_disk_ends_the_run_by_name_and_costs_nothing_that_was_acknowledged() {
+fn full_disk_ends_the_run_with_its_name_and_loses_no_acknowledged_node() {
     let folder = folder();
     let small = folder.path().join("small");
     let Some(disk) = SmallDisk::mount(&small, "400k") else {

@@ -1,5 +1,5 @@
-//! The same bits anywhere (design sections 2 and 9): any number of workers, a worker killed at work, no workers at all, any
-//! SIMD level.
+//! The same bits everywhere (design sections 2 and 9): with any number of workers, a worker killed while executing, no workers, any SIMD
+//! level.
 
 use super::scene::{fit, fit_json, folder, without_timing};
 use lookalike::{
@@ -51,7 +51,7 @@ fn fit_with_a_killed_worker(folder: &Path) -> Vec<Value> {
 }
 
 #[test]
-fn workers_their_number_and_their_deaths_leave_no_trace_in_the_results() {
+fn results_do_not_depend_on_the_number_or_deaths_of_workers() {
     let folder = folder();
     let out = |name: &str| folder.path().join(name);
     for workers in WORKERS {
@@ -72,7 +72,7 @@ fn workers_their_number_and_their_deaths_leave_no_trace_in_the_results() {
 }
 
 #[test]
-fn simd_levels_of_the_processor_leave_no_trace_in_the_results() {
+fn results_do_not_depend_on_the_simd_level() {
     if !simd::has_levels() {
         println!("skipped: this processor has only the baseline's instructions");
         return;
@@ -91,7 +91,7 @@ fn detected() -> &'static FitOutcome {
 
 /// The fit of [`FLAGS`] without workers, at a SIMD level.
 fn in_this_process(folder: &Path, level: Level) -> FitOutcome {
-    // The level is the process's: one fit at a time.
+    // The SIMD level is global to the process, so one fit runs at a time.
     static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
     let _guard = ONE_AT_A_TIME.lock().unwrap_or_else(PoisonError::into_inner);
     let environment = EnvironmentSettings { path: folder.join("map.exr"), mapping: None, rotation_deg: 0.0 };
@@ -110,7 +110,7 @@ fn in_this_process(folder: &Path, level: Level) -> FitOutcome {
     planner.unwrap().into_outcome().unwrap()
 }
 
-/// Everything that was found, in the shape of `fit.json`, with every bit.
+/// All numbers that the fit found, in the form of `fit.json`, with every bit.
 fn numbers_of(outcome: &FitOutcome) -> Value {
     let judged = outcome.judged.iter().map(|j| {
         let c = &j.candidate;

@@ -1,4 +1,4 @@
-//! A small photo under a small map, and what a fit of them leaves.
+//! A small photo under a small map, and the results of fits of them.
 
 use crate::program::{Answer, image, lookalike, write_exr};
 use lookalike::{
@@ -60,7 +60,7 @@ fn photo(size: usize) -> Image {
     Shot { geometry: &geometry, light: &light, reflectance: &paint, samples: 256, seed: 11 }.render(|| ()).image
 }
 
-/// A fit that many tests start from. It runs once in this process; each test gets a copy of its files.
+/// The results of a fit that many tests start from. It runs once in this process; each test gets a copy of its files.
 pub(crate) struct Finished {
     flags: &'static str,
     files: OnceLock<Vec<(String, Vec<u8>, Permissions)>>,
@@ -107,7 +107,7 @@ impl Finished {
 
     fn run(&self) -> Vec<(String, Vec<u8>, Permissions)> {
         let folder = folder();
-        // Where there is no run to resume, `--resume` begins one.
+        // `--resume` starts a run where there is none to resume.
         fit(folder.path(), "out", &format!("{} --resume", self.flags)).done();
         let entries = fs::read_dir(folder.path().join("out")).unwrap().map(Result::unwrap);
         let file = |entry: fs::DirEntry| {
@@ -123,19 +123,19 @@ pub(crate) fn fit(folder: &Path, out: &str, flags: &str) -> Answer {
     lookalike(folder, &format!("fit photo.exr --env map.exr --out {out} {flags}"))
 }
 
-/// The results of a fit: those of [`QUICK`] and more flags, which win.
+/// The `fit.json` of a fit with the flags of [`QUICK`] and these, which take precedence.
 pub(crate) fn quick(flags: &str) -> Value {
     let folder = folder();
     fit(folder.path(), "out", &format!("{QUICK} {flags}")).done();
     fit_json(&folder.path().join("out"))
 }
 
-/// `fit.json` of a folder of results.
+/// The content of `fit.json` in a folder of results.
 pub(crate) fn fit_json(out: &Path) -> Value {
     serde_json::from_slice(&fs::read(out.join("fit.json")).unwrap()).unwrap()
 }
 
-/// `fit.json` without its `timing`, which must be there, as text.
+/// The text of `fit.json` without `timing`, which must exist.
 pub(crate) fn without_timing(out: &Path) -> String {
     let mut json = fit_json(out);
     json.as_object_mut().unwrap().remove("timing").expect("a timing block");

@@ -1,4 +1,4 @@
-//! Every setting of the method does what it says, as seen in `fit.json`.
+//! Every setting of the method has the effect, visible in `fit.json`, that its documentation states.
 
 use super::scene::{
     POLISHED, QUICK, QUICK_FIT, QUICK_POLISHED, fit, fit_json, folder, folder_of_size, number, quick, without_timing,
@@ -21,13 +21,13 @@ fn settings_file_gives_the_result_of_the_flags() {
     let text = "photo = \"photo.exr\"\nenv = \"map.exr\"\nout = \"file\"\nsamples = 24\ngammas = \"1:2:1\"\nseed = 4\n\
                 polish = \"off\"\nworkers = 2\n";
     fs::write(folder.path().join("fit.toml"), text).unwrap();
-    // A flag wins over the file.
+    // A flag takes precedence over the file.
     crate::program::lookalike(folder.path(), "fit fit.toml --seed 9").done();
     assert_eq!(without_timing(&folder.path().join("flags")), without_timing(&folder.path().join("file")));
 }
 
 #[test]
-fn gammas_are_those_asked_for() {
+fn gammas_are_those_requested() {
     let json = QUICK_FIT.json();
     assert_eq!(gammas(&json), [1.0, 1.5, 2.0]);
     assert_eq!(json["gammas"], json!([1.0, 1.5, 2.0]));
@@ -35,7 +35,7 @@ fn gammas_are_those_asked_for() {
 }
 
 #[test]
-fn full_samples_use_every_usable_pixel() {
+fn samples_full_uses_every_usable_pixel() {
     let folder = folder_of_size(20);
     let fitted = |out: &str, flags: &str| {
         fit(folder.path(), out, &format!("{QUICK} --gammas 1 {flags}")).done();
@@ -43,7 +43,7 @@ fn full_samples_use_every_usable_pixel() {
     };
     let [a, b] = ["1", "2"].map(|seed| fitted(seed, &format!("--samples full --seed {seed}")));
     assert_eq!(a["samples"], "full");
-    // Nothing is drawn, so that the seed does not matter; the cost is an estimate of the same sum from a subset.
+    // No subset is drawn, so the seed does not matter; the cost of a fit with a subset is an estimate of the same sum.
     assert_eq!(a["candidates"], b["candidates"]);
     let subset = fitted("few", "");
     let [all, few] = [&a, &subset].map(|json| number(&json["candidates"][0]["cost"]));
@@ -79,7 +79,7 @@ fn preset_paper_is_the_method_of_the_paper() {
     let folder = folder();
     fit(folder.path(), "out", &format!("{QUICK_POLISHED} --preset paper")).done();
     let json = fit_json(&folder.path().join("out"));
-    // Flags given as well win over it: those of the quick fit.
+    // Explicit flags take precedence over the preset: here those of the quick fit.
     assert_eq!((json["samples"].as_u64(), gammas(&json).len()), (Some(32), 3));
     for (name, expected) in [
         ("model", "cook-torrance"),
@@ -112,7 +112,7 @@ fn subsets_multiply_the_candidates() {
 }
 
 #[test]
-fn judge_decides_which_score_selects_and_polishes() {
+fn judge_determines_the_score_for_selection_and_polish() {
     for (judge, score) in [("image", "cssim"), ("object", "cssim_object")] {
         let json = if judge == "image" { POLISHED.json() } else { quick("--judge object --polish on") };
         assert_eq!(json["judge"], judge);
@@ -124,7 +124,7 @@ fn judge_decides_which_score_selects_and_polishes() {
 }
 
 #[test]
-fn without_polish_there_is_none() {
+fn polish_off_gives_no_polished_result() {
     let (off, on) = (QUICK_FIT.json(), POLISHED.json());
     assert_eq!(off["polished"], Value::Null);
     assert_eq!(off["stage_two"], on["stage_two"]);
@@ -132,7 +132,7 @@ fn without_polish_there_is_none() {
 }
 
 #[test]
-fn model_is_the_one_asked_for() {
+fn model_is_the_one_requested() {
     let json = quick("--model cook-torrance --polish on");
     assert_eq!(json["model"], "cook-torrance");
     for parameters in [&json["candidates"][0]["parameters"], &json["polished"]["parameters"]] {
@@ -145,7 +145,7 @@ fn model_is_the_one_asked_for() {
 }
 
 #[test]
-fn progress_goes_to_stderr_in_the_form_asked_for() {
+fn progress_goes_to_stderr_in_the_requested_form() {
     let folder = folder();
     let flags = QUICK.replace("--progress none", "");
     let json = fit(folder.path(), "json", &format!("{flags} --progress json")).done();

@@ -1,4 +1,4 @@
-//! Workers of a real fit whose results are wrong by one bit: who finds out, and where nobody does (docs/security.md).
+//! Workers of a real fit whose results are wrong by one bit: which are detected, and which are not (docs/security.md).
 
 use std::path::Path;
 use std::process::Command;
@@ -8,10 +8,10 @@ use lookalike_tests::process::{Process, stderr};
 use super::PROGRAM;
 use crate::fit::scene::{fit, folder, without_timing};
 
-/// Few nodes, so that a liar gets some.
+/// Few nodes, so that the false worker is assigned some.
 const FLAGS: &str = "--samples 32 --gammas 1:2:0.5 --seed 5 --polish off --progress json";
 
-/// A fit whose workers are a liar about this kind of node, and perhaps an honest one: its exit code and what it said.
+/// A fit with a worker that returns wrong results of this kind of node, and possibly an honest one: its exit code and output.
 fn fit_with_a_liar(folder: &Path, kind: &str, flags: &str, has_honest: bool) -> (Option<i32>, String) {
     let line = format!("fit photo.exr --env map.exr --out {kind} {FLAGS} --workers 0 --listen 127.0.0.1:0 {flags}");
     let mut command = Command::new(env!("CARGO_BIN_EXE_lookalike-under-test"));
@@ -35,7 +35,7 @@ fn fit_with_a_liar(folder: &Path, kind: &str, flags: &str, has_honest: bool) -> 
 }
 
 #[test]
-fn wrong_result_of_a_search_is_found_out_always() {
+fn wrong_result_of_a_search_is_always_detected() {
     let folder = folder();
     let (code, said) = fit_with_a_liar(folder.path(), "search", "", false);
     assert_eq!(code, Some(3), "{said}");
@@ -43,7 +43,7 @@ fn wrong_result_of_a_search_is_found_out_always() {
 }
 
 #[test]
-fn wrong_table_is_found_out_where_all_are_verified() {
+fn wrong_table_is_detected_if_all_outputs_are_verified() {
     let folder = folder();
     let (code, said) = fit_with_a_liar(folder.path(), "transport", "--verify-fraction 1", true);
     assert_eq!(code, Some(3), "{said}");
@@ -51,7 +51,7 @@ fn wrong_table_is_found_out_where_all_are_verified() {
 }
 
 #[test]
-fn wrong_table_goes_unnoticed_where_none_is_verified_as_the_threat_model_says() {
+fn wrong_table_is_not_detected_without_verification_as_the_threat_model_states() {
     let folder = folder();
     let (code, said) = fit_with_a_liar(folder.path(), "transport", "--verify-fraction 0", false);
     assert_eq!(code, Some(0), "{said}");

@@ -1,4 +1,4 @@
-//! Those who listen on the wire, and workers that speak for others, for the past, or far too much.
+//! Replayed sessions, and workers that answer for other workers or other epochs, or send far too much.
 
 use std::io::Write;
 use std::process::Command;
@@ -23,7 +23,7 @@ use lookalike_tests::stranger::{
 
 use super::{PROGRAM, run_at_the_gate, run_within, worker};
 
-/// Say that a node has this output.
+/// Report this output of a node.
 fn claim(liar: &mut TlsClient, lease: LeaseName, output: &[u8]) {
     let (hash, length) = (BlobHash::of(output).0, output.len() as u64);
     say(liar, &ToCoordinator::Finished { lease, hash, length });
@@ -31,7 +31,7 @@ fn claim(liar: &mut TlsClient, lease: LeaseName, output: &[u8]) {
 }
 
 #[test]
-fn recorded_session_that_is_played_again_lets_nobody_in() {
+fn replayed_session_is_not_admitted() {
     let gate = Gate::new();
     let cluster = run_within(&gate, 0, Limits::default());
     let address = cluster.access().address;
@@ -44,7 +44,7 @@ fn recorded_session_that_is_played_again_lets_nobody_in() {
     assert!(record.len() > 400, "{} bytes of a session", record.len());
     for cut in [record.len(), record.len() / 2] {
         let mut again = connect(&address).unwrap();
-        // It may be closed before all is sent.
+        // The connection may be closed before all is sent.
         let _ = again.write_all(&record[..cut]);
         let _ = again.shutdown(std::net::Shutdown::Write);
         let _ = read_to_the_end(again);
@@ -57,7 +57,7 @@ fn recorded_session_that_is_played_again_lets_nobody_in() {
 }
 
 #[test]
-fn worker_that_answers_for_a_node_of_another_is_found_out_where_outputs_are_verified() {
+fn false_result_for_the_node_of_another_worker_is_detected_by_verification() {
     let gate = Gate::new();
     let policy = Policy { verify_fraction: 1.0, ..policy() };
     let leaves = Leaves::Gates { count: 1, address: gate.address().to_string() };
@@ -74,7 +74,7 @@ fn worker_that_answers_for_a_node_of_another_is_found_out_where_outputs_are_veri
 }
 
 #[test]
-fn second_result_with_other_bytes_ends_the_run_by_name_and_the_next_coordinator_computes_the_node_again() {
+fn differing_second_result_ends_the_run_and_the_node_is_rerun_on_resume() {
     let (gate, folder) = (Gate::new(), tempfile::tempdir().unwrap());
     let access = folder.path().join("access.json");
     let coordinator = || {
@@ -83,7 +83,7 @@ fn second_result_with_other_bytes_ends_the_run_by_name_and_the_next_coordinator_
     };
     let first = coordinator();
     gate.next().release();
-    // The liar answers for a node whose output the journal has.
+    // The false worker answers for a node whose output is in the journal.
     let journal = JournalView::of(folder.path());
     let node = loop {
         let known = "SELECT node FROM node_list JOIN results ON lower(hex(results.key)) = node_list.key";
@@ -114,7 +114,7 @@ fn second_result_with_other_bytes_ends_the_run_by_name_and_the_next_coordinator_
 }
 
 #[test]
-fn lease_of_an_earlier_coordinator_counts_for_nothing() {
+fn result_for_a_lease_of_an_earlier_epoch_is_a_violation() {
     let (gate, folder) = (Gate::new(), tempfile::tempdir().unwrap());
     let access = folder.path().join("access.json");
     let coordinator = || {
@@ -140,7 +140,7 @@ fn lease_of_an_earlier_coordinator_counts_for_nothing() {
 }
 
 #[test]
-fn lease_of_the_future_is_no_lease() {
+fn result_for_a_lease_of_another_epoch_is_a_violation() {
     let gate = Gate::new();
     let cluster = run_at_the_gate(&gate);
     let waiting = gate.next();
@@ -158,7 +158,7 @@ fn lease_of_the_future_is_no_lease() {
 }
 
 #[test]
-fn worker_that_floods_its_coordinator_does_not_keep_the_others_from_working() {
+fn worker_that_floods_its_coordinator_does_not_block_other_workers() {
     let gate = Gate::new();
     let cluster = run_at_the_gate(&gate);
     let waiting = gate.next();
@@ -171,7 +171,7 @@ fn worker_that_floods_its_coordinator_does_not_keep_the_others_from_working() {
     }
     let empty = ToCoordinator::Heartbeat { executing: Vec::new() };
     (0..10_000).for_each(|_| say(&mut liar, &empty));
-    // Behind all that, on another connection, somebody is heard at once.
+    // Despite these messages, a worker on another connection joins without delay.
     let honest = worker(&cluster.access_file());
     let joined = |event: &RunEvent| matches!(event, RunEvent::WorkerJoined { threads: 1, .. }).then_some(());
     (0..2).for_each(|_| cluster.wait_for(joined));
@@ -183,12 +183,12 @@ fn worker_that_floods_its_coordinator_does_not_keep_the_others_from_working() {
 }
 
 #[test]
-fn words_without_end_are_cut_or_refused() {
+fn oversized_hello_is_truncated() {
     let gate = Gate::new();
     let cluster = run_at_the_gate(&gate);
     let waiting = gate.next();
     let access = cluster.access();
-    // A hello as long as a frame may be, of a worker with more threads than there are.
+    // A hello about as long as a frame may be, from a worker that reports 2^32 - 1 threads.
     let mut loud = connect_tls(&access).unwrap();
     greet(&mut loud, &access.secret, |_| {}).unwrap();
     let build = "x".repeat(2_000_000);
@@ -199,14 +199,14 @@ fn words_without_end_are_cut_or_refused() {
     });
     assert!(joined <= 4096, "{joined} threads");
     drop(loud);
-    // Waits for the end of its life, so that it gets nothing.
+    // Wait until it has left, so that it is assigned no node.
     cluster.wait_for(|event| matches!(event, RunEvent::WorkerLeft { .. }).then_some(()));
     waiting.release();
     assert!(cluster.finish().0.is_some());
 }
 
 #[test]
-fn error_without_end_is_cut_before_anybody_has_to_read_it() {
+fn oversized_error_message_is_truncated() {
     let listen = Some(([127, 0, 0, 1], 0).into());
     let policy = Policy { grace: Duration::from_secs(5), ..policy() };
     let leaves = Leaves::Digests { count: 1, shared_bytes: 1 };

@@ -1,4 +1,4 @@
-//! Workers that have the access file and are up to no good: they are thrown out, their nodes run elsewhere.
+//! False workers that have the access file: they are disconnected, and their nodes run elsewhere.
 
 use super::{PROGRAM, run_at_the_gate, run_within, worker};
 use lookalike::graph::BlobHash;
@@ -18,7 +18,7 @@ use std::io::Write;
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::Duration;
 
-/// How the liar's membership ended.
+/// How the membership of the false worker ended.
 fn end_of_liar(cluster: &Cluster) -> Departure {
     let liar = cluster.wait_for(|event| match event {
         RunEvent::WorkerJoined { worker, process: LIAR, .. } => Some(*worker),
@@ -30,7 +30,7 @@ fn end_of_liar(cluster: &Cluster) -> Departure {
     })
 }
 
-/// Asserts that a liar who does this is thrown out of a run that goes on.
+/// Asserts that a worker that does this is disconnected and that the run continues.
 #[track_caller]
 fn assert_thrown_out(limits: Limits, lie: impl FnOnce(&mut TlsClient)) {
     let gate = Gate::new();
@@ -46,7 +46,7 @@ fn assert_thrown_out(limits: Limits, lie: impl FnOnce(&mut TlsClient)) {
 }
 
 #[test]
-fn frames_that_are_none_end_the_membership() {
+fn malformed_frames_end_the_membership() {
     let oversized = [255, 255, 255, 127, 0].to_vec();
     let unknown_tag = [1, 0, 0, 0, 9].to_vec();
     let no_message = [3, 0, 0, 0, 0, 99, 99].to_vec();
@@ -57,22 +57,22 @@ fn frames_that_are_none_end_the_membership() {
 }
 
 #[test]
-fn frame_beyond_the_coordinators_own_limit_is_refused_from_its_header() {
+fn frame_beyond_the_coordinators_limit_is_refused_by_its_header() {
     // A frame of 5000 bytes, of which only the header is sent.
     let limits = Limits { frame_bytes: 4096, ..Limits::default() };
     assert_thrown_out(limits, |stream| stream.write_all(&[0x88, 0x13, 0, 0, 0]).unwrap());
 }
 
 #[test]
-fn answers_to_nothing_and_false_hashes_are_not_believed() {
+fn unrequested_answers_and_false_hashes_end_the_membership() {
     let lease = LeaseName { node: 0, attempt: 9, epoch: 1 };
     let never_asked = ToCoordinator::Failed { lease, kind: FailureKind::Application, message: "I lie".into() };
     let false_hash = ToCoordinator::Finished { lease, hash: [1; 32], length: 0 };
     let too_long = ToCoordinator::Finished { lease, hash: [1; 32], length: u64::MAX };
-    // Refused before the first of its bytes has come.
+    // Refused before its first byte has arrived.
     let large_and_never_asked = ToCoordinator::Finished { lease, hash: [1; 32], length: 100 << 20 };
     let unknown_blob = ToCoordinator::Fetch { hash: [1; 32] };
-    // The input of the node at the gate: it is there, but this worker has nothing to do with it.
+    // The input of the node at the gate: it exists, but this worker was not assigned the node.
     let blob_of_another = ToCoordinator::Fetch { hash: BlobHash::of(&[]).0 };
     for lie in [never_asked, false_hash, too_long, large_and_never_asked, unknown_blob, blob_of_another] {
         assert_thrown_out(Limits::default(), |stream| say(stream, &lie));
@@ -80,7 +80,7 @@ fn answers_to_nothing_and_false_hashes_are_not_believed() {
 }
 
 #[test]
-fn frame_that_is_cut_off_is_the_end_of_the_connection_and_of_nothing_else() {
+fn truncated_frame_ends_only_its_connection() {
     for says_farewell in [true, false] {
         let gate = Gate::new();
         let cluster = run_at_the_gate(&gate);
@@ -99,20 +99,20 @@ fn frame_that_is_cut_off_is_the_end_of_the_connection_and_of_nothing_else() {
 }
 
 #[test]
-fn garbage_under_the_encryption_is_the_end_of_the_connection_and_of_nothing_else() {
+fn undecryptable_record_ends_only_its_connection() {
     let gate = Gate::new();
     let cluster = run_at_the_gate(&gate);
     let waiting = gate.next();
     let mut stream = join(&cluster.access(), 1);
     stream.flush().unwrap();
-    // A record of the right form that nobody with the keys has written.
+    // A well-formed record that was not encrypted with the keys of the connection.
     stream.sock.write_all(&[&[0x17, 3, 3, 0, 32][..], &[5; 32]].concat()).unwrap();
     assert_eq!(end_of_liar(&cluster), Departure::Lost);
     waiting.release();
     assert!(cluster.finish().0.is_some());
 }
 
-/// A run of two leaves over one blob that nobody works for yet.
+/// A run of two leaves over one blob, without workers yet.
 fn run_without_workers(limits: Limits) -> (Leaves, Cluster) {
     run_by(policy(), limits)
 }
@@ -126,7 +126,7 @@ fn run_by(policy: Policy, limits: Limits) -> (Leaves, Cluster) {
 }
 
 #[test]
-fn worker_that_returns_other_bytes_than_it_announced_is_not_believed() {
+fn worker_that_sends_other_bytes_than_announced_is_disconnected() {
     let (leaves, cluster) = run_without_workers(Limits::default());
     let mut liar = join(&cluster.access(), 1);
     let lease = hear(&mut liar, |message| match message {
@@ -143,14 +143,14 @@ fn worker_that_returns_other_bytes_than_it_announced_is_not_believed() {
 }
 
 #[test]
-fn worker_that_asks_and_does_not_take_is_thrown_out() {
+fn worker_that_requests_blobs_without_reading_is_disconnected() {
     let (leaves, cluster) = run_without_workers(Limits { pending_blobs: 4, ..Limits::default() });
     let mut liar = join(&cluster.access(), 1);
     let hash = hear(&mut liar, |message| match message {
         ToWorker::Assign(assignment) => Some(assignment.inputs[0]),
         _ => None,
     });
-    // Twenty megabytes are more than the sockets take, so the first one is on its way for ever.
+    // Twenty megabytes exceed the buffers of the sockets, so the first transfer never ends.
     for _ in 0..5 {
         say(&mut liar, &ToCoordinator::Fetch { hash });
     }
@@ -161,7 +161,7 @@ fn worker_that_asks_and_does_not_take_is_thrown_out() {
 }
 
 #[test]
-fn worker_that_reads_nothing_is_too_slow_however_alive_it_seems() {
+fn worker_that_sends_heartbeats_but_reads_nothing_is_too_slow() {
     let policy = Policy { heartbeat: Duration::from_millis(100), lost_after: Duration::from_secs(2), ..policy() };
     let (leaves, cluster) = run_by(policy, Limits::default());
     let mut liar = join(&cluster.access(), 1);
@@ -170,7 +170,7 @@ fn worker_that_reads_nothing_is_too_slow_however_alive_it_seems() {
         _ => None,
     });
     say(&mut liar, &ToCoordinator::Fetch { hash });
-    // It says that it lives until somebody closes the connection.
+    // It sends heartbeats until the connection is closed.
     let (keep, dropped) = channel::<()>();
     let living = std::thread::spawn(move || {
         let body = encode_message(&ToCoordinator::Heartbeat { executing: Vec::new() }).unwrap();
@@ -184,7 +184,8 @@ fn worker_that_reads_nothing_is_too_slow_however_alive_it_seems() {
     });
     assert_eq!(end_of_liar(&cluster), Departure::TooSlow);
     drop(keep);
-    // Only what the sockets held has got through; then the connection is closed, though nobody took what was left.
+    // Only the contents of the sockets' buffers were received; then the coordinator closed the connection, although bytes were left to
+    // read.
     let liar = living.join().unwrap();
     assert!(read_to_the_end(liar).len() < 20_000_001);
     let honest = worker(&cluster.access_file());
@@ -193,7 +194,7 @@ fn worker_that_reads_nothing_is_too_slow_however_alive_it_seems() {
 }
 
 #[test]
-fn wrong_output_is_found_out_where_outputs_are_verified() {
+fn wrong_output_is_detected_if_outputs_are_verified() {
     let policy = Policy { verify_fraction: 1.0, ..policy() };
     let (_, cluster) = run_by(policy, Limits::default());
     let mut liar = join(&cluster.access(), 1);
@@ -201,7 +202,7 @@ fn wrong_output_is_found_out_where_outputs_are_verified() {
         ToWorker::Assign(assignment) => Some(assignment.lease),
         _ => None,
     });
-    // Well formed, and long enough to be asked for first.
+    // Well formed, and so long that the coordinator has to request it.
     let wrong = vec![7; PART_BYTES + 1];
     say(&mut liar, &ToCoordinator::Started(lease));
     let (hash, length) = (BlobHash::of(&wrong).0, wrong.len() as u64);

@@ -1,5 +1,4 @@
-//! What happens when somebody is not who they should be, on either end of the wire: they get nothing, they cost little, and the
-//! run goes on.
+//! False peers on either end of a connection: they are not admitted or are disconnected, they cost little, and the run continues.
 
 mod false_results;
 mod impostors;
@@ -20,12 +19,12 @@ use std::process::Command;
 const PROGRAM: &str = env!("CARGO_BIN_EXE_lookalike-test-cluster");
 const WORKER: &str = env!("CARGO_BIN_EXE_lookalike-worker-under-test");
 
-/// A run whose only node waits at the gate, on a real local worker; others may join.
+/// A run whose only node waits at the gate, on a real local worker; other workers may join.
 fn run_at_the_gate(gate: &Gate) -> Cluster {
     run_within(gate, 1, Limits::default())
 }
 
-/// A run whose only node waits at the gate, with so many local workers.
+/// A run whose only node waits at the gate, with this many local workers.
 fn run_within(gate: &Gate, workers: usize, limits: Limits) -> Cluster {
     let leaves = Leaves::Gates { count: 1, address: gate.address().to_string() };
     let listen = Some(([127, 0, 0, 1], 0).into());

@@ -1,4 +1,4 @@
-//! A worker that is refused, or refuses its coordinator, ends at once, says why and what to do, and does not try again.
+//! A worker that is refused, or refuses its coordinator, ends at once without retrying and prints the reason and the remedy.
 
 use super::{PROGRAM, WORKER, run_at_the_gate, worker};
 use lookalike::protocol::{
@@ -26,7 +26,7 @@ use tempfile::TempDir;
 
 const YEAR: Duration = Duration::from_hours(365 * 24);
 
-/// A worker that would try for a minute, with this access file.
+/// A worker with this access file that would retry for a minute.
 fn start(folder: &TempDir, access: &Access) -> Process {
     let file = folder.path().join("access.json");
     std::fs::write(&file, access.to_json()).unwrap();
@@ -40,12 +40,12 @@ fn assert_refused(output: &Output, phrases: &[&str]) {
     for phrase in phrases {
         assert!(stderr.contains(phrase), "expected {phrase:?} in: {stderr}");
     }
-    // At most the line that says where it connects, then one line of error.
+    // At most the line with the address to which it connects, then one line of error.
     let errors = stderr.lines().filter(|line| !line.starts_with("connecting to the coordinator at ")).count();
     assert!(errors == 1 && stderr.lines().count() <= 2, "{stderr}");
 }
 
-/// Asserts that a worker with an access file for `pinned` ends at once when the coordinator behaves like this.
+/// Asserts that a worker whose access file pins `pinned` ends at once when the coordinator behaves like this.
 #[track_caller]
 fn assert_ends(pinned: &Identity, behave: impl FnOnce(&FalseCoordinator, &Secret), phrases: &[&str]) {
     let (folder, coordinator) = (tempfile::tempdir().unwrap(), FalseCoordinator::new());
@@ -58,7 +58,7 @@ fn assert_ends(pinned: &Identity, behave: impl FnOnce(&FalseCoordinator, &Secret
 }
 
 #[test]
-fn wrong_secret() {
+fn worker_with_a_wrong_secret_is_refused() {
     let gate = Gate::new();
     let cluster = run_at_the_gate(&gate);
     let folder = tempfile::tempdir().unwrap();
@@ -70,7 +70,7 @@ fn wrong_secret() {
 }
 
 #[test]
-fn foreign_certificate() {
+fn worker_refuses_a_foreign_certificate() {
     let now = SystemTime::now();
     let behave = |coordinator: &FalseCoordinator, _: &Secret| {
         let alert = coordinator.next_tls(&tls_of(&identity(now))).unwrap_err();
@@ -80,7 +80,7 @@ fn foreign_certificate() {
 }
 
 #[test]
-fn certificate_of_another_time() {
+fn worker_refuses_an_expired_or_future_certificate() {
     let now = SystemTime::now();
     for (made, phrases) in [
         (now - 3 * YEAR, ["has expired", "lookalike access new"]),
@@ -102,7 +102,7 @@ impl ResolvesServerCert for Thief {
 }
 
 #[test]
-fn certificate_without_its_key() {
+fn worker_refuses_a_certificate_without_its_key() {
     let now = SystemTime::now();
     let pinned = identity(now);
     let own = identity(now);
@@ -119,11 +119,11 @@ fn certificate_without_its_key() {
 }
 
 #[test]
-fn address_of_something_else() {
+fn worker_refuses_a_server_that_is_not_a_coordinator() {
     let pinned = identity(SystemTime::now());
     let http = b"HTTP/1.1 400 Bad Request\r\n\r\n".to_vec();
     let greeting = Challenge::new([1; 32]).to_bytes().to_vec();
-    // Fatal: handshake_failure, as a server without TLS 1.3 says it.
+    // The alert handshake_failure, fatal, as a server without TLS 1.3 sends it.
     let old_tls = vec![0x15, 3, 3, 0, 2, 2, 40];
     for answer in [http, greeting, old_tls] {
         let behave = |coordinator: &FalseCoordinator, _: &Secret| {
@@ -137,7 +137,7 @@ fn address_of_something_else() {
 }
 
 #[test]
-fn other_version() {
+fn worker_refuses_another_protocol_version() {
     let pinned = identity(SystemTime::now());
     let behave = |coordinator: &FalseCoordinator, _: &Secret| {
         let mut stream = coordinator.next_tls(&tls_of(&pinned)).unwrap();
@@ -149,22 +149,22 @@ fn other_version() {
 }
 
 #[test]
-fn coordinator_that_does_not_know_the_secret() {
+fn worker_refuses_a_coordinator_without_the_secret() {
     let pinned = identity(SystemTime::now());
     let behave = |coordinator: &FalseCoordinator, _: &Secret| {
         let mut stream = coordinator.next_tls(&tls_of(&pinned)).unwrap();
         let own = Challenge::new([1; 32]);
-        // It has the key of the certificate and welcomes everybody, but cannot prove anything.
+        // It has the key of the certificate and admits every worker, but sends a false proof.
         let welcome = |_: &_, _: &_| Verdict { version: PROTOCOL_VERSION, refusal: None, proof: [5; 32] };
         challenge(&mut stream, &own, welcome).unwrap();
     };
     assert_ends(&pinned, behave, &["the coordinator does not know the secret", "copy the file again"]);
 }
 
-/// Somebody who has stolen the coordinator's key, but not the secret, sits between a worker and its coordinator and passes the
-/// preamble on, word for word: without channel bindings both would accept.
+/// An attacker that has the coordinator's key, but not the secret, relays the preamble unchanged between a worker and its coordinator.
+/// Without channel bindings both would accept.
 #[test]
-fn proofs_that_were_passed_on_by_somebody_in_between() {
+fn relayed_proofs_are_refused() {
     let gate = Gate::new();
     let cluster = run_at_the_gate(&gate);
     let stolen = std::fs::read_to_string(cluster.folder().join("access.key.pem")).unwrap();
@@ -188,12 +188,12 @@ fn proofs_that_were_passed_on_by_somebody_in_between() {
         pass(&mut [0; RESPONSE_BYTES], false);
         pass(&mut [0; VERDICT_BYTES], true);
     };
-    // The worker has the true secret here.
+    // This worker has the true secret.
     let (folder, between) = (tempfile::tempdir().unwrap(), FalseCoordinator::new());
     let worker = start(&folder, &Access { address: between.address().to_string(), ..real.clone() });
     behave(&between, &real.secret);
     assert_refused(&worker.output(), &["wrong secret"]);
-    // The same worker without anybody in between is welcome.
+    // The same worker is admitted on a direct connection.
     let mut direct = connect_tls(&real).unwrap();
     assert_eq!(greet(&mut direct, &real.secret, |_| {}).unwrap().2.refusal, None);
     gate.next().release();
@@ -201,14 +201,14 @@ fn proofs_that_were_passed_on_by_somebody_in_between() {
 }
 
 #[test]
-fn worker_that_cannot_reach_its_coordinator_tries_until_it_can() {
+fn worker_retries_until_it_reaches_its_coordinator() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("beforehand.json");
     // A port that was free a moment ago.
     let address = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
     Credentials::new(address.to_string(), SystemTime::now()).unwrap().create(&file).unwrap();
     let worker = worker(&file);
-    // Somebody who ends every connection at once is not a refusal.
+    // Closing every connection at once does not count as a refusal.
     let rude = TcpListener::bind(address).unwrap();
     drop(rude.accept().unwrap());
     drop(rude.accept().unwrap());
@@ -225,7 +225,7 @@ fn worker_that_cannot_reach_its_coordinator_tries_until_it_can() {
 }
 
 #[test]
-fn coordinator_that_falls_silent_is_left_and_called_again() {
+fn worker_leaves_a_silent_coordinator_and_reconnects() {
     let (folder, coordinator) = (tempfile::tempdir().unwrap(), FalseCoordinator::new());
     let known = identity(SystemTime::now());
     let address = coordinator.address().to_string();
@@ -245,8 +245,8 @@ fn coordinator_that_falls_silent_is_left_and_called_again() {
         let run = RunName([1; 16]);
         let welcome = Welcome { worker: 1, run, epoch: 1, heartbeat_ms: 50, silence_ms: 1000, drain_ms: 0 };
         tell(&mut stream, &ToWorker::Welcome(welcome));
-        // Heartbeats keep the worker for longer than the silence that it tolerates; then, as of a machine without power, there is not
-        // even an end.
+        // Heartbeats continue for longer than the silence that the worker tolerates. Then they stop, without an end of the connection, as
+        // of a machine without power.
         for _ in 0..30 {
             tell(&mut stream, &ToWorker::Heartbeat);
             while !matches!(read_message(&mut stream), ToCoordinator::Heartbeat { .. }) {}

@@ -1,4 +1,4 @@
-//! The secret and the key are in their files and nowhere else.
+//! The secret and the key appear only in their files.
 
 use super::{PROGRAM, run_at_the_gate};
 use crate::program::{image, write_exr};
@@ -7,7 +7,7 @@ use lookalike_tests::process::Process;
 use std::path::Path;
 use std::process::Command;
 
-/// What must not be seen: the secret, and a line of the key.
+/// What must not appear: the secret, and a line of the key.
 fn secrets(access: &Path) -> [String; 2] {
     let json: serde_json::Value = serde_json::from_slice(&std::fs::read(access).unwrap()).unwrap();
     let pem = std::fs::read_to_string(access.with_extension("key.pem")).unwrap();
@@ -34,7 +34,7 @@ fn process_list_shows_the_access_files_path_and_not_the_secret() {
 }
 
 #[test]
-fn logs_at_the_finest_level_do_not_tell_them() {
+fn logs_at_level_trace_do_not_contain_secret_or_key() {
     let folder = tempfile::tempdir().unwrap();
     write_exr(
         &folder.path().join("photo.exr"),
@@ -59,7 +59,7 @@ fn logs_at_the_finest_level_do_not_tell_them() {
 }
 
 #[test]
-fn coordinator_without_an_address_to_listen_on_is_not_seen_from_elsewhere() {
+fn coordinator_without_listen_is_reachable_only_on_loopback() {
     let folder = tempfile::tempdir().unwrap();
     let (gate, file) = (Gate::new(), folder.path().join("access.json"));
     let arguments = ["gates", "1", &gate.address().to_string(), "1"].map(str::to_owned);

@@ -1,4 +1,4 @@
-//! Strangers at the coordinator's port: they do not have the access file.
+//! Strangers at the coordinator's port: clients without the access file.
 
 use super::{PROGRAM, run_at_the_gate, run_within, worker};
 use lookalike::protocol::{Access, CHALLENGE_BYTES, CertificatePin, Refusal, Secret};
@@ -12,11 +12,11 @@ use std::net::TcpStream;
 use std::process::Command;
 use std::time::Duration;
 
-/// The head of a TLS record with a ClientHello of 65535 bytes in it, cut off.
+/// A TLS record that starts a ClientHello of 65535 bytes, truncated.
 const LONG_HELLO: [u8; 9] = [0x16, 3, 1, 0x40, 0, 1, 0, 0xff, 0xff];
 
 #[test]
-fn bytes_that_are_no_tls_are_closed_on() {
+fn connection_with_bytes_that_are_not_tls_is_closed() {
     let gate = Gate::new();
     let cluster = run_at_the_gate(&gate);
     let waiting = gate.next();
@@ -25,9 +25,9 @@ fn bytes_that_are_no_tls_are_closed_on() {
     let http = b"GET / HTTP/1.1\r\nHost: lookalike\r\n\r\n".repeat(4);
     for bytes in [&http, &greeting, &noise, &vec![0xff; 100_000], &vec![0; 100_000]] {
         let mut stream = connect(&cluster.access().address).unwrap();
-        // The other side may close before it has read all.
+        // The coordinator may close the connection before it has read all.
         let _ = stream.write_all(bytes);
-        // At most an alert of TLS.
+        // At most a TLS alert.
         let answer = read_to_the_end(stream);
         assert!(answer.len() <= 7, "{answer:?}");
     }
@@ -49,7 +49,7 @@ fn hello_of_tls_1_2() -> Vec<u8> {
 }
 
 #[test]
-fn client_of_tls_1_2_is_told_that_its_version_is_too_old() {
+fn client_of_tls_1_2_gets_a_protocol_version_alert() {
     let gate = Gate::new();
     let cluster = run_at_the_gate(&gate);
     let mut stream = connect(&cluster.access().address).unwrap();
@@ -78,7 +78,7 @@ fn wrong_secret_or_version_inside_tls_is_refused_without_a_proof() {
 }
 
 #[test]
-fn nothing_is_given_out_with_which_a_session_could_be_resumed() {
+fn tls_session_resumption_is_not_offered() {
     let gate = Gate::new();
     let cluster = run_at_the_gate(&gate);
     let access = cluster.access();
@@ -91,7 +91,7 @@ fn nothing_is_given_out_with_which_a_session_could_be_resumed() {
 }
 
 #[test]
-fn stranger_has_its_time_and_not_more_however_busy_it_seems() {
+fn stranger_is_disconnected_after_its_time_even_while_it_sends() {
     let gate = Gate::new();
     // Long enough for a handshake on a machine whose processors are busy.
     let limits = Limits { stranger_time: Duration::from_secs(2), ..Limits::default() };
@@ -103,22 +103,22 @@ fn stranger_has_its_time_and_not_more_however_busy_it_seems() {
     let mut dripping = connect(&access.address).unwrap();
     dripping.write_all(&LONG_HELLO).unwrap();
     dripping.set_read_timeout(Some(Duration::from_millis(20))).unwrap();
-    // It lives on bytes that it sends, until the other side has enough.
+    // It sends single bytes until the coordinator closes the connection.
     let drops = (0..1500).take_while(|_| {
         let silence = dripping.read(&mut [0; 8]).is_err_and(|error| error.kind() == std::io::ErrorKind::WouldBlock);
         silence && dripping.write_all(&[0]).is_ok()
     });
-    // At least 20 ms each: 100 are its time, 500 would be the default of 10 s.
+    // At least 20 ms each: 100 take the permitted 2 s, 500 the default of 10 s.
     assert!(drops.count() < 250);
     assert!(read_to_the_end(silent).is_empty());
-    // The challenge, and nothing after it.
+    // The challenge and nothing more.
     assert_eq!(read_to_the_end(silent_inside).len(), CHALLENGE_BYTES);
     waiting.release();
     assert!(cluster.finish().0.is_some());
 }
 
 #[test]
-fn strangers_that_hold_all_places_do_not_keep_a_worker_out() {
+fn strangers_in_all_places_do_not_block_a_worker() {
     let gate = Gate::new();
     let limits = Limits { strangers: 8, stranger_time: Duration::from_secs(3600), ..Limits::default() };
     let cluster = run_within(&gate, 0, limits);
@@ -129,7 +129,7 @@ fn strangers_that_hold_all_places_do_not_keep_a_worker_out() {
         stream
     };
     let mut slow: Vec<TcpStream> = (0..20).map(|count| begin(if count % 2 == 0 { &LONG_HELLO } else { b"" })).collect();
-    // The first ones had to make room for the others, long before their time.
+    // The first ones were closed long before their time was over, to make room for the others.
     slow.drain(..12).for_each(|stream| assert!(read_to_the_end(stream).is_empty()));
     let worker = worker(&cluster.access_file());
     gate.next().release();
@@ -152,7 +152,7 @@ fn connections_beyond_the_limit_are_closed_at_once() {
 }
 
 #[test]
-fn another_certificate_than_the_pinned_one_is_not_talked_to() {
+fn client_refuses_another_certificate_than_the_pinned_one() {
     let gate = Gate::new();
     let cluster = run_at_the_gate(&gate);
     let access = Access { certificate: CertificatePin::of(b"another"), ..cluster.access() };
@@ -170,8 +170,8 @@ fn peak_memory(process: u32) -> usize {
     line.split_whitespace().nth(1).unwrap().parse::<usize>().unwrap() << 10
 }
 
-/// What the 16 places of this test may cost, and 10 MB for what an allocator does not give back (4 MB were seen). Without the
-/// bound the 400 strangers cost 29 to 38 MB.
+/// The memory for the 16 places of this test, and 10 MB for what an allocator does not return (4 MB were observed). Without the limit the
+/// 400 strangers used 29 to 38 MB.
 #[cfg(target_os = "linux")]
 const MEMORY_FOR_STRANGERS: usize = 16 * 150_000 + (10 << 20);
 
@@ -185,12 +185,12 @@ fn strangers_cost_a_bounded_amount_of_memory() {
     let waiting = gate.next();
     let before = peak_memory(coordinator.id());
     let address = read_access(&file).address;
-    // Handshakes that never end: most of what a message may have, in records of 16 KiB.
+    // Handshakes that never end: most of the largest message, in records of 16 KiB.
     let record = [&[0x16, 3, 3, 0x40, 0][..], &[0; 0x4000]].concat();
     let hello = [&LONG_HELLO[..], &[0; 0x4000 - 4], &record, &record, &record[..0x3800]].concat();
     let begin = |_| {
         let mut stream = connect(&address).unwrap();
-        // It may be closed before all is sent.
+        // The connection may be closed before all is sent.
         let _ = stream.write_all(&hello);
         stream
     };

@@ -1,5 +1,5 @@
-//! Pixels whose value is known without integrating: constant light, mirrors, turned maps, finer images, other
-//! descriptions of the same sphere.
+//! Pixels whose value is known without integration: constant light, mirrors, rotated maps, finer images, other descriptions of the same
+//! sphere.
 
 use super::knots;
 use lookalike::{
@@ -16,7 +16,7 @@ use lookalike::{
 };
 use lookalike_tests::scene::{Scene, spread, synthetic};
 
-/// What covers the sphere: `None` is white Lambert, else a metal of F = 1 with this alpha.
+/// The material of the sphere: `None` is white Lambert, else a metal of F = 1 with this alpha.
 type Surface = Option<f64>;
 
 fn render(scene: &Scene, pixels: &[Pixel], surface: Surface, accuracy: Accuracy) -> Planes {
@@ -47,19 +47,19 @@ fn difference(a: &Planes, b: &Planes) -> f64 {
 }
 
 #[test]
-fn a_white_lambertian_sphere_in_constant_light_is_that_light_everywhere() {
+fn white_lambertian_sphere_in_constant_light_has_its_radiance() {
     let scene = sphere(synthetic::uniform(2.5));
     let pixels = spread(&scene.interior(), 64, 3);
     for plane in render(&scene, &pixels, None, Accuracy::SUBSET) {
-        // 16 rows of texels: what a cut leaves of the kink at the horizon.
+        // The map has 16 rows of texels; this is the error of a cut at the kink at the horizon.
         assert!(plane.iter().all(|value| (value / 2.5 - 1.0).abs() < 2e-3), "{plane:?}");
     }
 }
 
 #[test]
-fn no_sharp_lobe_of_unit_fresnel_loses_or_gains_in_constant_light() {
+fn sharp_lobe_of_unit_fresnel_conserves_energy_in_constant_light() {
     let scene = sphere(synthetic::uniform(1.0));
-    // Away from the rim masking takes less than alpha^2 of a sharp lobe.
+    // Away from the rim, masking removes less than alpha^2 of a sharp lobe.
     let pixels: Vec<Pixel> = (0..32).map(|i| [128 + 3 * i, 128 - 2 * i]).collect();
     for plane in render(&scene, &pixels, Some(0.02), Accuracy::SUBSET) {
         assert!(plane.iter().all(|value| (value - 1.0).abs() < 2e-3), "{plane:?}");
@@ -67,7 +67,7 @@ fn no_sharp_lobe_of_unit_fresnel_loses_or_gains_in_constant_light() {
 }
 
 #[test]
-fn the_sharpest_lobe_mirrors_smooth_light() {
+fn sharpest_lobe_mirrors_smooth_light() {
     // Radiance linear in the direction: a lobe symmetric about the mirror direction sees its value there.
     let (height, width) = (256, 512);
     let uniform = synthetic::uniform(1.0);
@@ -90,7 +90,7 @@ fn the_sharpest_lobe_mirrors_smooth_light() {
 }
 
 #[test]
-fn turning_the_map_is_the_same_as_shifting_its_columns() {
+fn rotating_the_map_equals_shifting_its_columns() {
     let map = synthetic::room(32);
     let image = map.to_image();
     let width = image.width();
@@ -103,14 +103,14 @@ fn turning_the_map_is_the_same_as_shifting_its_columns() {
     for surface in [None, Some(0.1)] {
         let accuracy = Accuracy { tolerance: 1e-4, footprint: 1.0 };
         let [a, b] = [&turned, &shifted].map(|scene| render(scene, &pixels, surface, accuracy));
-        // The same cut of the same cells; only their directions are rounded apart.
+        // Both use the same cut of the same cells; only the rounding of directions differs.
         assert!(difference(&a, &b) < 1e-5, "{surface:?}: {}", difference(&a, &b));
     }
 }
 
-/// A pixel of a near-mirror sphere sees 0.9 degrees of the map at the centre and 2 at 0.9 R: many lobe widths.
+/// A pixel of a near-mirror sphere covers 0.9 degrees of the map at the centre and 2 degrees at 0.9 R: many lobe widths.
 #[test]
-fn a_near_mirror_pixel_is_the_mean_of_an_eight_times_finer_image() {
+fn near_mirror_pixel_is_the_mean_of_an_eight_times_finer_image() {
     const FINER: u32 = 8;
     let scene = sphere(synthetic::room(256));
     let fine = Scene::sphere(256 * FINER as usize, Camera::Orthographic, synthetic::room(256)).unwrap();
@@ -130,7 +130,7 @@ fn a_near_mirror_pixel_is_the_mean_of_an_eight_times_finer_image() {
 }
 
 #[test]
-fn a_normal_map_of_the_sphere_gives_the_image_of_the_sphere() {
+fn normal_map_of_the_sphere_gives_the_image_of_the_sphere() {
     let scene = sphere(synthetic::room(64));
     let normal = |k: usize| {
         let point = scene.geometry.point((k % 256) as f64 + 0.5, (k / 256) as f64 + 0.5);

@@ -1,4 +1,4 @@
-//! The proof of the rendering: transport tables against the direct integrator, and both against what is known exactly.
+//! Tests of rendering: transport tables against the direct integrator, and both against exactly known values.
 
 mod limits;
 #[cfg(feature = "slow")]
@@ -25,7 +25,7 @@ use std::collections::BTreeSet;
 /// Largest root mean square deviation of tables of stage one, as a share of mean radiance (design section 5).
 const TOLERANCE: f64 = 2e-3;
 
-/// How good the reference has to be.
+/// The target accuracy of a reference.
 #[derive(Debug, Clone, Copy)]
 struct Rigour {
     effort: Effort,
@@ -33,11 +33,11 @@ struct Rigour {
     standard_error: f64,
 }
 
-/// In seconds: half of [`TOLERANCE`], which then holds a table to 0.17 %.
+/// Takes seconds: half of [`TOLERANCE`], with which a table is held to 0.17 %.
 const QUICK: Rigour =
     Rigour { effort: Effort { first: 1 << 12, standard_error: 1.5e-3, ..EFFORT }, standard_error: 1e-3 };
 
-/// In minutes: a quarter of [`TOLERANCE`] (design section 5).
+/// Takes minutes: a quarter of [`TOLERANCE`] (design section 5).
 const THOROUGH: Rigour =
     Rigour { effort: Effort { first: 1 << 13, standard_error: 7e-4, ..EFFORT }, standard_error: 5e-4 };
 
@@ -49,23 +49,23 @@ fn knots(per_octave: f64) -> Knots {
 
 /// One comparison of every lobe of some models.
 struct Case {
-    /// For the print.
+    /// A name for the output.
     name: &'static str,
     scene: Scene,
-    /// Whose lobes.
+    /// The models whose lobes are compared.
     models: Vec<&'static dyn Model>,
-    /// Widths; the nearest mid-knots are taken.
+    /// Widths; the nearest mid-knots are used.
     alphas: &'static [f64],
     /// Pixels of full coverage, spread over the object.
     pixels: usize,
     /// Accuracies of tables, each with the largest root mean square deviation of any part of any lobe.
     accuracies: &'static [(Accuracy, f64)],
-    /// Of the reference.
+    /// Accuracy of the reference.
     rigour: Rigour,
 }
 
 impl Case {
-    /// Prints every deviation, then asserts.
+    /// Prints every deviation, then asserts the largest ones.
     #[track_caller]
     fn check(&self, references: &[References]) {
         let mut failures = Vec::new();
@@ -84,7 +84,7 @@ impl Case {
         assert!(failures.is_empty(), "{failures:#?}");
     }
 
-    /// What the integrator says of every lobe.
+    /// References of every lobe by the direct integrator.
     fn integrate(&self) -> Vec<References> {
         let (pixels, widths) = (self.pixels(), mid_knots(&knots(PER_OCTAVE), self.alphas));
         let of_model = |(model, lobes): (&'static dyn Model, Vec<&str>)| {
@@ -98,7 +98,7 @@ impl Case {
         spread(&self.scene.interior(), self.pixels, 1)
     }
 
-    /// The lobes of each model. One that several models share is compared once.
+    /// The lobes of each model. A lobe shared by several models is compared once.
     fn lobes(&self) -> Vec<(&'static dyn Model, Vec<&'static str>)> {
         let mut seen = BTreeSet::new();
         let mut of_model = |model: &'static dyn Model| {

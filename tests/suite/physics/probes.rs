@@ -1,4 +1,4 @@
-//! Tables against the direct integrator under real light: minutes, so behind `--features slow`.
+//! Tables against the direct integrator under real light: takes minutes, so it needs `--features slow`.
 
 use super::{Case, THOROUGH, TOLERANCE};
 use lookalike::{brdf::MODELS, render::transport::Accuracy, scene::Camera};
@@ -10,7 +10,7 @@ use lookalike_tests::scene::{
 /// Root mean square deviation of full-resolution tables: stage two and polish rank images that differ by far more.
 const FULL_TOLERANCE: f64 = 5e-3;
 
-/// Half-way between knots, over the widths that materials have.
+/// Half-way between knots, over the widths of common materials.
 const ALPHAS: [f64; 6] = [0.01, 0.025, 0.06, 0.15, 0.4, 0.95];
 
 fn agree(probe: Probe) {

@@ -1,6 +1,6 @@
-//! What the direct integrator said, stored in `references.json`: to integrate it takes minutes.
+//! References by the direct integrator, stored in `references.json` because integration takes minutes.
 //!
-//! `LOOKALIKE_BLESS=1 cargo test --release --features slow -p lookalike-tests --test suite physics::stored` writes the file anew. Look at
+//! `LOOKALIKE_BLESS=1 cargo test --release --features slow -p lookalike-tests --test suite physics::stored` writes the file again. Review
 //! the difference: it changes only with a scene, a lobe or the integrator.
 
 use super::Case;
@@ -11,7 +11,7 @@ use std::sync::OnceLock;
 const FILE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/suite/physics/references.json");
 
 impl Case {
-    /// What the integrator said of every lobe.
+    /// The stored references of every lobe.
     pub(super) fn stored(&self) -> Vec<References> {
         let (pixels, stored) = (self.pixels(), stored(self.name));
         assert_eq!(stored["pixels"], serde_json::json!(pixels), "the stored references are of other pixels");
@@ -22,7 +22,7 @@ impl Case {
     }
 }
 
-/// What the integrator said of the pixels at the silhouette, by material.
+/// The stored references of the pixels at the silhouette, by material.
 pub(super) fn silhouette(material: &str) -> Reference {
     Reference::from_json(&stored("silhouette")[material])
 }
@@ -34,7 +34,7 @@ fn stored(name: &str) -> &'static Value {
 
 #[cfg(feature = "slow")]
 #[test]
-fn stored_references_are_what_the_integrator_says() {
+fn stored_references_match_the_integrator() {
     use super::tables::{MATERIALS, PERSPECTIVE, ROOM, SUN, Silhouette};
     use serde_json::{Map, json};
 
@@ -61,7 +61,7 @@ fn stored_references_are_what_the_integrator_says() {
     assert!(text == stored, "the integrator says something else: see LOOKALIKE_BLESS in this file");
 }
 
-/// A section of the file: a line for each of its entries.
+/// A section of the file, with one line for each entry.
 #[cfg(feature = "slow")]
 fn section(name: &str, entries: &serde_json::Map<String, Value>) -> String {
     let lines: Vec<String> = entries.iter().map(|(key, value)| format!("{key:?}: {value}")).collect();

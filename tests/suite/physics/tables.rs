@@ -1,9 +1,10 @@
 //! Transport tables against the direct integrator (design section 5, "Accuracy").
 //!
-//! The direct integrator is Monte Carlo with its own density, its own points inside the pixel and seeds of its own; tables are
-//! deterministic. They share the map, the geometry and the formula of the lobe, each tested elsewhere.
+//! The direct integrator is Monte Carlo with its own density, positions inside the pixel and seeds; tables are deterministic. They share
+//! the map, the geometry and the formula of the lobe, each tested elsewhere.
 //!
-//! By default the integrator's means and variances are read from a file. With `--features slow` it integrates again, and more pixels.
+//! By default the integrator's means and variances are read from a file. With `--features slow` they are integrated again, for more
+//! pixels.
 
 use super::{Case, EFFORT, Rigour, TOLERANCE, knots, stored};
 use lookalike::{
@@ -22,9 +23,9 @@ use lookalike_tests::scene::{
 
 const SUBSET: &[(Accuracy, f64)] = &[(Accuracy::SUBSET, TOLERANCE)];
 
-/// A comparison, and how many pixels it has.
+/// A comparison and its numbers of pixels.
 pub(super) struct Comparison {
-    /// Of so many pixels, with a reference of this rigour.
+    /// Builds the case with this many pixels and a reference of this rigour.
     pub(super) build: fn(usize, Rigour) -> Case,
     /// Pixels whose reference is stored.
     pub(super) stored: usize,
@@ -65,14 +66,15 @@ fn perspective(pixels: usize, rigour: Rigour) -> Case {
     Case { name: "perspective", scene, models, alphas, pixels, accuracies: SUBSET, rigour }
 }
 
-/// The whole path on light with texture, windows and a sun of one texel: both lobes and both Fresnel parts of every model.
+/// The whole path under light with texture, windows and a sun of one texel: both lobes and both Fresnel parts of every model.
 #[test]
 fn tables_agree_with_the_direct_integrator_in_a_room() {
     ROOM.check();
 }
 
-/// Once the `F5` part was 0.3 % too dark near the rim (`render::cut::spread`), and the diffuse lobe of `ashikhmin-shirley`, which fades
-/// towards the rim, by as much (2.5 % in the worst pixel: one position stood for it). Of every model with such a part.
+/// Two regressions near the rim. The `F5` part was 0.3 % too dark (`render::cut::spread`). The diffuse lobe of `ashikhmin-shirley`, which
+/// fades towards the rim, was too dark by as much (2.5 % in the worst pixel), because one position represented the whole pixel. Compares
+/// every model with such a part.
 #[test]
 fn fresnel_part_of_sharp_lobes_agrees_at_the_rim_under_a_sun_of_one_texel() {
     SUN.check();
@@ -83,7 +85,7 @@ fn tables_agree_with_the_direct_integrator_through_a_perspective_camera() {
     PERSPECTIVE.check();
 }
 
-/// Pixels that the silhouette cuts, and what covers the sphere there.
+/// Pixels of a sphere that its silhouette cuts.
 pub(super) struct Silhouette {
     scene: Scene,
     pixels: Vec<Pixel>,
@@ -103,14 +105,14 @@ impl Silhouette {
         Self { scene, pixels }
     }
 
-    /// What the integrator says.
+    /// The reference by the direct integrator.
     pub(super) fn integrate(&self, parameters: &[f64; 7]) -> Reference {
         let material = Material::new(&Ggx, parameters.to_vec()).unwrap();
         let effort = Effort { first: 1 << 15, most: 1 << 15, ..EFFORT };
         Reference::new(&self.scene, &self.pixels, &material, effort, 7)
     }
 
-    /// What a table of full images says: the green channel of some pixels.
+    /// The green channel of some pixels by a table of full images.
     fn radiance(&self, pixels: &[Pixel], parameters: &[f64; 7]) -> Vec<f64> {
         let plan = TransportPlan { model: &Ggx, knots: knots(PER_OCTAVE), accuracy: Accuracy::FULL };
         let table = plan.integrate(&self.scene.geometry, &self.scene.pyramid, pixels);
@@ -121,7 +123,8 @@ impl Silhouette {
     }
 }
 
-/// Pixels that the silhouette cuts never enter stage one; in full images they count by their coverage, and so do their errors here.
+/// Pixels that the silhouette cuts are never used in stage one; in full images they are weighted by their coverage, and so are their
+/// errors here.
 #[test]
 fn silhouette_pixels_agree_to_a_percent_of_mean_radiance() {
     const TOLERANCE: f64 = 1e-2;

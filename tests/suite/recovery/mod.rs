@@ -57,7 +57,7 @@ impl Session {
         Prediction::new(self.model, &self.truth, &self.table, &self.photo, &compression)
     }
 
-    /// Quantities that have to come back: name, truth, found, predicted standard deviation.
+    /// Quantities that must be recovered: name, truth, found, predicted standard deviation.
     fn quantities(&self, found: &[f64], prediction: &Prediction) -> Vec<Quantity> {
         let at = |name: &str| offset_of(self.model.parameters(), name);
         let names = flat_names(self.model.parameters());
@@ -105,7 +105,7 @@ impl Quantity {
     }
 }
 
-/// Photographs a target, fits it for each gamma, prints, and returns what was not recovered.
+/// Photographs a target, fits it for each gamma, prints the results, and returns the quantities that were not recovered.
 fn unrecovered(scene: &Scene, place: &str, target: &Target, exposure: Exposure) -> Vec<String> {
     let mut failures = Vec::new();
     for (model, truth) in target.parameters() {
@@ -136,7 +136,7 @@ fn metal_and_plastic_are_recovered_in_a_room() {
     assert!(failures.is_empty(), "{failures:#?}");
 }
 
-/// The paper's search from the paper's start stays where least squares goes on.
+/// The paper's search from the paper's start stops where least squares still improves.
 #[test]
 fn least_squares_reaches_at_most_the_cost_of_pattern_search() {
     let scene = Scene::sphere(64, Camera::Orthographic, synthetic::room_at_dusk(32)).unwrap();

@@ -1,4 +1,4 @@
-//! The full matrix under real light: minutes, so behind `--features slow`.
+//! All materials under real light: takes minutes, so it needs `--features slow`.
 
 use super::{EXPOSURE, GAMMAS, Session, targets::*, unrecovered};
 use lookalike::{
@@ -36,7 +36,7 @@ fn known_materials_are_recovered_under_the_uffizi_gallery() {
     recover(UFFIZI);
 }
 
-/// A table of what the paper's search reaches from the paper's start; nothing to assert.
+/// Prints a table of what the paper's search reaches from the paper's start; asserts nothing.
 #[test]
 fn what_pattern_search_reaches_from_the_papers_start() {
     for probe in [GRACE, RNL, UFFIZI] {

@@ -1,4 +1,4 @@
-//! Materials whose parameters are to be found again.
+//! Materials whose parameters must be recovered.
 
 use lookalike::brdf::{CookTorrance, Ggx, Model};
 
@@ -9,7 +9,7 @@ pub(super) struct Target {
     kd: [f64; 3],
     /// Specular colour at normal incidence.
     specular: [f64; 3],
-    /// Scalar `f0` of models that have one beside a colour.
+    /// Scalar `f0` of models that have one in addition to a colour.
     f0: f64,
     width: f64,
 }

@@ -1,4 +1,4 @@
-//! Chance that is a function of a seed: streams of numbers that do not disturb each other.
+//! Random numbers from a seed, in streams that are independent of each other.
 
 use std::time::Duration;
 
@@ -27,7 +27,7 @@ impl Chance {
         key(&[self.seed, self.stream, self.drawn])
     }
 
-    /// Whether something happens that does so with this probability.
+    /// Whether an event with this probability happens.
     pub(super) fn happens(&mut self, probability: f64) -> bool {
         self.share() < probability
     }
@@ -38,7 +38,7 @@ impl Chance {
         least + (self.share() * (most - least + 1) as f64) as u64
     }
 
-    /// A place in something of this length, which is not 0.
+    /// An index into something of this length, which is not 0.
     pub(super) fn index(&mut self, length: usize) -> usize {
         usize::try_from(self.between(0, length as u64 - 1)).unwrap_or(0)
     }
@@ -48,7 +48,7 @@ impl Chance {
         choices[self.index(choices.len())]
     }
 
-    /// A time between these, in whole milliseconds.
+    /// A duration between these, in whole milliseconds.
     pub(super) fn time(&mut self, least_ms: u64, most_ms: u64) -> Duration {
         Duration::from_millis(self.between(least_ms, most_ms))
     }

@@ -1,4 +1,4 @@
-//! What is done to a simulated run, and how it is mended again.
+//! Faults of a simulated run, and their repairs.
 
 use std::sync::Weak;
 use std::time::Duration;
@@ -9,26 +9,26 @@ use super::chance::Chance;
 use super::stage::Place;
 use super::wire::Fate;
 
-/// Something that is done at its time.
+/// Something done to the run at its time.
 #[derive(Clone, Debug)]
 pub(super) enum Event {
-    /// A new fault, whichever it will be.
+    /// A new fault, chosen at random when it happens.
     Fault,
     /// The link to a worker works again.
     MendLink(usize, Link),
     /// An end of a connection fails.
     Reset(Weak<Fate>),
-    /// A process begins in a place where there is none.
+    /// A process starts in a place that has none.
     Start(Place),
-    /// A worker goes on.
+    /// A stuck worker continues.
     Unstick(usize),
-    /// A worker computes as fast as the others.
+    /// A slow worker computes as fast as the others again.
     Hurry(usize),
-    /// A worker that was asked to end is asked again.
+    /// A worker that was asked to end is asked a second time.
     Insist(Wishes),
 }
 
-/// What is wrong with a link.
+/// A fault of a link.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Link {
     /// Everything on it waits, nothing is lost.
@@ -43,25 +43,25 @@ pub(super) enum Link {
     Slow,
 }
 
-/// What may happen.
+/// A kind of fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Fault {
     Link(Link),
-    /// The connections end, as a firewall ends them: each end notices at its own time.
+    /// The connections end, as when a firewall ends them: each end notices at its own time.
     ResetConnections,
     /// A worker's process is killed.
     KillWorker,
-    /// A worker's machine is gone: nobody says so.
+    /// A worker's machine vanishes without closing its connections.
     PowerOff,
     /// A worker is asked to end.
     Drain,
-    /// A worker does nothing for a while, and says nothing.
+    /// A worker computes and sends nothing for a while.
     Stick,
     /// A worker computes slowly.
     SlowDown,
     /// The coordinator's process is killed; another one resumes the run.
     KillCoordinator,
-    /// The same, and some workers are killed with it: the next coordinator begins with fewer of them, and more join later.
+    /// The same, and some workers are killed with it: the next coordinator starts with fewer of them, and more join later.
     KillAll,
 }
 
@@ -82,7 +82,7 @@ impl Fault {
         Self::KillAll,
     ];
 
-    /// One of them.
+    /// A random kind of fault.
     pub(super) fn draw(chance: &mut Chance) -> Self {
         chance.of(&Self::ALL)
     }

@@ -1,8 +1,8 @@
-//! The runner in a simulated network, under faults from a seed: coordinator and workers are the program itself, with TLS,
-//! protocol and journal; network, time, computing and chance are simulated (see `lookalike_worker::world`).
+//! The runner in a simulated network, with faults from a seed. Coordinator and workers are the program itself, with TLS, protocol and
+//! journal; network, time, computing and randomness are simulated (see `lookalike_worker::world`).
 //!
-//! After every run: it has come to its end, each node has come to what it comes to in one process, nothing that was acknowledged
-//! was given out again, no innocent node has failed, nobody has left or ended without a reason.
+//! Checked after every run: it has ended, each node has the same outcome as in one process, no acknowledged node was assigned again, no
+//! node failed without a cause of its own, and no worker left or ended without a fault.
 
 mod chance;
 mod events;
@@ -27,17 +27,17 @@ const SEEDS: u64 = if cfg!(feature = "slow") { 1000 } else { 12 };
 /// How many seeds are simulated twice.
 const REPLAYS: u64 = if cfg!(feature = "slow") { 5 } else { 1 };
 
-/// Names the seed to replay.
+/// Environment variable: the seed to replay.
 const SEED: &str = "LOOKALIKE_SIM_SEED";
 
-/// Says how many seeds are simulated twice.
+/// Environment variable: how many seeds are simulated twice.
 const TWICE: &str = "LOOKALIKE_SIM_TWICE";
 
-/// Says how many seeds are simulated.
+/// Environment variable: how many seeds are simulated.
 const COUNT: &str = "LOOKALIKE_SIM_SEEDS";
 
 #[test]
-fn runs_come_through_whatever_happens_to_the_network() {
+fn runs_end_correctly_under_all_faults() {
     let count = number(COUNT).unwrap_or(SEEDS);
     let first = number(SEED).unwrap_or(0);
     let mut report = Report::default();
@@ -92,7 +92,7 @@ fn number(name: &str) -> Option<u64> {
     env::var(name).ok().map(|text| text.parse().unwrap_or_else(|_| panic!("{name}: expected a number, found {text:?}")))
 }
 
-/// What many runs came to.
+/// Totals over many runs.
 #[derive(Debug, Default)]
 struct Report {
     runs: u32,

@@ -1,4 +1,4 @@
-//! The processes of a simulated run: coordinator after coordinator, and workers, each the program itself in a simulated world.
+//! The processes of a simulated run: consecutive coordinators, and workers, each the program itself in a simulated world.
 
 use std::collections::BTreeMap;
 use std::num::NonZeroUsize;
@@ -27,7 +27,7 @@ pub(super) fn policy(chance: &mut Chance) -> Policy {
     let heartbeat = chance.time(100, 600);
     Policy {
         heartbeat,
-        // Late messages alone shall not lose a worker.
+        // Late messages alone must not lose a worker.
         lost_after: heartbeat * 2 + chance.time(1000, 3000),
         spare_leases: usize::try_from(chance.between(0, 4)).unwrap_or(0),
         suspect_after: u32::try_from(chance.between(2, 3)).unwrap_or(2),
@@ -36,14 +36,14 @@ pub(super) fn policy(chance: &mut Chance) -> Policy {
         speculation: Speculation { factor: chance.happens(0.8).then_some(2.0), after: chance.time(200, 3000) },
         verify_fraction: chance.of(&[0.0, 0.0, 0.2, 1.0]),
         drain_time: chance.time(500, 5000),
-        // Nobody gives up: whatever is broken is mended some time.
+        // No process gives up, because every fault is repaired in time.
         grace: Duration::from_mins(30),
         wait_for_workers: Duration::from_mins(30),
         ..Policy::default()
     }
 }
 
-/// A coordinator, the first or a later one, to the end of the run.
+/// A coordinator, the first or a later one, until the run ends.
 pub(super) async fn coordinate(stage: Arc<Stage>, policy: Policy) {
     let process = stage.next_process(Place::Coordinator);
     stage.say(Place::Coordinator, "begins");
@@ -65,7 +65,7 @@ pub(super) async fn coordinate(stage: Arc<Stage>, policy: Policy) {
     stage.state().outcome = Some(outcome);
 }
 
-/// Notes what a coordinator tells, and what it must not do.
+/// Records the events of a coordinator and checks what must not happen.
 struct Watcher {
     stage: Arc<Stage>,
     process: u32,
@@ -97,7 +97,7 @@ impl Watcher {
         }
     }
 
-    /// Nothing is given out whose output an earlier coordinator has acknowledged.
+    /// A node whose output an earlier coordinator has acknowledged must not be assigned.
     fn given_out(&self, label: &str) {
         let acknowledged = self.stage.state().finished.get(label).copied();
         if acknowledged.is_some_and(|by| by != self.process) {
@@ -106,7 +106,7 @@ impl Watcher {
         }
     }
 
-    /// Nobody leaves to whom nothing was done, and nobody breaks the protocol.
+    /// A worker may leave only after a fault of its own, and must not break the protocol.
     fn left(&self, worker: WorkerId, departure: &Departure) {
         let process = self.members.get(&worker).copied().unwrap_or(0);
         self.stage.state().joined.remove(&process);
@@ -127,7 +127,7 @@ pub(super) async fn work(stage: Arc<Stage>, index: usize, threads: NonZeroUsize,
     stage.state().wishes.insert(place, wishes.clone());
     let options = WorkerOptions {
         threads,
-        // Small enough for blobs to be fetched again.
+        // Small enough that blobs are evicted and fetched again.
         cached_blob_bytes: 500_000,
         reconnect_for: Duration::from_mins(30),
         ..WorkerOptions::new(stage.folder.join("access.json"))

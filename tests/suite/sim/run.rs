@@ -20,31 +20,31 @@ use super::processes::{PORT, coordinate, policy, work};
 use super::stage::{Place, Stage};
 use super::web::{Web, registry};
 
-/// A run that goes on for longer hangs: nothing that is done to it lasts nearly as long.
+/// A longer run hangs: every fault is much shorter.
 const LONGEST_RUN: Duration = Duration::from_secs(300);
 
-/// How far apart the ends of a coordinator and of a worker that it has told may be, whatever the network does.
+/// The longest time between the end of a coordinator and that of a worker that it has told to end, with any network fault.
 const LAST_WORDS: Duration = Duration::from_secs(5);
 
-/// How a run came through.
+/// The outcome of a run.
 #[derive(Clone, Debug)]
 pub(super) struct Ending {
-    /// What was done to it, and how often.
+    /// The faults, and how often each happened.
     pub(super) faults: BTreeMap<&'static str, u32>,
     /// How long it took, in simulated time.
     pub(super) time: Duration,
-    /// What it cost its last coordinator.
+    /// The summary of its last coordinator.
     pub(super) summary: RunSummary,
     pub(super) nodes: usize,
     pub(super) coordinators: u32,
-    /// All that happened, and when.
+    /// All events, with their times.
     pub(super) trace: String,
 }
 
 /// Simulate the run of a seed.
 ///
 /// # Errors
-/// What went wrong, with the trace.
+/// When a check fails: its message, with the trace.
 pub(super) fn simulate(seed: u64) -> Result<Ending, String> {
     let folder = temporary_folder();
     let mut run = Run::new(seed, &folder);
@@ -52,32 +52,32 @@ pub(super) fn simulate(seed: u64) -> Result<Ending, String> {
     outcome.map_err(|wrong| format!("{wrong}\n\n{}\n{wrong}", run.stage.trace()))
 }
 
-/// In memory where that is possible: the disk's time is simulated as well.
+/// In memory where that is possible, because the time of disk accesses is simulated.
 fn temporary_folder() -> TempDir {
     let memory = Path::new("/dev/shm");
     let folder = if memory.is_dir() { tempfile::tempdir_in(memory) } else { tempfile::tempdir() };
     folder.expect("a temporary folder")
 }
 
-/// A run that goes on.
+/// A run in progress.
 pub(super) struct Run {
     pub(super) stage: Arc<Stage>,
     pub(super) sim: Sim<'static>,
     pub(super) chance: Chance,
     pub(super) workers: usize,
-    /// By time, then in the order in which they were planned.
+    /// Planned events by time, then in the order in which they were planned.
     pub(super) events: BTreeMap<(Duration, u64), Event>,
     pub(super) planned: u64,
     pub(super) faults_left: u64,
     /// The longest time between two faults, in milliseconds.
     pub(super) pause_ms: u64,
-    /// The workers whose links are not as they should be.
+    /// The workers whose links have a fault.
     pub(super) broken: BTreeMap<usize, Link>,
-    /// Where there is no process.
+    /// Places without a process.
     pub(super) absent: BTreeSet<Place>,
-    /// The workers that have ended though nobody had asked them, and when.
+    /// The workers that have ended without having been asked to, and when.
     pub(super) left_unasked: Vec<(usize, Duration)>,
-    /// When coordinators have ended.
+    /// When coordinators ended.
     pub(super) coordinators_ended: Vec<Duration>,
     pub(super) faults: BTreeMap<&'static str, u32>,
 }
@@ -160,7 +160,7 @@ impl Run {
         }
     }
 
-    /// What came of the run, against what comes of it in one process.
+    /// Compare the outcome of the run with that in one process.
     fn judge(&mut self) -> Result<Ending, String> {
         let outcome = self.stage.state().outcome.take().ok_or("no outcome")?;
         let (results, summary) = outcome.map_err(|error| format!("the run has failed: {error}"))?;
@@ -184,7 +184,8 @@ impl Run {
         Ok(Ending { faults: self.faults.clone(), time, summary, nodes: results.len(), coordinators, trace })
     }
 
-    /// Workers end when the run is over, and not before; the coordinator may be killed when it has just told them. One to which something was done may not have heard that it is.
+    /// Check that workers end with the run and not before. A coordinator may be killed just after it has told them to end. A worker that
+    /// had a fault may not have received the message.
     fn end_workers(&mut self) -> Result<(), String> {
         let over = self.sim.elapsed();
         self.coordinators_ended.push(over);

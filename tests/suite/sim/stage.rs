@@ -1,4 +1,4 @@
-//! What the processes of a simulated run and whoever torments them share.
+//! State shared by the processes of a simulated run and the code that causes faults.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::net::{IpAddr, SocketAddr};
@@ -37,10 +37,10 @@ impl Place {
     }
 }
 
-/// How a run ended: what came of each node, and what it has cost.
+/// The result of a run: the outcome of each node, and the summary.
 pub(super) type Outcome = Result<(BTreeMap<String, String>, RunSummary), String>;
 
-/// What everybody shares.
+/// State shared by all processes of a run.
 #[derive(Debug)]
 pub(super) struct Stage {
     pub(super) seed: u64,
@@ -52,27 +52,27 @@ pub(super) struct Stage {
 
 #[derive(Debug, Default)]
 pub(super) struct State {
-    /// Who, what, when.
+    /// Lines with time, place and event.
     trace: Vec<String>,
-    /// What must never happen and has.
+    /// Violations of what must hold.
     pub(super) wrong: Vec<String>,
-    /// The ends of connections: those of the link to this worker, and at which end.
+    /// Each end of each connection: the worker of its link, and the place of the end.
     wires: Vec<(Place, Place, Weak<Fate>)>,
-    /// Where a process is about to die of the node that it runs.
+    /// Places whose process is about to be killed by the node that it executes.
     pub(super) doomed: BTreeSet<Place>,
     pub(super) stuck: BTreeSet<Place>,
     pub(super) slow: BTreeMap<Place, u32>,
-    /// How to ask the worker in a place to end.
+    /// The means to ask the worker in a place to end.
     pub(super) wishes: BTreeMap<Place, Wishes>,
     /// The workers that have ended by themselves, and whether they were asked to.
     pub(super) ended: Vec<(usize, bool)>,
-    /// How many processes there were in a place.
+    /// How many processes each place has had.
     pub(super) processes: BTreeMap<Place, u32>,
-    /// The processes that something was done to.
+    /// The processes that had a fault.
     pub(super) harmed: BTreeSet<u32>,
-    /// The processes of the workers that the present coordinator has.
+    /// The processes of the workers that have joined the present coordinator.
     pub(super) joined: BTreeSet<u32>,
-    /// The nodes whose outputs were told of, and by which coordinator.
+    /// The nodes whose outputs were reported, and by which coordinator.
     pub(super) finished: BTreeMap<String, u32>,
     pub(super) outcome: Option<Outcome>,
 }
@@ -86,17 +86,17 @@ impl Stage {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Write something into the trace, said in a process.
+    /// Add a line to the trace, with the current time.
     pub(super) fn say(&self, place: Place, what: &str) {
         self.note(turmoil::sim_elapsed().unwrap_or_default(), place, what);
     }
 
-    /// Write something into the trace.
+    /// Add a line to the trace.
     pub(super) fn note(&self, at: Duration, place: Place, what: &str) {
         self.state().trace.push(format!("{:9.3} {:<11} {what}", at.as_secs_f64(), place.host()));
     }
 
-    /// Something has happened that must never happen.
+    /// Record a violation of what must hold.
     pub(super) fn wrong(&self, what: String) {
         self.state().wrong.push(what);
     }
@@ -119,21 +119,21 @@ impl Stage {
         number(place, self.state().processes.get(&place).copied().unwrap_or(0))
     }
 
-    /// A connection was made on the link to a worker.
+    /// Record a new connection on the link to a worker.
     pub(super) fn laid(&self, link: Place, end: Place, fate: Weak<Fate>) {
         let mut state = self.state();
         state.wires.retain(|(.., fate)| fate.strong_count() > 0);
         state.wires.push((link, end, fate));
     }
 
-    /// The ends of the connections that there are on the link to a worker.
+    /// The ends of the open connections on the link to a worker.
     pub(super) fn wires(&self, link: Place) -> Vec<(Place, Weak<Fate>)> {
         let state = self.state();
         let on_link = state.wires.iter().filter(|(other, ..)| *other == link);
         on_link.map(|(_, end, fate)| (*end, Weak::clone(fate))).collect()
     }
 
-    /// The process in a place dies of its node: nothing leaves it any more.
+    /// The process in a place is about to be killed by its node: it sends nothing from now on.
     pub(super) fn doom(&self, place: Place) {
         self.say(place, "runs a deadly node");
         let ends = self.wires(place).into_iter().filter(|(end, _)| *end == place);

@@ -1,4 +1,4 @@
-//! How faults are chosen, done and mended.
+//! How faults are chosen, caused and repaired.
 
 use std::time::Duration;
 
@@ -6,11 +6,11 @@ use super::events::{Event, Fault, Link};
 use super::run::Run;
 use super::stage::Place;
 
-/// How many coordinators are killed at most.
+/// The most coordinators that are killed.
 const MOST_COORDINATORS: u32 = 4;
 
 impl Run {
-    /// Let the next fault happen some time.
+    /// Plan the next fault, at a random time.
     pub(super) fn plan_fault(&mut self) {
         if self.faults_left > 0 {
             self.faults_left -= 1;
@@ -19,7 +19,7 @@ impl Run {
         }
     }
 
-    /// Do something after a while.
+    /// Plan an event after this time.
     fn plan(&mut self, after: Duration, event: Event) {
         self.planned += 1;
         self.events.insert((self.sim.elapsed() + after, self.planned), event);
@@ -49,7 +49,7 @@ impl Run {
         }
     }
 
-    /// Do harm to a worker, or to the coordinator. Whether that was possible.
+    /// Cause a fault of a worker or of the coordinator. Returns whether that was possible.
     fn hurt(&mut self, fault: Fault, index: usize) -> bool {
         let time = fault.time(&mut self.chance);
         let is_coordinator = matches!(fault, Fault::KillCoordinator | Fault::KillAll);
@@ -97,13 +97,13 @@ impl Run {
         true
     }
 
-    /// From now on the process in a place may leave without being asked.
+    /// Record that the process in a place may now leave without being asked.
     fn harm(&mut self, place: Place) {
         let process = self.stage.process(place);
         self.stage.state().harmed.insert(process);
     }
 
-    /// Kill the coordinator and about half of the workers, which come back later than it, most of them one after the other.
+    /// Kill the coordinator and about half of the workers, which return after it, most of them one after the other.
     fn kill_all(&mut self, time: Duration) {
         self.kill(Place::Coordinator, time);
         for index in 0..self.workers {
@@ -125,8 +125,8 @@ impl Run {
         self.plan(time, Event::Start(place));
     }
 
-    /// End a process. In which order its connections end depends on how many tasks there ever were in the test's process, so none
-    /// of their last words may draw a latency of its own: they all arrive at once, or, where a link is cut in one direction, never.
+    /// End a process. The order in which its connections end depends on how many tasks the test's process ever had, so the last packets
+    /// must not draw latencies of their own: all arrive at once, or, where a link is cut in one direction, never.
     fn crash(&mut self, place: Place) {
         let links = match place {
             Place::Coordinator => 0..self.workers,
@@ -153,7 +153,7 @@ impl Run {
         }
     }
 
-    /// There is no process in a place any more.
+    /// Record that a place has no process.
     fn gone(&mut self, place: Place) {
         self.absent.insert(place);
         let mut state = self.stage.state();
@@ -171,7 +171,7 @@ impl Run {
             Link::CutUp => self.sim.partition_oneway(far, near),
             Link::Slow => self.sim.set_link_latency(near, far, self.chance.time(100, 400)),
         }
-        // Or nobody says anything, and each end has to notice the silence.
+        // Otherwise the connections are not reset, and each end has to notice the silence.
         if matches!(link, Link::Cut | Link::CutDown | Link::CutUp) && self.chance.happens(0.5) {
             self.reset_ends(index, time + Duration::from_secs(2));
         }
@@ -193,13 +193,13 @@ impl Run {
             }
             Link::Slow => self.sim.set_link_latency(near, far, self.chance.time(1, 100)),
         }
-        // There may be another process by now.
+        // The place may have another process by now.
         if link != Link::Slow {
             self.harm(place);
         }
     }
 
-    /// Let both ends of every connection of a worker fail, each at its own time.
+    /// Reset both ends of every connection of a worker, each at its own time.
     fn reset_ends(&mut self, index: usize, within: Duration) {
         let most = u64::try_from(within.as_millis()).unwrap_or(0);
         for (_, fate) in self.stage.wires(Place::Worker(index)) {
@@ -208,7 +208,7 @@ impl Run {
         }
     }
 
-    /// See to the processes that have come to their end.
+    /// Handle the processes that have ended.
     pub(super) fn mark_dead(&mut self) {
         let mut state = self.stage.state();
         let (doomed, ended) = (std::mem::take(&mut state.doomed), std::mem::take(&mut state.ended));

@@ -1,5 +1,5 @@
-//! The graph of a simulated run: a random web of small nodes that grows as their outputs come. What it becomes is a function of
-//! the seed alone, in whatever order they come.
+//! The graph of a simulated run: a random web of small nodes that grows as outputs arrive. Its final form depends only on the seed, not
+//! on the order of outputs.
 
 use std::collections::BTreeMap;
 
@@ -20,17 +20,17 @@ pub(super) fn registry() -> Registry {
     Registry::default().with(Mix).with(Fail).with(Panic).with(Deadly)
 }
 
-/// The label of the node that may or may not run: another one's end cancels it.
+/// The label of a node that may or may not run, because the end of another node cancels it.
 const FRINGE: &str = "fringe";
 
-/// Plans the web, and remembers what came of each node, by its label.
+/// Plans the web and keeps the outcome of each node, by its label.
 #[derive(Debug)]
 pub(super) struct Web {
     seed: u64,
     roots: Vec<NodeId>,
     blobs: Vec<BlobHash>,
     fringe: Option<NodeId>,
-    /// The hash of the output, or why there is none.
+    /// The hash of the output, or the reason why there is none.
     pub(super) results: BTreeMap<String, String>,
 }
 
@@ -94,7 +94,7 @@ impl Planner for Web {
         if self.roots.first() == Some(&node) {
             self.fringe.take().into_iter().for_each(|fringe| graph.release(fringe));
         }
-        // What grows here depends on the output, not on who else is done.
+        // What is added here depends on the output, not on which other nodes are done.
         let [first, second, ..] = output.hash().0;
         if label.matches('.').count() < DEPTH {
             for child in 0..first % 3 {
@@ -117,7 +117,7 @@ impl Planner for Web {
         let (kind, label) = graph.spec(node).map(|spec| (spec.kind.clone(), spec.label.clone())).unwrap_or_default();
         let why = match reason {
             FailureReason::Crashed { .. } if kind == "deadly" => "deadly".into(),
-            // Which of several is named depends on which failed first.
+            // If several inputs fail, the one that is named depends on which failed first.
             FailureReason::InputFailed { .. } => "without an input".into(),
             reason => reason.to_string(),
         };
@@ -138,7 +138,7 @@ fn hex(hash: &BlobHash) -> String {
     hash.0.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
-/// As many bytes as the parameters begin with, made from all of them and the inputs.
+/// As many bytes as the number at the start of the parameters, made from all parameters and inputs.
 struct Mix;
 
 impl NodeType for Mix {
@@ -176,12 +176,12 @@ impl NodeType for Panic {
     }
 
     fn run(&self, _: &[u8], _: &[Blob], _: &RunContext) -> Result<Vec<u8>, NodeFailure> {
-        // As a panic does, but without a word on stderr: there are many of them.
+        // A panic without a message on stderr, because there are many.
         std::panic::resume_unwind(Box::new("asked to panic"))
     }
 }
 
-/// Ends the process that it runs in. In a test's own process it only says so.
+/// Ends the process that executes it. In the test's own process it only returns an error.
 struct Deadly;
 
 impl NodeType for Deadly {

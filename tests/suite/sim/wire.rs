@@ -1,5 +1,5 @@
-//! Connections that can be reset: turmoil does not send again what a partition has swallowed, so a stream that was there has to
-//! end, as TCP ends one that gets no answer. Each end notices at its own time.
+//! Connections that can be reset. turmoil does not resend what a partition has dropped, so existing streams must end, as TCP ends a
+//! stream without an answer. Each end notices at its own time.
 
 use std::io;
 use std::pin::Pin;
@@ -23,9 +23,9 @@ pub(super) struct Fate(Mutex<State>);
 #[derive(Debug, Default)]
 struct State {
     is_reset: bool,
-    /// The process is about to die: nothing leaves it any more.
+    /// The process is about to be killed: writing waits.
     is_mute: bool,
-    /// Those of reading and of writing.
+    /// The wakers of reading and of writing.
     wakers: [Option<Waker>; 2],
 }
 
@@ -58,7 +58,7 @@ impl Fate {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// An error if the end was reset; else remember whom to wake. `None` if it may not go on.
+    /// An error if the end was reset; `None`, after storing the waker, if it has to wait.
     fn check(&self, way: usize, context: &Context<'_>) -> io::Result<Option<()>> {
         let mut state = self.state();
         if state.is_reset {

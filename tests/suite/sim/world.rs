@@ -1,4 +1,4 @@
-//! The world of a simulated process: turmoil's network, a heart and threads that are tasks, chance from a seed.
+//! The world of a simulated process: turmoil's network, heartbeat and threads as tasks, random numbers from a seed.
 
 use std::cell::RefCell;
 use std::future::Future;
@@ -20,11 +20,11 @@ use super::stage::{Place, Stage};
 use super::wire::Wire;
 
 thread_local! {
-    /// Whose node runs at the moment.
+    /// The world of the process whose node executes at the moment.
     static RUNNING: RefCell<Option<SimWorld>> = const { RefCell::new(None) };
 }
 
-/// The process in which the node runs that asks this is about to die.
+/// Mark the process that executes the calling node as about to be killed.
 pub(super) fn doom_this_host() {
     RUNNING.with_borrow(|world| world.iter().for_each(|world| world.0.stage.doom(world.0.place)));
 }
@@ -45,7 +45,7 @@ struct Process {
 }
 
 impl SimWorld {
-    /// The world of a process in this place. No two processes of a run have one number.
+    /// The world of a process in this place. Process ids are unique in a run.
     pub(super) fn new(stage: Arc<Stage>, place: Place, number: u32) -> Self {
         let mut chance = Chance::new(stage.seed, u64::from(number) + (1 << 32));
         let node_ms = stage.node_ms;
@@ -128,7 +128,7 @@ pub(super) struct Port {
     stage: Arc<Stage>,
 }
 
-/// Jobs as tasks: each takes its time, then it is run at once.
+/// Jobs as tasks: each waits for its simulated duration and is then run at once.
 #[derive(Debug)]
 pub(super) struct Threads {
     world: SimWorld,

@@ -1,5 +1,4 @@
-//! Studies end to end, on materials and light that need no file: what they leave, that they go on where they were, and that the small
-//! preset gives what it gave.
+//! Studies end to end, on materials and light from formulas: their files, resuming, and the stored results of the small preset.
 
 mod preset;
 mod refusals;

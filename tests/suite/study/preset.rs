@@ -1,14 +1,15 @@
-//! The small preset gives the results that are written down in `preset.json`, whatever happened on the way.
+//! The small preset gives the results stored in `preset.json`, also after interruptions.
 
 use super::scene::{folder, preset, results, study};
 use serde_json::Value;
 use std::{collections::BTreeSet, fs};
 
-/// What the preset gave. `LOOKALIKE_BLESS=1` with `--features slow` writes it anew: look at the difference, and say in CHANGELOG.md why results changed.
+/// Stored results of the preset. `LOOKALIKE_BLESS=1` with `--features slow` writes the file again: review the difference, and state in
+/// CHANGELOG.md why results changed.
 const EXPECTED: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/suite/study/preset.json");
 
 #[test]
-fn the_small_preset_gives_what_it_gave_and_a_finished_study_only_writes_its_report_again() {
+fn small_preset_gives_stored_results_and_finished_study_only_rewrites_its_report() {
     let folder = folder(&preset());
     let answer = study(folder.path(), "--workers 2").done();
     assert!(answer.stdout.trim_end().ends_with("report.html"), "{}", answer.stdout);
@@ -25,7 +26,7 @@ fn the_small_preset_gives_what_it_gave_and_a_finished_study_only_writes_its_repo
     for (found, expected) in found.iter().zip(&expected) {
         assert_eq!(found, expected, "the small preset gives another result: see LOOKALIKE_BLESS in this file");
     }
-    // The methods that the table of results is to have.
+    // The methods that must be in the table of results.
     let methods: BTreeSet<&str> = found.iter().filter_map(|row| row["method"].as_str()).collect();
     let all = ["ours", "ours+polish", "paper", "l2", "brute", "lowres", "log", "cuberoot"];
     assert_eq!(methods, all.into_iter().collect());
@@ -37,7 +38,7 @@ fn the_small_preset_gives_what_it_gave_and_a_finished_study_only_writes_its_repo
     assert!(score("ours+polish") <= score("brute") + 0.002, "{found:?}");
 
     let report = |name: &str| fs::read(folder.path().join("out").join(name)).unwrap();
-    // Of nodes alone: a line begins every process.
+    // Only lines of nodes: each process starts with a line `#`.
     let seconds = || String::from_utf8(report("seconds.tsv")).unwrap().lines().filter(|line| *line != "#").count();
     let before = (report("results.json"), seconds());
     for name in ["results.md", "report.html", "data.json"] {
@@ -47,7 +48,7 @@ fn the_small_preset_gives_what_it_gave_and_a_finished_study_only_writes_its_repo
     assert!(report("results.json") == before.0 && seconds() == before.1, "nothing is computed again");
     assert!(!report("results.md").is_empty() && !report("report.html").is_empty());
 
-    // A cell that is lost is computed again, and nothing else.
+    // A missing cell is computed again, and nothing else.
     let lost = folder.path().join("out/cells/paint-room-32-lowres16.json");
     let record = fs::read(&lost).unwrap();
     fs::remove_file(&lost).unwrap();

@@ -1,4 +1,4 @@
-//! Studies that cannot be: each mistake is named, with its file, and the exit code is 2.
+//! Invalid studies: each mistake is named, with its file, and the exit code is 2.
 
 use super::scene::{folder, study};
 use std::fs;
@@ -21,7 +21,7 @@ fn mistakes_are_named_with_their_file() {
 }
 
 #[test]
-fn a_study_of_other_settings_is_not_gone_on_with() {
+fn study_with_other_settings_is_not_resumed() {
     let study_file = "materials = ['paint.binary']\nprobes = ['room.exr']\nexperiments = []\n";
     let folder = folder(study_file);
     study(folder.path(), "--workers 1").done();

@@ -33,7 +33,7 @@ pub(crate) fn study(folder: &Path, more: &str) -> Answer {
     lookalike(folder, &format!("study STUDY.toml --out out --progress none {more}"))
 }
 
-/// The rows of `results.json`, without what differs from run to run.
+/// The rows of `results.json`, without fields that differ from run to run.
 pub(crate) fn results(folder: &Path) -> Vec<Value> {
     let text = fs::read_to_string(folder.join("out/results.json")).unwrap();
     let mut rows: Vec<Value> = serde_json::from_str(&text).unwrap();

@@ -43,7 +43,7 @@ impl<'a> Crate<'a> {
         Self { files, re_exports }
     }
 
-    /// The module that defines what a path names, through at most so many re-exports.
+    /// The module that defines the item of a path, through at most this many re-exports.
     fn definer(&self, path: &[String], hops: usize) -> Module {
         let length = (0..=path.len()).rev().find(|length| self.files.contains_key(&path[..*length])).unwrap_or(0);
         let (module, rest) = path.split_at(length);
@@ -55,7 +55,7 @@ impl<'a> Crate<'a> {
         }
     }
 
-    /// For each module those that define what it names.
+    /// For each module, the modules that define the items it names.
     fn imports(&self) -> BTreeMap<Module, BTreeSet<Module>> {
         let of = |(module, code): (&Module, &&str)| {
             let mut code = (*code).to_owned();
@@ -80,7 +80,7 @@ fn re_exports(code: &str) -> Vec<String> {
     uses.filter_map(|(place, word)| code[place + word.len()..].split(';').next()).map(str::to_owned).collect()
 }
 
-/// A path from the root of the crate; none for one that leaves it.
+/// A path from the root of the crate; `None` if it leaves the crate.
 fn absolute(module: &[String], path: &str) -> Option<Module> {
     let mut names: Vec<&str> = path.split("::").collect();
     let mut base = match names[0] {

@@ -1,4 +1,4 @@
-//! Words that other programs rely on are those of their pages, and the other way round.
+//! Names that other programs rely on are documented on their pages, and the pages list no others.
 
 use super::{
     documents::{between, document},
@@ -11,7 +11,7 @@ fn source(path: &str) -> String {
     fs::read_to_string(root().join(path)).unwrap_or_else(|error| panic!("{path}: {error}"))
 }
 
-/// What one side has and the other one lacks.
+/// The names that only one side has.
 fn differences<'a>(there: &BTreeSet<&'a str>, here: &BTreeSet<&'a str>, page: &str, code: &str) -> Vec<String> {
     let only = |one: &BTreeSet<&'a str>, other: &BTreeSet<&'a str>, text: &str| {
         one.difference(other).map(|word| format!("{word} is {text}")).collect::<Vec<_>>()
@@ -22,7 +22,7 @@ fn differences<'a>(there: &BTreeSet<&'a str>, here: &BTreeSet<&'a str>, page: &s
 }
 
 #[test]
-fn events_of_the_stream_are_those_of_their_page() {
+fn events_of_the_stream_match_their_page() {
     let (page, code) = ("docs/progress.md", "app/src/progress/json.rs");
     let (text, program) = (document(page), source(code));
     let table = text.lines().skip_while(|line| !line.starts_with("| event |")).skip(2);
@@ -35,7 +35,7 @@ fn events_of_the_stream_are_those_of_their_page() {
 }
 
 #[test]
-fn metrics_are_those_of_their_page() {
+fn metrics_match_their_page() {
     let (page, code) = ("docs/batch.md", "coordinator/src/metrics/text.rs");
     let (text, program) = (document(page), source(code));
     let told = text.split('`').filter(|word| word.starts_with("lookalike_"));

@@ -1,4 +1,4 @@
-//! Documents say what is there: links and paths resolve, commands and flags exist, keys are in the bibliography.
+//! Documents agree with the sources: links and paths resolve, commands and flags exist, keys are in the bibliography.
 
 use super::{
     none,
@@ -50,7 +50,7 @@ pub(super) fn document(name: &str) -> String {
     parts.fold(before.to_owned(), |shown, part| shown + part.split_once("-->").map_or("", |(_, after)| after))
 }
 
-/// What stands between `open` and `close`, each time.
+/// Every text between `open` and `close`.
 pub(super) fn between<'a>(text: &'a str, open: &str, close: &str) -> Vec<&'a str> {
     text.split(open).skip(1).filter_map(|rest| Some(rest.split_once(close)?.0)).collect()
 }
@@ -144,7 +144,7 @@ fn commands_and_flags_in_documents_exist() {
         offences.extend(flags(&text).difference(&known).map(|flag| format!("{name}: no command has {flag}")));
         let joined = text.replace("\\\n", " ");
         for line in joined.lines().filter(|line| line.starts_with("lookalike ")) {
-            // What follows a lone -- is for another program.
+            // What follows a lone `--` are arguments of another program.
             let line = line.split(" -- ").next().unwrap_or_default();
             let command = line.split_whitespace().nth(1).unwrap_or_default();
             match helps.iter().find(|(known, _)| known.split(' ').next() == Some(command)) {
@@ -161,7 +161,7 @@ fn commands_and_flags_in_documents_exist() {
 }
 
 #[test]
-fn the_readme_names_the_two_commands() {
+fn readme_names_the_two_commands() {
     let text = document("README.md");
     let lines: Vec<&str> = blocks(&text).0.into_iter().flat_map(str::lines).collect();
     for command in ["cargo run --release --bin lookalike -- demo", "cargo test"] {
@@ -204,7 +204,7 @@ fn section_numbers(text: &str) -> Vec<String> {
     let mut numbers = Vec::new();
     for word in words.take_while(is_number) {
         numbers.push(number(word));
-        // A list goes on after a comma or an "and"; a number after anything else is another sentence's.
+        // A list continues after a comma or an "and"; a number after any other word belongs to another sentence.
         let goes_on = word.ends_with(',') || list.split_once(word).is_some_and(|(_, rest)| rest.starts_with(" and "));
         if !goes_on {
             break;
@@ -228,7 +228,7 @@ fn keys_cited_in_the_sources_are_in_the_bibliography() {
     }
     let texts = sources().into_iter().map(|source| (source.path.clone(), source.text));
     for (path, text) in texts.chain(DOCUMENTS.map(|name| (name.to_owned(), document(name)))) {
-        // [BP20b]: capital initials, two digits of the year, perhaps a letter.
+        // A key such as [BP20b]: capital initials, two digits of the year, optionally a letter.
         let plain = text.replace("\\[", "[").replace("\\]", "]");
         let cited =
             between(&plain, "[", "]").into_iter().filter(|key| is_key(key)).map(str::to_owned).collect::<Vec<_>>();

@@ -1,4 +1,4 @@
-//! What every file of Rust looks like, tests included.
+//! The form of every Rust file, tests included.
 
 use super::{
     at, none,
@@ -10,7 +10,7 @@ use super::{
 const LONGEST_FILE: usize = 600;
 
 #[test]
-fn files_are_short_and_named_after_concepts() {
+fn files_are_short_and_have_no_generic_names() {
     let mut offences = Vec::new();
     for source in sources() {
         let lines = source.text.lines().count();
@@ -26,7 +26,7 @@ fn files_are_short_and_named_after_concepts() {
 }
 
 #[test]
-fn nothing_is_left_for_later_in_the_sources() {
+fn sources_have_no_unfinished_work_ignored_tests_or_bare_allows() {
     let marks = [concat!("TO", "DO"), concat!("FIX", "ME"), concat!("XX", "X")];
     let mut offences = Vec::new();
     for source in sources() {

@@ -1,4 +1,4 @@
-//! A reflectance model is one file, which is also its manual page, and one line in the registry.
+//! A reflectance model is one file, whose head comment is its manual page, and one line in the registry.
 
 use super::{
     common,
@@ -19,7 +19,7 @@ const NAME_MODELS: [(&str, &str); 4] = [
 ];
 
 #[test]
-fn the_head_of_a_models_file_is_its_manual_page() {
+fn head_comment_of_a_models_file_is_its_manual_page() {
     let files: Vec<Source> = common().filter(|source| is_of_a_model(&source.code)).collect();
     let mut offences = Vec::new();
     let mut described = BTreeSet::new();
@@ -43,7 +43,7 @@ fn the_head_of_a_models_file_is_its_manual_page() {
 }
 
 #[test]
-fn a_model_is_named_in_its_file_and_in_the_registry_only() {
+fn model_is_named_only_in_its_file_and_the_registry() {
     // A model that has a folder may name itself in all of it.
     let own = common().filter(|source| is_of_a_model(&source.code));
     let own: Vec<String> =
@@ -92,7 +92,8 @@ fn type_of(model: &dyn Model) -> String {
     format!("{model:?}")
 }
 
-/// Models named by their types in the code or by their names in literals, with the lines. Doc comments of arguments are the help.
+/// Models named by their types in code or by their names in literals, with the lines. Doc comments of arguments count, because they
+/// become the help.
 fn names_of_models(source: &Source) -> Vec<(usize, String)> {
     let types: Vec<String> = MODELS.iter().map(|model| type_of(*model)).collect();
     let by_type = words(&source.code).filter(|(word, _)| types.contains(&word.name));

@@ -96,7 +96,7 @@ pub(super) fn calls(code: &str) -> Vec<Found> {
     found
 }
 
-/// The chain of method names, not of those inside arguments, from a place to the end of its expression.
+/// The chain of method names from a place to the end of its expression, without those inside arguments.
 pub(super) fn chain(code: &str, place: usize) -> Vec<&str> {
     let (mut depth, mut names) = (0, Vec::new());
     for (i, byte) in code.bytes().enumerate().skip(place) {

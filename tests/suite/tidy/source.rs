@@ -1,4 +1,4 @@
-//! The sources as the rules see them: text without comments, string contents and test items.
+//! Sources as the rules read them: text without comments, contents of strings and test items.
 
 use super::paths::Found;
 use std::{
@@ -24,7 +24,7 @@ impl Source {
         text[..place].matches('\n').count() + 1
     }
 
-    /// The first folder or file below `common/src`; none elsewhere and for `lib.rs` itself.
+    /// The first folder or file below `common/src`; `None` elsewhere and for `lib.rs` itself.
     pub(super) fn module_of_common(&self) -> Option<&str> {
         let inside = self.path.strip_prefix("common/src/")?;
         let first = inside.split('/').next()?;
@@ -56,7 +56,7 @@ pub(super) fn sources() -> Vec<Source> {
     sources
 }
 
-/// Adds the Rust files below a folder, sorted, as paths relative to the root. Build output and hidden folders are not ours.
+/// Adds the Rust files below a folder, sorted, as paths relative to the root. Build output and hidden folders are skipped.
 fn collect(root: &Path, folder: &str, paths: &mut Vec<String>) {
     let entries = fs::read_dir(root.join(folder)).unwrap_or_else(|error| panic!("{folder}: {error}"));
     let mut names: Vec<_> = entries
@@ -114,7 +114,7 @@ pub(super) fn without_comments_and_strings(text: &str) -> String {
     String::from_utf8(code).expect("whole literals and comments are blanked")
 }
 
-/// The part to blank of the comment or literal that starts here, and where to go on.
+/// The range to blank of the comment or literal that starts here, and where scanning continues.
 fn opaque(bytes: &[u8], i: usize) -> Option<(usize, usize)> {
     let rest = &bytes[i..];
     if rest.starts_with(b"//") {

@@ -1,4 +1,4 @@
-//! A throw-away Slurm cluster in the processes of this machine: its own configuration, keys and ports, nothing of the system's.
+//! A temporary Slurm cluster of processes on this machine, with its own configuration, keys and ports, separate from the system's.
 
 use lookalike_tests::process::Process;
 use std::{
@@ -12,7 +12,7 @@ use std::{
 };
 use tempfile::TempDir;
 
-/// CPUs that each node claims to have.
+/// CPUs that each node reports.
 pub(super) const CPUS: usize = 2;
 
 /// A cluster whose nodes are called `node1`, `node2` and so on.
@@ -24,7 +24,7 @@ pub(super) struct Cluster {
 }
 
 impl Cluster {
-    /// So many nodes; none where Slurm is not installed, and then it says so.
+    /// A cluster with this many nodes; `None`, with a message, where Slurm is not installed.
     pub(super) fn start(nodes: usize) -> Option<Self> {
         for program in ["munged", "slurmctld", "slurmd", "srun"] {
             if Command::new(program).arg("--version").output().is_err() {
@@ -46,14 +46,14 @@ impl Cluster {
         Some(cluster)
     }
 
-    /// A program that knows this cluster as its own.
+    /// A command that uses this cluster.
     pub(super) fn command(&self, program: &str) -> Command {
         let mut command = Command::new(program);
         command.env("SLURM_CONF", self.configuration()).stdin(Stdio::null());
         command
     }
 
-    /// Submits `deploy/slurm/lookalike.sbatch` and follows the job's messages.
+    /// Submits `deploy/slurm/lookalike.sbatch` and follows the output of the job.
     pub(super) fn submit(&self, folder: &Path, options: &[&str], line: &str) -> Job {
         let log = self.folder.path().join("job-%j.out");
         let mut command = self.command("sbatch");
@@ -65,7 +65,7 @@ impl Cluster {
         Job::follow(number.clone(), &self.folder.path().join(format!("job-{number}.out")))
     }
 
-    /// Lets the program submit itself, and follows the job's messages in its folder of results.
+    /// Submits with the program itself and follows the job's output in its folder of results.
     pub(super) fn submit_with_the_program(&self, folder: &Path, line: &str, out: &str) -> Job {
         let mut command = self.command(env!("CARGO_BIN_EXE_lookalike-under-test"));
         command.args(line.split_whitespace()).current_dir(folder);
@@ -74,25 +74,25 @@ impl Cluster {
         Job::follow(number.clone(), &folder.join(out).join(format!("slurm-{number}.out")))
     }
 
-    /// Kills a node with all that runs on it, as a power cut would.
+    /// Kills a node and all its processes, as a power failure would.
     pub(super) fn cut(&mut self, node: &str) {
         let index = node.strip_prefix("node").and_then(|number| number.parse::<usize>().ok()).unwrap() - 1;
         end(self.nodes[index].take().expect("a node that lives"));
         let there = self.processes(|environment| environment.contains(&format!("SLURMD_NODENAME={node}")));
-        // As if all at once: whoever lives on for a moment can tell others. Children first, as every srun has one that cancels the
-        // step when srun dies, and as a group whose parent dies goes on.
+        // All are stopped first, because a process that lives longer could report the deaths of others. Children are killed before their
+        // parents: each srun has a child that cancels the step when srun dies, and an orphaned group of stopped processes is continued.
         there.iter().for_each(|process| send("STOP", *process));
         there.into_iter().rev().for_each(kill);
     }
 
-    /// Starts a node that was cut again.
+    /// Starts a killed node again.
     pub(super) fn start_node(&mut self, index: usize) {
         let name = format!("node{}", index + 1);
         fs::create_dir_all(self.folder.path().join("spool").join(&name)).unwrap();
         self.nodes[index] = Some(self.daemon("slurmd", &["-D", "-N", &name]));
     }
 
-    /// What the controller writes down, as it comes.
+    /// The lines of the controller's log, as they are written.
     pub(super) fn controller_log(&self) -> Lines {
         Lines::follow(&self.folder.path().join("slurmctld.log"))
     }
@@ -107,13 +107,13 @@ impl Cluster {
         command.args(arguments).stdout(Stdio::null()).stderr(log).spawn().unwrap()
     }
 
-    /// The processes of this cluster's jobs whose environment is as wanted, and the keepers of their steps.
+    /// The processes of this cluster's jobs whose environment passes `wanted`, and the step daemons that Slurm runs for them.
     fn processes(&self, wanted: impl Fn(&BTreeSet<String>) -> bool) -> BTreeSet<u32> {
         let ours = format!("SLURM_CONF={}", self.configuration().display());
         let mut found = BTreeSet::new();
         for entry in fs::read_dir("/proc").unwrap().flatten() {
             let Some(process) = entry.file_name().to_str().and_then(|name| name.parse::<u32>().ok()) else { continue };
-            // Gone, or not ours to look at.
+            // The process has ended or belongs to another user.
             let Ok(bytes) = fs::read(entry.path().join("environ")) else { continue };
             let variables = bytes.split(|byte| *byte == 0).map(|bytes| String::from_utf8_lossy(bytes).into_owned());
             let environment: BTreeSet<String> = variables.collect();
@@ -131,7 +131,7 @@ impl Cluster {
 
 impl Drop for Cluster {
     fn drop(&mut self) {
-        // Daemons first: they would report what they miss.
+        // Daemons first, because they would report missing processes.
         for node in self.nodes.iter_mut().filter_map(Option::take) {
             end(node);
         }
@@ -146,7 +146,7 @@ impl Drop for Cluster {
     }
 }
 
-/// A job, and its messages as they come.
+/// A job and the lines of its output.
 pub(super) struct Job {
     pub(super) number: String,
     pub(super) log: Lines,
@@ -158,7 +158,7 @@ impl Job {
     }
 }
 
-/// The lines of a file that grows, and that may not be there yet.
+/// The lines of a growing file, which may not exist yet.
 pub(super) struct Lines {
     follower: Child,
     lines: BufReader<ChildStdout>,
@@ -167,7 +167,7 @@ pub(super) struct Lines {
 
 impl Lines {
     fn follow(path: &Path) -> Self {
-        // Whatever goes wrong, no test hangs for good.
+        // The time limit keeps a test from hanging for ever.
         let mut command = Command::new("timeout");
         command.args(["400", "tail", "-n", "+1", "-F"]).arg(path).stdout(Stdio::piped()).stderr(Stdio::null());
         let mut follower = command.stdin(Stdio::null()).spawn().expect("timeout and tail of the system");
@@ -175,7 +175,7 @@ impl Lines {
         Self { follower, lines, seen: Vec::new() }
     }
 
-    /// Waits for a line that holds all of these.
+    /// Waits for a line that contains all of these.
     #[track_caller]
     pub(super) fn wait_for(&mut self, words: &[&str]) -> String {
         loop {
@@ -189,7 +189,7 @@ impl Lines {
         }
     }
 
-    /// The lines so far that hold these words.
+    /// How many lines so far contain these words.
     pub(super) fn count(&self, words: &str) -> usize {
         self.seen.iter().filter(|line| line.contains(words)).count()
     }
@@ -197,13 +197,13 @@ impl Lines {
 
 impl Drop for Lines {
     fn drop(&mut self) {
-        // Its tail ends with it: `timeout` hands SIGTERM on.
+        // `timeout` passes SIGTERM on to its `tail`.
         let _ = Command::new("kill").arg(self.follower.id().to_string()).status();
         let _ = self.follower.wait();
     }
 }
 
-/// The number of the job that this submits.
+/// The job number printed by this submission.
 fn number(mut command: Command) -> String {
     let output = Process::start(&mut command).output();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
@@ -216,7 +216,7 @@ fn start_munged(folder: &Path) -> Child {
     fs::write(&key, bytes).unwrap();
     fs::set_permissions(&key, std::os::unix::fs::PermissionsExt::from_mode(0o400)).unwrap();
     let at = |option: &str, name: &str| format!("{option}={}", folder.join(name).display());
-    // Forced, as it mistrusts a folder below a shared one for temporary files.
+    // Forced, because munged refuses a folder below a shared one for temporary files.
     let arguments = [
         "--foreground".to_owned(),
         "--force".to_owned(),
@@ -235,7 +235,7 @@ fn start_munged(folder: &Path) -> Child {
         .unwrap()
 }
 
-/// The configuration of a cluster without cgroups and accounts, whose nodes are dead after five seconds of silence.
+/// The configuration of a cluster without cgroups and accounting, whose nodes are down after five seconds of silence.
 fn configuration(folder: &Path, nodes: usize) -> String {
     let said = |program: &str, flag: &str| {
         let output = Command::new(program).arg(flag).output().unwrap();
@@ -267,7 +267,7 @@ fn configuration(folder: &Path, nodes: usize) -> String {
     text + "PartitionName=main Nodes=ALL Default=YES MaxTime=INFINITE State=UP\n"
 }
 
-/// The process that Slurm keeps for the step of a process: the parent of that name.
+/// The step daemon of a process: its parent of that name.
 fn keeper(process: u32) -> Option<u32> {
     let status = fs::read_to_string(format!("/proc/{process}/stat")).ok()?;
     let parent: u32 = status.rsplit_once(')')?.1.split_whitespace().nth(1)?.parse().ok()?;
@@ -280,7 +280,7 @@ fn kill(process: u32) {
 }
 
 fn send(signal: &str, process: u32) {
-    // It may have ended by itself.
+    // The process may have ended by itself.
     let _ = Command::new("kill").args([&format!("-{signal}"), &process.to_string()]).stderr(Stdio::null()).status();
 }
 

@@ -1,5 +1,5 @@
-//! Batches on a real Slurm: several nodes, one of them cut off with all its processes in the middle of a run, then the
-//! coordinator's own. Whatever dies, the results are those of this machine alone, bit for bit.
+//! Batches on a real Slurm with several nodes. A node is killed with all its processes during a run: first one with a worker, then the
+//! coordinator's. The results are those of this machine alone, bit for bit.
 
 mod cluster;
 
@@ -15,7 +15,7 @@ use tempfile::TempDir;
 /// How many fits the batch has.
 const FITS: usize = 12;
 
-/// The folder of a scene, with a batch of it under light from all sides, and its results by this machine alone.
+/// A folder with a scene, a batch of it under light from all sides, and its results by this machine alone.
 fn batch() -> TempDir {
     let folder = folder();
     let mut manifest = "[defaults]\nsamples = 128\nseed = 5\n".to_owned();
@@ -38,13 +38,13 @@ fn assert_same(folder: &Path, out: &str) {
 }
 
 #[test]
-fn batches_survive_the_deaths_of_nodes() {
+fn batches_survive_killed_nodes() {
     let Some(mut cluster) = Cluster::start(3) else { return };
     let folder = batch();
     let cpus = format!("--cpus-per-task={}", cluster::CPUS);
     let ended = ["the coordinator ended with status 0"];
 
-    // A node with a worker.
+    // Kill a node with a worker.
     let line = "batch all.toml --out worker --progress json";
     let mut job = cluster.submit(folder.path(), &["--nodes=3", &cpus], line);
     job.log.wait_for(&["worker-joined", "\"worker\":3"]);
@@ -54,7 +54,7 @@ fn batches_survive_the_deaths_of_nodes() {
     job.log.wait_for(&ended);
     assert_same(folder.path(), "worker");
 
-    // The coordinator's node: the worker that is left gives the job back, and it goes on with the nodes that are left.
+    // Kill the coordinator's node: the remaining worker requeues the job, which continues on the remaining nodes.
     cluster.start_node(2);
     let mut controller = cluster.controller_log();
     let line = "batch all.toml --out coordinator --progress json --slurm -- --nodes=2";
@@ -63,7 +63,7 @@ fn batches_survive_the_deaths_of_nodes() {
     job.log.wait_for(&["node-finished", "select"]);
     cluster.cut("node1");
     controller.wait_for(&[&format!("Requeuing JobId={}", job.number)]);
-    // Slurm lets a job that was given back wait for two minutes.
+    // Slurm delays the start of a requeued job by two minutes.
     let now = [format!("jobid={}", job.number), "starttime=now".to_owned()];
     let update = Process::start(cluster.command("scontrol").arg("update").args(now)).output();
     assert!(update.status.success(), "{}", String::from_utf8_lossy(&update.stderr));
