@@ -1,4 +1,4 @@
-//! A run as a job of Slurm: what is submitted, and what the user is told.
+//! Submits a run as a Slurm job.
 
 use crate::{
     outputs::print_result,
@@ -8,7 +8,7 @@ use crate::{
 use anyhow::Context;
 use std::{env, path, path::Path, process::ExitCode};
 
-/// Submits a run whose results go to the folder `out`. What `check` finds wrong is told now, and not when the job's turn comes.
+/// Submits a run whose results go to the folder `out`. The problems that `check` finds are reported before the job is queued.
 pub(crate) fn submit(
     job: JobSettings,
     out: &Path,
