@@ -1,4 +1,4 @@
-//! A line when a fit of a batch has ended, and now and then one in between, for logs and pipes.
+//! Plain lines for logs and pipes: one when a fit of a batch has ended, and occasional ones in between.
 
 use super::{
     Display, Ending, PAUSE,
