@@ -135,7 +135,7 @@ impl Parts for Supply {
                     }
                 }
                 Err(true) if self.taken < self.options.open.len() => {
-                    return Err(PlanError::new("the thread that reads the inputs is gone: please report this"));
+                    return Err(PlanError::new("the thread that reads inputs ended too early; please report this"));
                 }
                 Err(true) => return Ok(Next::End),
                 Err(false) => return Ok(Next::NotYet),

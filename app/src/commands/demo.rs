@@ -59,7 +59,7 @@ pub(crate) fn run(settings: DemoSettings) -> anyhow::Result<ExitCode> {
         resume: false,
         input_seconds: began.elapsed().as_secs_f64(),
     };
-    let finished = fit::run(job)?.context("a fit that nobody has made is finished: please report this")?;
+    let finished = fit::run(job)?.context("the demo's run was finished before it began; please report this")?;
     let picture = picture(&finished.outcome, &finished.pictures);
     out.write("strip.png", &png::write(&picture, &[]).context("strip.png")?)?;
     print_result(&format!(

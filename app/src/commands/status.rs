@@ -51,13 +51,13 @@ fn table(status: &Status, folder: &str) -> String {
     for failure in &status.failures {
         text.push_str(&format!("\nfailed: {} {:?}: {}\n", failure.kind, failure.label, failure.error));
     }
-    let why = status.error.as_deref().unwrap_or("it does not say why");
+    let why = status.error.as_deref().unwrap_or("no reason is recorded");
     match status.state {
         RunState::Stopped => {
             text.push_str(&format!("\nstopped: {why}\nresume it: the same command with --resume\n"));
         }
         RunState::Ended => {
-            text.push_str(&format!("\nended: {why}\ntry what failed again: the same command with --resume\n"));
+            text.push_str(&format!("\nended: {why}\nretry what failed: the same command with --resume\n"));
         }
         RunState::Running | RunState::Finished => {}
     }
@@ -99,7 +99,7 @@ fn fits(all: &[PartStatus]) -> String {
     }
     match all.len() - shown.len() {
         0 => {}
-        more => text.push_str(&format!("and {more} more fits (--json has them all)\n")),
+        more => text.push_str(&format!("and {more} more fits (--json lists them all)\n")),
     }
     text
 }
@@ -157,7 +157,7 @@ fn workers(status: &Status) -> String {
     }
     match status.workers.len().saturating_sub(MOST_WORKERS) {
         0 => {}
-        more => text.push_str(&format!("and {more} more workers (--json has them all)\n")),
+        more => text.push_str(&format!("and {more} more workers (--json lists them all)\n")),
     }
     text
 }

@@ -105,7 +105,7 @@ impl<'a> Claim<'a> {
     /// Refuses a lock file or a ledger that this program did not write.
     pub(super) fn check_lock(&self) -> anyhow::Result<()> {
         if self.out.exists() && !self.out.is_dir() {
-            bail!("{} is a file: --out takes a folder, which is made if it is not there", self.out.display());
+            bail!("{} is a file: --out takes a folder, which is created if necessary", self.out.display());
         }
         for (name, beginning) in [(LOCK_FILE, b"process "), (LEDGER, b"# lookal")] {
             let path = self.out.join(name);

@@ -79,7 +79,7 @@ impl ManyBars {
             }
         }
         let hidden = self.fits.len() - shown;
-        self.more.set_message(if hidden > 0 { format!("and {hidden} more under way") } else { String::new() });
+        self.more.set_message(if hidden > 0 { format!("and {hidden} more running") } else { String::new() });
     }
 
     /// Removes a row.

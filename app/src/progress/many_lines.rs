@@ -28,7 +28,7 @@ impl Display for ManyLines {
         if self.count.running > 0 && self.told.elapsed() >= PAUSE {
             self.told = Instant::now();
             let (seconds, running) = (self.began.elapsed().as_secs_f64(), self.count.running);
-            self.say(&format!("{seconds:7.1} s  {}, {running} under way", self.count.text()));
+            self.say(&format!("{seconds:7.1} s  {}, {running} running", self.count.text()));
         }
     }
 

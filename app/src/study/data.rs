@@ -285,7 +285,7 @@ impl Collector<'_> {
 
 /// The message about a record whose content does not belong to its cell.
 fn foreign(cell: &Cell) -> String {
-    format!("cells/{}.json is no record of this study; remove it, and --resume computes it again", cell.name)
+    format!("cells/{}.json is not a record of this study; remove it, and --resume computes it again", cell.name)
 }
 
 fn named(model: &str, parameters: &[f64]) -> BTreeMap<String, f64> {

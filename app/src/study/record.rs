@@ -139,8 +139,9 @@ pub(super) fn read(out: &OutFolder, name: &str) -> anyhow::Result<Option<Record>
     let text = fs::read_to_string(&path).with_context(|| format!("cannot read {shown}"))?;
     let record = serde_json::from_str(&text);
     Ok(Some(
-        record
-            .with_context(|| format!("{shown} is no record of a study; remove it, and --resume computes it again"))?,
+        record.with_context(|| {
+            format!("{shown} is not a record of a study; remove it, and --resume computes it again")
+        })?,
     ))
 }
 

@@ -332,5 +332,5 @@ fn around(point: &[f64], model: &str) -> anyhow::Result<Vec<Vec<f64>>> {
 }
 
 fn missing(cell: &Cell) -> anyhow::Error {
-    anyhow!("{}: what it needs has no such match: please report this", cell.name)
+    anyhow!("{}: a cell that it needs has no such match; please report this", cell.name)
 }

@@ -39,7 +39,7 @@ pub struct Credentials {
 #[non_exhaustive]
 pub enum CredentialsError {
     /// The system provides no random bytes.
-    #[error("the system gives no random bytes for a secret and a key: {0}")]
+    #[error("the system provides no random bytes for a secret and a key: {0}")]
     Randomness(String),
     /// A file cannot be written.
     #[error("cannot write {}", path.display())]
@@ -199,7 +199,7 @@ impl Credentials {
 fn read_private(path: &Path) -> io::Result<String> {
     let mut file = File::open(path)?;
     if private_file::is_readable_by_others(&file) {
-        warn!(path = %path.display(), "others may read this secret file; chmod 600 would prevent it");
+        warn!(path = %path.display(), "other users may read this secret file; restrict it with chmod 600");
     }
     let mut text = String::new();
     file.read_to_string(&mut text)?;

@@ -182,7 +182,7 @@ impl Writer {
             Ok(rows) => self.deferred.written(rows),
             Err(error) => {
                 self.options.parts.put_back(parts);
-                warn!(%error, "cannot note in the journal what is under way");
+                warn!(%error, "cannot write attempts and states to the journal");
             }
         }
     }
@@ -197,7 +197,7 @@ impl Writer {
             params![self.epoch, unix_ms(), best],
         );
         if let Err(error) = seen {
-            warn!(%error, "cannot note the time in the journal");
+            warn!(%error, "cannot write the time to the journal");
         }
         if let Err(error) = status::write(&self.connection, &self.options.path) {
             warn!(%error, "cannot write the status of the run");

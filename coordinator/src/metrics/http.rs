@@ -94,12 +94,9 @@ pub(super) fn response(head: &[u8], pages: &impl Pages) -> Vec<u8> {
             Ok(()) => message("200 OK", "", "ok\n", with_body),
             Err(what) => message("503 Service Unavailable", "", &format!("{what}\n"), with_body),
         },
-        _ => message(
-            "404 Not Found",
-            "",
-            "the metrics are at /metrics, and whether the run goes on at /healthz\n",
-            with_body,
-        ),
+        _ => {
+            message("404 Not Found", "", "the metrics are at /metrics, the health of the run at /healthz\n", with_body)
+        }
     }
 }
 

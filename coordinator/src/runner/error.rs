@@ -20,11 +20,11 @@ pub enum RunError {
     Policy(#[from] PolicyError),
     /// There are neither local workers nor an address on which others could join.
     #[error(
-        "no worker can ever join: expected at least one local worker, or an address to listen on for others, found neither; use --workers N or --listen ADDR"
+        "no worker can join: expected at least one local worker, or an address to listen on for others, found neither; use --workers N or --listen ADDR"
     )]
     NoWorkersPossible,
     /// The coordinator listens on every address of the machine, so it cannot tell workers which one to connect to.
-    #[error("listening on {listen} tells workers no host name to connect to; add --advertise HOST[:PORT]")]
+    #[error("listening on {listen} gives workers no host name to connect to; add --advertise HOST[:PORT]")]
     NothingToAdvertise {
         /// The address to listen on.
         listen: SocketAddr,
@@ -58,14 +58,14 @@ pub enum RunError {
     Tls(#[source] rustls::Error),
     /// The access file made beforehand names an address of another machine, so `--listen` must be given.
     #[error(
-        "workers with this access file connect to {address}; say on which address of this machine they arrive with --listen IP:PORT"
+        "workers with this access file connect to {address}; give the address of this machine to listen on with --listen IP:PORT"
     )]
     ListenWhere {
         /// The address in the access file.
         address: String,
     },
     /// The operating system provides no random bytes.
-    #[error("the system gives no random bytes for the name of the run: {0}")]
+    #[error("the system provides no random bytes for the name of the run: {0}")]
     Randomness(io::Error),
     /// Signal handlers cannot be installed.
     #[error("cannot listen for Ctrl-C and SIGTERM")]
