@@ -29,7 +29,7 @@ pub(super) struct Board {
     writing: Mutex<()>,
 }
 
-/// What receives changes of fits.
+/// The receivers of changes.
 pub(super) struct Watchers {
     pub(super) display: Box<dyn Display>,
     pub(super) metrics: Option<Metrics>,
@@ -40,7 +40,7 @@ pub(super) struct Watchers {
 struct Inner {
     rows: Vec<Row>,
     numbers: BTreeMap<String, u32>,
-    /// Of the fits that are running.
+    /// The clocks of running fits.
     clocks: BTreeMap<u32, FitClock>,
     watchers: Watchers,
     workers_joined: usize,
@@ -51,7 +51,7 @@ struct Inner {
     began: Instant,
 }
 
-/// What a fit has cost so far.
+/// The cost of a fit so far.
 #[derive(Debug)]
 struct FitClock {
     clock: Clock,

@@ -8,18 +8,18 @@ use crate::{
 use rayon::prelude::*;
 use serde_json::Value;
 
-/// What the check found out about a fit.
+/// The result of the check of a fit.
 #[derive(Debug, Clone)]
 pub(super) struct Checked {
     /// The `inputs` of its `fit.json`, with the hashes of their contents.
     pub(super) inputs: Value,
     /// Pixels of its photo.
     pub(super) pixels: usize,
-    /// What may not change when the batch is resumed, by name.
+    /// The inputs and settings that may not change when the batch is resumed, by name.
     pub(super) identity: Vec<(&'static str, String)>,
 }
 
-/// What the check found out about all fits, and what the user should know.
+/// The results of the check of all fits, and the warnings for the user.
 #[derive(Debug)]
 pub(super) struct AllChecked {
     pub(super) fits: Vec<Checked>,

@@ -24,7 +24,7 @@ pub(super) struct Loader {
     loaded: Receiver<Loaded>,
 }
 
-/// What the thread works on.
+/// The data of the thread.
 #[derive(Debug)]
 pub(super) struct Shelf {
     pub(super) fits: Arc<[BatchFit]>,

@@ -53,7 +53,7 @@ impl Prepared {
         Ok(Self { capture, method, exposure, inputs, planner, warnings, seconds })
     }
 
-    /// What may not change when the batch is resumed, by name.
+    /// The inputs and settings that may not change when the batch is resumed, by name.
     pub(super) fn identity(&self) -> anyhow::Result<Vec<(&'static str, String)>> {
         let (inputs, capture, method, exposure) = (&self.inputs, &*self.capture, &self.method, self.exposure);
         FitIdentity { inputs, capture, method, exposure, also_render: &[] }.parts()

@@ -1,4 +1,4 @@
-//! What an earlier run of a batch left: whether it is the same batch, and which fits are complete.
+//! Examines an earlier run of a batch: whether it is the same batch, and which fits are complete.
 
 use super::{check::Checked, row::Scores};
 use crate::{
@@ -20,7 +20,7 @@ pub(super) fn identity(fits: &[BatchFit], checks: &[Checked]) -> RunIdentity {
     })
 }
 
-/// What an earlier run of a batch left.
+/// The state of an earlier run of a batch.
 #[derive(Debug)]
 pub(super) struct Earlier {
     /// Whether there is nothing left to do.
@@ -31,7 +31,7 @@ pub(super) struct Earlier {
     pub(super) remark: Option<String>,
 }
 
-/// What the run in a folder left, if there is one and it is resumed. Only files that its journal lists count as its results.
+/// The state of the run in a folder, if it is resumed. Only files that its journal lists count as its results.
 ///
 /// # Errors
 /// If that run has other inputs or settings, or a result was changed.

@@ -71,7 +71,7 @@ pub(super) const STATES: [&str; 6] = ["waiting", "running", "done", "missed", "f
 pub(super) struct Scores {
     pub(super) cssim: f64,
     pub(super) cssim_object: f64,
-    /// Of the winner of stage two.
+    /// The gamma of the winner of stage two.
     pub(super) gamma: f64,
     /// The final flat parameter vector.
     pub(super) parameters: Vec<f64>,

@@ -51,7 +51,7 @@ pub(super) struct Supply {
     writers: Writers,
 }
 
-/// What the results of a running fit will need.
+/// Data of a running fit that its results will need.
 #[derive(Debug)]
 struct Active {
     inputs: Inputs,

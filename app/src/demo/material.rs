@@ -17,7 +17,7 @@ use lookalike::{
 };
 use std::f64::consts::PI;
 
-/// What the material is, in one line.
+/// A description of the material in one line.
 pub const DESCRIPTION: &str = "pearl paint under lacquer: two GGX lobes, a clear coat, a retro-reflective diffuse part";
 
 /// The material as something to render.

@@ -8,7 +8,7 @@ use lookalike::{
 use lookalike_coordinator::journal::RunIdentity;
 use serde_json::Value;
 
-/// Everything that shapes the result of a fit.
+/// Everything that determines the result of a fit.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct FitIdentity<'a> {
     /// The `inputs` of `fit.json`.

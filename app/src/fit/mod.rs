@@ -52,7 +52,7 @@ pub(crate) struct FitJob {
     pub(crate) input_seconds: f64,
 }
 
-/// What the caller of a finished fit needs for further pictures.
+/// The data of a finished fit for further pictures.
 #[derive(Debug)]
 pub(crate) struct Finished {
     pub(crate) outcome: FitOutcome,

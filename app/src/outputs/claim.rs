@@ -55,7 +55,7 @@ pub(crate) enum OldFiles {
 }
 
 impl OldFiles {
-    /// As the flags `--resume` and `--force` say.
+    /// The choice for the flags `--resume` and `--force`.
     pub(crate) fn of(is_resumed: bool, is_forced: bool) -> Self {
         match (is_resumed, is_forced) {
             (_, true) => Self::Replace,

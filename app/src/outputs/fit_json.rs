@@ -16,12 +16,12 @@ use serde_json::{Map, Value, json};
 /// The schema of the document.
 const SCHEMA: &str = "lookalike.fit/1";
 
-/// The content of the document.
+/// The data for the document.
 #[derive(Debug)]
 pub(crate) struct FitRecord<'a> {
     pub(crate) method: &'a Method,
     pub(crate) capture: &'a Capture,
-    /// What the fit was made from.
+    /// The inputs of the fit.
     pub(crate) inputs: &'a Value,
     pub(crate) outcome: &'a FitOutcome,
     pub(crate) display_exposure: f64,

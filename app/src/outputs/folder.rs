@@ -95,7 +95,7 @@ impl OutFolder {
         self.hashes(FIT_FILES)
     }
 
-    /// Those of the named files that exist, each with the BLAKE3 of its bytes.
+    /// The existing ones of the named files, each with the BLAKE3 of its bytes.
     pub(crate) fn hashes<'a>(&self, names: impl IntoIterator<Item = &'a str>) -> anyhow::Result<Vec<(String, String)>> {
         let there = names.into_iter().filter_map(|name| Some((name.to_owned(), self.hash(name).transpose()?)));
         there.map(|(name, hash)| Ok((name, hash?))).collect()

@@ -30,7 +30,7 @@ pub(super) struct Cell {
     pub(super) needs: Vec<CellId>,
 }
 
-/// What a cell computes.
+/// The task of a cell.
 #[derive(Debug, Clone)]
 pub(super) enum Task {
     /// The photo of its scene.

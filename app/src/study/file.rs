@@ -100,7 +100,7 @@ pub(super) enum Experiment {
     Agreement,
     /// Several subsets of pixels.
     Subsets,
-    /// What direct renderings cost.
+    /// The cost of direct renderings.
     Direct,
 }
 

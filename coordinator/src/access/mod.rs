@@ -79,7 +79,7 @@ pub enum CredentialsError {
     Access {
         /// The file.
         path: PathBuf,
-        /// What is wrong with it.
+        /// The fault.
         source: AccessError,
     },
     /// The file is not a key file.
@@ -87,7 +87,7 @@ pub enum CredentialsError {
     Key {
         /// The file.
         path: PathBuf,
-        /// What is wrong with it.
+        /// The fault.
         fault: String,
     },
     /// The key file belongs to another access file.

@@ -45,7 +45,7 @@ pub enum JournalError {
     AnotherRun {
         /// The journal.
         path: PathBuf,
-        /// What differs.
+        /// The differences.
         differences: Vec<Difference>,
     },
     /// Another process uses the journal.

@@ -77,7 +77,7 @@ pub(crate) struct Journal {
     pub(crate) run: RunName,
     /// The number of this process among those of the run, from 1.
     pub(crate) epoch: u64,
-    /// What earlier epochs left.
+    /// The data of earlier epochs.
     pub(crate) past: Past,
     /// The keys for which an earlier epoch has a result.
     known: HashSet<NodeKey>,

@@ -22,7 +22,7 @@ pub struct PartStatus {
     /// Its final score.
     #[serde(rename = "cssim")]
     pub score: Option<f64>,
-    /// From its start to its end.
+    /// The time from its start to its end.
     pub seconds: Option<f64>,
     /// Why it failed.
     pub error: Option<String>,
@@ -69,7 +69,7 @@ impl PartLedger {
     }
 }
 
-/// What an earlier process of a run of many left.
+/// The parts that earlier processes of a run wrote.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct WrittenParts {
     /// Whether every part was written.

@@ -15,12 +15,12 @@ use super::schema;
 use super::time::unix_ms;
 use crate::state::Deaths;
 
-/// What earlier epochs left.
+/// The data of earlier epochs.
 #[derive(Debug, Default)]
 pub(crate) struct Past {
     /// Deaths of workers that executed a node, for nodes with at least one.
     pub(crate) deaths: HashMap<NodeKey, Deaths>,
-    /// Where the last coordinator listened.
+    /// The address on which the last coordinator listened.
     pub(crate) listen: Option<SocketAddr>,
     /// How many nodes have a result.
     pub(crate) results: usize,

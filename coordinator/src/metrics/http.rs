@@ -20,7 +20,7 @@ const MOST_HEAD_BYTES: usize = 8 << 10;
 /// The pause after the system fails to accept a connection, for example when file descriptors run out.
 const ACCEPT_PAUSE: Duration = Duration::from_millis(100);
 
-/// What is served.
+/// The pages that are served.
 pub(super) trait Pages: Send + Sync + 'static {
     /// The metrics as of now.
     fn page(&self) -> String;

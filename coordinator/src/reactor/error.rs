@@ -55,7 +55,7 @@ pub enum Stop {
         name: Box<NodeName>,
         /// Where the result came from.
         site: Site,
-        /// What is wrong with it.
+        /// The fault.
         error: PlanError,
     },
     /// The planner cannot continue, by default because a node failed.

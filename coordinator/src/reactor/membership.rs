@@ -149,8 +149,7 @@ fn requeue(core: &mut Core, node: NodeId, worker: WorkerId, now: Duration, outbo
     outbox.tell(RunEvent::NodeRequeued { name: core.name(node), worker, crashes: deaths.total() });
 }
 
-/// Queue a node. After the second loss of its worker it waits before that, longer each time, to limit how often a node that
-/// always fails runs.
+/// Queue a node, from the second loss of its worker on after a pause that grows, to limit how often a failing node runs.
 fn await_worker(core: &mut Core, node: NodeId, now: Duration) {
     let losses = core.look(node).map_or(0, |record| record.losses);
     let doublings = losses.saturating_sub(2).min(16);

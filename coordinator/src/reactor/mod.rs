@@ -30,7 +30,7 @@ use crate::state::{Core, Record, Starving};
 /// Start a run: let the planner add the first nodes, and process them.
 ///
 /// # Errors
-/// Those of the planner.
+/// Errors of the planner.
 pub fn start(core: &mut Core, planner: &mut impl Planner, now: Duration, outbox: &mut Outbox) -> Result<(), Stop> {
     planner.start(&mut GraphEdit::new(&mut core.graph))?;
     settle(core, planner, now, outbox)
@@ -39,7 +39,7 @@ pub fn start(core: &mut Core, planner: &mut impl Planner, now: Duration, outbox:
 /// Process an event that has just arrived. `now` is the time since the start of the run and never decreases.
 ///
 /// # Errors
-/// As [`handle_arrived`].
+/// See [`handle_arrived`].
 pub fn handle(
     core: &mut Core,
     planner: &mut impl Planner,

@@ -15,7 +15,7 @@ use crate::policy::Speculation;
 use crate::state::{Core, Policy};
 use lookalike::graph::FailureReason;
 
-/// One event from outside. Its numbers select among the present objects, modulo their number.
+/// An event from outside. A number selects one of the present objects (modulo their count).
 #[derive(Clone, Debug)]
 enum Step {
     Join {
@@ -67,7 +67,7 @@ fn step() -> impl Strategy<Value = Step> {
         1 => (0..9_usize).prop_map(|worker| Step::Fetch { worker }),
         1 => (0..9_usize).prop_map(|worker| Step::Drain { worker }),
         1 => (0..4_000_000_u64, any::<u8>()).prop_map(|(microseconds, heard)| Step::PassTime { microseconds, heard }),
-        // So short that nodes are short.
+        // So little time that nodes count as short.
         3 => (0..400_u64, any::<u8>()).prop_map(|(microseconds, heard)| Step::PassTime { microseconds, heard }),
         2 => (0..9_usize, any::<bool>()).prop_map(|(which, is_at_it)| Step::Return { which, is_at_it }),
         2 => Just(Step::RunHere),

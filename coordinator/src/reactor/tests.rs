@@ -224,7 +224,7 @@ fn worker_is_not_given_more_bytes_than_it_may_leave_unread() {
     let mut bench = Bench::new(Script { nodes: vec![large; 40], ..Script::default() });
     // It has threads for all of them, but eight of them take 8 MiB.
     assert_eq!(bench.join(A, 64).len(), 8);
-    // What it has begun has left its queue.
+    // A node that it has begun has left its queue.
     assert_eq!(bench.start(A, 0, 1), ["worker 1 gets 8.1"]);
     assert_eq!(bench.finish(A, 1, 1, 0), ["worker 1 is thanked for 1.1", "worker 1 gets 9.1"]);
     assert_eq!(bench.core.members.get(A).unwrap().waiting.len(), 8);

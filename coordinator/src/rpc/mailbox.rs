@@ -86,7 +86,7 @@ impl Postman {
         self.state.overflowing.clone().cancelled_owned()
     }
 
-    /// Wait until the connection is to end at once.
+    /// Wait until [`Mailbox::close`] is called.
     pub(super) fn closed(&self) -> impl Future<Output = ()> + use<> {
         self.state.closed.clone().cancelled_owned()
     }

@@ -37,7 +37,7 @@ pub(crate) struct Cluster {
     local_workers: JoinSet<()>,
 }
 
-/// What the journal of a resumed run records about its earlier coordinators.
+/// The records of earlier coordinators in the journal of a resumed run.
 #[derive(Debug)]
 pub(crate) struct Resumed {
     /// The address on which the last one listened.

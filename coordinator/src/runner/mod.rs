@@ -78,7 +78,7 @@ pub async fn run<P: Planner>(
 /// Like [`run`], in any world. Local workers are processes in every world.
 ///
 /// # Errors
-/// Those of [`run`].
+/// See [`run`].
 pub async fn run_in<W: World, P: Planner>(
     world: W,
     options: RunnerOptions,

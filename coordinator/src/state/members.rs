@@ -391,7 +391,7 @@ impl Members {
         Some((*worker, self.get(*worker)?))
     }
 
-    /// Those with a free thread and unbegun leases that have made no progress since `since` or longer.
+    /// Those with a free thread and unbegun leases that have made no progress since `since`.
     pub(crate) fn stalled(&self, since: Duration) -> impl Iterator<Item = (WorkerId, &Member)> {
         let stalled = self.stalled.iter().take_while(move |(begin, _)| *begin <= since);
         stalled.filter_map(|(_, worker)| Some((*worker, self.get(*worker)?)))

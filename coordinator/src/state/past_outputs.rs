@@ -6,7 +6,7 @@ use lookalike::graph::{Blob, NodeKey};
 
 use super::deaths::Deaths;
 
-/// What earlier coordinators know about a node.
+/// The data of earlier coordinators about a node.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Memory {
     /// Its output. If it has one, the node need not run again.
@@ -17,6 +17,6 @@ pub struct Memory {
 
 /// A source of the outputs of earlier coordinators: the journal, or a test.
 pub trait PastOutputs: fmt::Debug + Send {
-    /// What is known about the nodes with this key.
+    /// The data about the nodes with this key.
     fn of(&mut self, key: NodeKey) -> Memory;
 }

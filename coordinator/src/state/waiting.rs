@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use lookalike::graph::NodeId;
 
-/// Where a node waits.
+/// The place where a node waits.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) enum Place {
     /// It does not wait for a worker.

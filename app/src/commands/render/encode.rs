@@ -38,7 +38,7 @@ impl Format {
     }
 }
 
-/// What was rendered, for the metadata.
+/// A description of what was rendered, for the metadata.
 #[derive(Debug)]
 pub(super) struct Subject<'a> {
     pub(super) settings: &'a RenderSettings,
