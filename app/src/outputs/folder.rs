@@ -78,7 +78,7 @@ impl ClaimedFolder {
             for path in &replaced {
                 fs::remove_file(path).with_context(|| cannot(path))?;
             }
-            // The ledger, which says whose run it was, is replaced last.
+            // The ledger is replaced last, because it identifies the run that wrote the files.
             let journal = folder.file(JOURNAL_FILE);
             journal::remove(&journal).with_context(|| cannot(&journal))?;
         }

@@ -90,7 +90,7 @@ impl Ledger {
         if state.written.contains(&entry) {
             return Ok(());
         }
-        // Opened anew after a failure, so that the next line does not continue one that was cut off.
+        // Reopened after a failure, so that the next line does not continue an incomplete one.
         let file = state.file.take().map_or_else(|| self.open(), Ok);
         let noted = file.and_then(|mut file| {
             file.write_all(format!("{hash}  {name}\n").as_bytes())?;
@@ -102,7 +102,7 @@ impl Ledger {
         Ok(())
     }
 
-    /// The file, ready for the next line: a line that was cut off is ended, so that it is not continued.
+    /// Opens the file for appending, and ends an incomplete last line.
     fn open(&self) -> io::Result<File> {
         let mut file = OpenOptions::new().read(true).append(true).open(&self.path)?;
         let mut last = [b'\n'];
