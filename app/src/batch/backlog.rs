@@ -1,12 +1,12 @@
-//! Fits whose nodes have ended and whose results are not written yet: all that their files need is still in memory.
+//! Fits whose nodes have ended and whose results are not written yet: what their files need is still in memory.
 
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 
-/// What fits take together.
+/// The number and the size of some fits.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub(super) struct Load {
     pub(super) fits: usize,
-    /// Pixels of their photos.
+    /// The total number of pixels of their photos.
     pub(super) pixels: usize,
 }
 
@@ -18,31 +18,31 @@ impl std::ops::Add for Load {
     }
 }
 
-/// The fits that are being written. Clones are the same backlog.
+/// The fits that are being written. Clones share one backlog.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Backlog(Arc<(Mutex<Load>, Condvar)>);
 
 impl Backlog {
-    /// One more fit, of so many pixels, until what this returns is dropped.
+    /// Adds a fit with this many pixels, until the returned entry is dropped.
     pub(super) fn add(&self, pixels: usize) -> Entry {
         let mut load = self.lock();
         *load = *load + Load { fits: 1, pixels };
         Entry { backlog: self.clone(), pixels }
     }
 
-    /// What is being written.
+    /// The fits that are being written.
     pub(super) fn load(&self) -> Load {
         *self.lock()
     }
 
-    /// Waits until so little is left that `is_little` is content, or nothing.
+    /// Waits until `is_little` accepts the remaining load, or until the backlog is empty.
     pub(super) fn wait_until(&self, is_little: impl Fn(Load) -> bool) {
         let is_much = |load: &mut Load| load.fits > 0 && !is_little(*load);
         drop(self.0.1.wait_while(self.lock(), is_much));
     }
 
     fn lock(&self) -> MutexGuard<'_, Load> {
-        // Two numbers that are set together.
+        // The two numbers are always set together, so a panic leaves them consistent.
         self.0.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
@@ -84,7 +84,7 @@ mod tests {
             left
         });
         assert_eq!(left, Load { fits: 1, pixels: 3 });
-        // Nothing is little enough for anybody.
+        // No load is accepted, so this waits until the backlog is empty.
         backlog.wait_until(|_| false);
     }
 }

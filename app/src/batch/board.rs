@@ -1,5 +1,5 @@
-//! How every fit of a batch is doing. Whoever knows something tells the board, from any thread; the board tells the display, the
-//! metrics and the summaries.
+//! The state of every fit of a batch. Any thread may report a change; the board passes it on to the display, the metrics and
+//! the summaries.
 
 use super::{
     row::{Row, STATES, Scores, State},
@@ -21,7 +21,7 @@ use std::{
 };
 use tracing::warn;
 
-/// How every fit is doing.
+/// The state of every fit.
 pub(super) struct Board {
     inner: Mutex<Inner>,
     out: OutFolder,
@@ -29,7 +29,7 @@ pub(super) struct Board {
     writing: Mutex<()>,
 }
 
-/// Who is told how fits are doing.
+/// The receivers of changes.
 pub(super) struct Watchers {
     pub(super) display: Box<dyn Display>,
     pub(super) metrics: Option<Metrics>,
@@ -40,18 +40,18 @@ pub(super) struct Watchers {
 struct Inner {
     rows: Vec<Row>,
     numbers: BTreeMap<String, u32>,
-    /// Of fits under way.
+    /// The clocks of running fits.
     clocks: BTreeMap<u32, FitClock>,
     watchers: Watchers,
     workers_joined: usize,
-    /// How the run is doing: `running`, `finished` or `stopped`.
+    /// The state of the run: `running`, `finished` or `stopped`.
     state: &'static str,
     /// Whether a failed fit has ended the run.
     is_stopped: bool,
     began: Instant,
 }
 
-/// What a fit has cost so far.
+/// The cost of a fit so far.
 #[derive(Debug)]
 struct FitClock {
     clock: Clock,
@@ -61,7 +61,7 @@ struct FitClock {
 }
 
 impl Board {
-    /// A board of fits that wait, or are complete, which their results say with their seconds; with their first summaries.
+    /// A board whose fits are waiting or complete; complete ones have scores and seconds. Writes the first summaries.
     pub(super) fn new(
         fits: &[BatchFit],
         complete: Vec<Option<(Scores, f64)>>,
@@ -96,7 +96,7 @@ impl Board {
         Ok(board)
     }
 
-    /// Takes note of what happened in the run.
+    /// Processes an event of the run.
     pub(super) fn note(&self, event: &RunEvent) {
         let mut inner = self.lock();
         inner.workers_joined += usize::from(matches!(event, RunEvent::WorkerJoined { .. }));
@@ -108,7 +108,7 @@ impl Board {
         inner.watchers.display.event(event);
     }
 
-    /// The inputs of a fit are there, which took so many seconds.
+    /// A fit begins: its inputs are loaded, which took this many seconds.
     pub(super) fn started(&self, number: u32, best: Arc<BestScore>, input_seconds: f64) {
         let mut inner = self.lock();
         let clock = FitClock { clock: Clock::start(), input_seconds, attempts: 0, requeued: 0 };
@@ -118,7 +118,7 @@ impl Board {
         inner.show(number, &FitEvent::Started { number, name, best });
     }
 
-    /// The nodes of a fit have ended: what they cost.
+    /// The nodes of a fit have ended. Returns the time they took and the attempts.
     pub(super) fn computed(&self, number: u32) -> Timing {
         let mut inner = self.lock();
         let workers = inner.workers_joined;
@@ -155,7 +155,7 @@ impl Board {
         self.write_summaries_soon();
     }
 
-    /// Whether a fit has failed; if so, the run is taken to end for it.
+    /// Whether a fit has failed. If so, notes that the run ends because of it.
     pub(super) fn stop_if_failed(&self) -> bool {
         let mut inner = self.lock();
         inner.is_stopped |= inner.count().failed > 0;
@@ -167,7 +167,7 @@ impl Board {
         self.lock().is_stopped
     }
 
-    /// What is wrong when all has come to its end: fits without results.
+    /// The problem to report at the end, if fits are left without results.
     pub(super) fn problem(&self) -> Option<String> {
         let FitCount { total, done, .. } = self.lock().count();
         match (total, total - done) {
@@ -177,7 +177,7 @@ impl Board {
         }
     }
 
-    /// No fit will change any more: the last summaries.
+    /// Writes the last summaries. No fit may change any more.
     ///
     /// # Errors
     /// If they cannot be written.
@@ -195,23 +195,23 @@ impl Board {
         self.write_summaries()
     }
 
-    /// All is written, and the run is over.
+    /// Reports the end of the run, after everything is written.
     pub(super) fn end(&self, ending: Ending<'_>) {
         self.lock().watchers.display.finish(ending);
     }
 
-    /// The summaries for people.
+    /// The table to print at the end.
     pub(super) fn table(&self) -> String {
         self.summary().table()
     }
 
-    /// The exit code that the fits ask for.
+    /// The exit code for the states of the fits.
     pub(super) fn exit(&self) -> Exit {
         exit(&self.lock().count())
     }
 
     fn lock(&self) -> MutexGuard<'_, Inner> {
-        // Every change is whole before anything that could panic.
+        // Each change is complete before any call that could panic.
         self.inner.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -221,7 +221,7 @@ impl Board {
         Summary { rows, count, state, seconds: inner.began.elapsed().as_secs_f64() }
     }
 
-    /// Writes the summaries without letting the caller wait for the disk.
+    /// Writes the summaries on another thread, so that the caller does not wait for the disk.
     fn write_summaries_soon(self: &Arc<Self>) {
         let board = Arc::clone(self);
         rayon::spawn(move || {
@@ -231,7 +231,7 @@ impl Board {
         });
     }
 
-    /// Writes the summaries as of now: one that comes late, after the end of the run, repeats the last ones.
+    /// Writes the summaries as of now. A late call, after the end of the run, writes the last ones again.
     fn write_summaries(&self) -> anyhow::Result<()> {
         let _writing = self.writing.lock().unwrap_or_else(PoisonError::into_inner);
         summary::write(&self.summary(), &self.out)
@@ -249,7 +249,7 @@ impl Inner {
         }
     }
 
-    /// Stops the clock of a fit: its seconds.
+    /// Stops the clock of a fit. Returns its seconds.
     fn end(&mut self, number: u32) -> f64 {
         let clock = self.clocks.remove(&number);
         let seconds = clock.map(|clock| clock.input_seconds + clock.clock.total());
@@ -259,7 +259,7 @@ impl Inner {
         seconds.unwrap_or(0.0)
     }
 
-    /// The clock of the fit that an event of a node is about.
+    /// The clock of the fit that a node's event belongs to.
     fn clock_of(&mut self, event: &RunEvent) -> Option<&mut FitClock> {
         let name = match event {
             RunEvent::NodeStarted { name, .. }
@@ -287,7 +287,7 @@ impl Inner {
         count
     }
 
-    /// Tells everybody of a change of a fit.
+    /// Reports a change of a fit to the journal, the metrics and the display.
     fn show(&mut self, number: u32, event: &FitEvent) {
         if let Some(row) = self.rows.get(number as usize) {
             self.watchers.ledger.tell(row.journal_row(number));
@@ -305,7 +305,7 @@ impl Inner {
     }
 }
 
-/// The exit code of a batch: a fit that failed outweighs one that missed its score.
+/// The exit code of a batch: a failed fit takes precedence over one that missed its score.
 fn exit(count: &FitCount) -> Exit {
     if count.failed > 0 {
         Exit::SomeFitsFailed

@@ -1,4 +1,4 @@
-//! Before any work: the inputs of every fit are read, and everything that is wrong is told at once.
+//! The check before any work: reads the inputs of every fit and reports all problems at once.
 
 use super::{lights::Lights, prepare::Prepared};
 use crate::{
@@ -8,28 +8,28 @@ use crate::{
 use rayon::prelude::*;
 use serde_json::Value;
 
-/// What is known of a fit from its check.
+/// The result of the check of a fit.
 #[derive(Debug, Clone)]
 pub(super) struct Checked {
     /// The `inputs` of its `fit.json`, with the hashes of their contents.
     pub(super) inputs: Value,
     /// Pixels of its photo.
     pub(super) pixels: usize,
-    /// What may not change when the batch is resumed, by name.
+    /// The inputs and settings that may not change when the batch is resumed, by name.
     pub(super) identity: Vec<(&'static str, String)>,
 }
 
-/// All fits, as they were found, and what the user should know.
+/// The results of the check of all fits, and the warnings for the user.
 #[derive(Debug)]
 pub(super) struct AllChecked {
     pub(super) fits: Vec<Checked>,
     pub(super) warnings: Vec<String>,
 }
 
-/// Reads the inputs of every fit, a few at a time, and lets go of them.
+/// Reads the inputs of every fit, a few at a time, and frees them again.
 ///
 /// # Errors
-/// Everything that is wrong, with the names of the fits that it concerns.
+/// All problems, each with the names of the fits that have it.
 pub(super) fn check(settings: &BatchSettings, lights: &Lights) -> anyhow::Result<AllChecked> {
     let found: Vec<anyhow::Result<(Checked, Vec<String>)>> = settings
         .fits
@@ -45,7 +45,7 @@ pub(super) fn check(settings: &BatchSettings, lights: &Lights) -> anyhow::Result
         match found {
             Ok((checked, of_fit)) => {
                 fits.push(checked);
-                // Fits of one photo or one light have them in common.
+                // Fits with one photo or one light share its warnings.
                 for warning in of_fit {
                     if !warnings.contains(&warning) {
                         warnings.push(warning);
@@ -67,7 +67,7 @@ pub(super) fn check(settings: &BatchSettings, lights: &Lights) -> anyhow::Result
     Ok(AllChecked { fits, warnings })
 }
 
-/// A problem with the fits that have it: the first by name.
+/// A problem with the fits that have it; the first is named.
 fn line(manifest: &str, text: &str, fits: &[&BatchFit]) -> String {
     let Some(first) = fits.first() else { return text.to_owned() };
     let others = match fits.len() - 1 {

@@ -1,4 +1,4 @@
-//! The lights of a batch: read once and kept as long as the fits that use them are near, encoded once for all of them.
+//! The lights of a batch: read and encoded once, and kept while fits that use them are near.
 
 use crate::{
     inputs::{LoadedEnvironment, load_environment},
@@ -10,30 +10,30 @@ use std::{
     sync::{Arc, Mutex, MutexGuard, PoisonError},
 };
 
-/// What lights that nobody uses at the moment may take, in bytes (256 MiB); the last one is kept whatever it takes.
+/// The most bytes that unused lights may take (256 MiB). The last one is kept whatever its size.
 const MOST_BYTES: usize = 256 << 20;
 
-/// A light, and the same as the nodes read it.
+/// A light, and its encoding for nodes.
 #[derive(Debug, Clone)]
 pub(super) struct Light {
     pub(super) loaded: LoadedEnvironment,
     pub(super) encoded: Blob,
 }
 
-/// The lights that were used last.
+/// The most recently used lights.
 #[derive(Debug, Default)]
 pub(super) struct Lights {
-    /// The latest last.
+    /// In order of use, latest last.
     kept: Mutex<VecDeque<(EnvironmentSettings, Arc<Light>)>>,
 }
 
 impl Lights {
-    /// The light of these settings: the one that is here, else from its file.
+    /// The light of these settings, from memory or from its file.
     pub(super) fn get(&self, settings: &EnvironmentSettings) -> anyhow::Result<Arc<Light>> {
         if let Some(light) = self.find(settings) {
             return Ok(light);
         }
-        // Two that want it at the same time may both read it; nobody waits for the other's file.
+        // Two threads that need one light at the same time may both read it, so that neither waits for another file.
         let loaded = load_environment(settings)?;
         let encoded = encode_light(&loaded.environment)?;
         let light = Arc::new(Light { loaded, encoded });
@@ -57,7 +57,7 @@ impl Lights {
     }
 
     fn lock(&self) -> MutexGuard<'_, VecDeque<(EnvironmentSettings, Arc<Light>)>> {
-        // A panic cannot leave it half changed in a way that matters: at worst one is missing.
+        // A panic leaves at worst one light missing.
         self.kept.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }

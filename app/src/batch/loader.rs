@@ -12,10 +12,10 @@ use std::{
 };
 use tokio::sync::Notify;
 
-/// Fits that wait for their turn in memory, beside the one that is being read.
+/// How many loaded fits wait in memory, beside the one that is being read.
 const AHEAD: usize = 1;
 
-/// A fit whose turn has come: its number, and its inputs or what is wrong with them now.
+/// A loaded fit: its number, and its inputs or the error.
 pub(super) type Loaded = (u32, anyhow::Result<Box<Prepared>>);
 
 /// The receiving end. The thread ends when this is dropped or all fits are read.
@@ -24,21 +24,21 @@ pub(super) struct Loader {
     loaded: Receiver<Loaded>,
 }
 
-/// What the thread works on.
+/// The data of the thread.
 #[derive(Debug)]
 pub(super) struct Shelf {
     pub(super) fits: Arc<[BatchFit]>,
-    /// The numbers of those to be read, in order.
+    /// The numbers of the fits to read, in order.
     pub(super) open: Arc<[u32]>,
     pub(super) checks: Arc<[Checked]>,
     pub(super) lights: Arc<Lights>,
     pub(super) stage_two: StageTwo,
-    /// Told whenever a fit is there.
+    /// Notified whenever a fit is loaded.
     pub(super) wake: Arc<Notify>,
 }
 
 impl Loader {
-    /// Starts to read.
+    /// Starts the thread.
     pub(super) fn start(shelf: Shelf) -> anyhow::Result<Self> {
         let (sender, loaded) = sync_channel(AHEAD);
         let read = move || read_all(&shelf, &sender);
@@ -46,12 +46,12 @@ impl Loader {
         Ok(Self { loaded })
     }
 
-    /// The next fit, once it is there; `None` after the last one.
+    /// Waits for the next fit; `None` after the last one.
     pub(super) fn wait(&self) -> Option<Loaded> {
         self.loaded.recv().map_err(|RecvError| ()).ok()
     }
 
-    /// The next fit, if it is there. `Err(true)` after the last one.
+    /// The next fit, if it is loaded. `Err(true)` after the last one.
     pub(super) fn look(&self) -> Result<Loaded, bool> {
         self.loaded.try_recv().map_err(|error| error == TryRecvError::Disconnected)
     }
@@ -67,14 +67,14 @@ fn read_all(shelf: &Shelf, sender: &SyncSender<Loaded>) {
             Ok(Box::new(prepared))
         });
         if sender.send((number, unchanged)).is_err() {
-            // Nobody wants fits any more.
+            // The receiver was dropped.
             return;
         }
         shelf.wake.notify_one();
     }
 }
 
-/// Refuses inputs that were changed while the batch ran: which of the two would the results be of?
+/// Refuses inputs that changed while the batch ran: it would be unclear to which version the results belong.
 fn same(before: &serde_json::Value, now: &serde_json::Value) -> anyhow::Result<()> {
     let roles = now.as_object().into_iter().flatten();
     for (role, file) in roles {
@@ -86,7 +86,7 @@ fn same(before: &serde_json::Value, now: &serde_json::Value) -> anyhow::Result<(
     Ok(())
 }
 
-/// Refuses what settings say differently now, such as an exposure that comes from another file.
+/// Refuses settings that changed while the batch ran, such as an exposure that is read from another file.
 fn same_settings(before: &[(&str, String)], now: &[(&str, String)]) -> anyhow::Result<()> {
     match before.iter().zip(now).find(|(before, now)| before != now) {
         None => Ok(()),

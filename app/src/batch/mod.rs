@@ -1,7 +1,7 @@
 //! Many fits as one run.
 //!
 //! ```text
-//!   manifest ──► fits ──► check: read the inputs of every fit, tell all that is wrong
+//!   manifest ──► fits ──► check: read the inputs of every fit, report all problems
 //!                           │
 //!                  loader (a thread): reads a fit's files again when its turn is near
 //!                           ▼
@@ -9,7 +9,7 @@
 //!                           │ a fit ends
 //!                  results (rayon): OUT/<name>/..., then the summaries
 //! ```
-//! The board knows how every fit is doing. Everybody tells it, and it tells the display, the metrics and the summaries.
+//! The board holds the state of every fit. All modules report to it, and it updates the display, the metrics and the summaries.
 
 mod backlog;
 mod board;
@@ -44,7 +44,7 @@ use window::{Demand, Window};
 
 /// Runs a batch and writes its results.
 pub(crate) fn run(settings: BatchSettings) -> anyhow::Result<ExitCode> {
-    // Whatever can fail fails before any work is done.
+    // Check for errors before any work is done.
     let folder = ClaimedFolder::take(&claim(&settings))?;
     let metrics = settings.metrics.map(|address| address.listen()).transpose()?;
     let lights = Arc::new(Lights::default());
@@ -100,18 +100,18 @@ pub(crate) fn run(settings: BatchSettings) -> anyhow::Result<ExitCode> {
         demand.note(event);
         board.note(event);
     });
-    // Also of a run that failed: what was computed is written.
+    // Also after an error: what was computed is written.
     let run = run.map(|(planner, summary)| (drop(planner), summary).1);
     written.wait();
     let closed = close(&out, &board, &ledger, run.is_ok(), &fits);
     end(&board, first_error(run.map(|_| ()), closed))
 }
 
-/// Tells the journal what has come after it was closed: fits whose results were written last, and how all of it ended.
+/// Adds to the closed journal the fits whose results were written last, and how the run ended.
 fn close(out: &OutFolder, board: &Board, ledger: &PartLedger, is_whole: bool, fits: &[BatchFit]) -> anyhow::Result<()> {
     let path = out.file(JOURNAL_FILE);
     if !path.exists() {
-        // The run could not begin.
+        // The run did not begin.
         return Ok(());
     }
     let ended = board.problem().filter(|_| is_whole);
@@ -123,7 +123,7 @@ fn close(out: &OutFolder, board: &Board, ledger: &PartLedger, is_whole: bool, fi
     Ok(())
 }
 
-/// What the batch asks of its folder.
+/// The files that the batch reads and writes.
 fn claim(settings: &BatchSettings) -> Claim<'_> {
     let mut inputs: Vec<&Path> = vec![&settings.manifest];
     for fit in &settings.fits {
@@ -141,7 +141,7 @@ fn claim(settings: &BatchSettings) -> Claim<'_> {
     }
 }
 
-/// Tells all that is wrong with a batch, without running it.
+/// Checks a batch without running it.
 pub(crate) fn check(settings: &BatchSettings) -> anyhow::Result<()> {
     claim(settings).check()?;
     show_warnings(&check::check(settings, &Lights::default())?.warnings);
@@ -154,9 +154,9 @@ fn outputs(out: &OutFolder, fits: &[BatchFit]) -> anyhow::Result<Vec<(String, St
     out.hashes(files.iter().map(String::as_str))
 }
 
-/// Writes the last summaries and tells how it went.
+/// Writes the last summaries and prints the outcome.
 fn end(board: &Board, run: anyhow::Result<()>) -> anyhow::Result<ExitCode> {
-    // A disk that is full may have room later.
+    // Not an error of the input: a full disk may have room when the batch is resumed.
     let written = board.close().context(Exit::ClusterFailed);
     let stopped =
         run.as_ref().err().filter(|_| board.was_stopped_by_a_fit()).map(|error| error.root_cause().to_string());
@@ -171,7 +171,7 @@ fn end(board: &Board, run: anyhow::Result<()>) -> anyhow::Result<ExitCode> {
     first_error(outcome, printed).map(|()| board.exit().into())
 }
 
-/// What went wrong first is the one to tell; what followed from it is logged.
+/// The first error is returned; a later one, most likely a consequence, is logged.
 fn first_error(first: anyhow::Result<()>, then: anyhow::Result<()>) -> anyhow::Result<()> {
     match (first, then) {
         (Err(first), Err(then)) => {

@@ -1,4 +1,4 @@
-//! From a fit of the manifest to one that can begin.
+//! Prepares a fit of the manifest: loads its inputs and plans it.
 
 use super::lights::Lights;
 use crate::{
@@ -21,12 +21,12 @@ pub(super) struct Prepared {
     pub(super) inputs: Value,
     pub(super) planner: FitPlanner,
     pub(super) warnings: Vec<String>,
-    /// Seconds that it took to read the inputs.
+    /// Seconds that reading the inputs took.
     pub(super) seconds: f64,
 }
 
 impl Prepared {
-    /// Reads the inputs of a fit and plans it, which checks all that a fit checks before it begins.
+    /// Reads the inputs of a fit and plans it. All checks of a fit are made here.
     pub(super) fn new(fit: &BatchFit, lights: &Lights, stage_two: StageTwo) -> anyhow::Result<Self> {
         let began = Instant::now();
         let mut encoded = None;
@@ -53,7 +53,7 @@ impl Prepared {
         Ok(Self { capture, method, exposure, inputs, planner, warnings, seconds })
     }
 
-    /// What may not change when the batch is resumed, by name.
+    /// The inputs and settings that may not change when the batch is resumed, by name.
     pub(super) fn identity(&self) -> anyhow::Result<Vec<(&'static str, String)>> {
         let (inputs, capture, method, exposure) = (&self.inputs, &*self.capture, &self.method, self.exposure);
         FitIdentity { inputs, capture, method, exposure, also_render: &[] }.parts()

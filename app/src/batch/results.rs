@@ -1,4 +1,4 @@
-//! The results of fits that have ended: written beside the run, so that it never waits for a disk.
+//! Writes the results of fits that have ended on other threads, so that the run does not wait for a disk.
 
 use super::{backlog::Backlog, board::Board, row::Scores};
 use crate::{
@@ -14,7 +14,7 @@ use std::sync::{
 };
 use tokio::sync::Notify;
 
-/// What a fit was made from.
+/// The inputs of a fit.
 #[derive(Debug)]
 pub(super) struct Inputs {
     pub(super) capture: Arc<Capture>,
@@ -25,7 +25,7 @@ pub(super) struct Inputs {
     pub(super) max_cssim: Option<f64>,
 }
 
-/// A fit that has ended, with all that its files need.
+/// A fit that has ended, with everything that its files need.
 #[derive(Debug)]
 pub(super) struct Fitted {
     pub(super) number: u32,
@@ -41,12 +41,12 @@ pub(super) struct Writers {
     board: Arc<Board>,
     out: OutFolder,
     out_name: String,
-    /// Every result that is being written holds a clone.
+    /// Each result that is being written holds a clone.
     open: Sender<()>,
-    /// Fits whose results were written since somebody asked.
+    /// Fits whose results were written since the last call of [`Writers::newly_safe`].
     safe: Arc<Mutex<Vec<u32>>>,
     backlog: Backlog,
-    /// Told whenever a fit is written.
+    /// Notified whenever the results of a fit are written.
     wake: Arc<Notify>,
 }
 
@@ -55,7 +55,7 @@ pub(super) struct Writers {
 pub(super) struct Written(Receiver<()>);
 
 impl Written {
-    /// Until everything is written. The [`Writers`] have to be dropped before.
+    /// Waits until everything is written. The [`Writers`] must be dropped first.
     pub(super) fn wait(self) {
         while self.0.recv().is_ok() {}
     }

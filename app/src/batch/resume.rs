@@ -1,4 +1,4 @@
-//! What an earlier run of a batch has left: the same batch or another one, and which fits are complete.
+//! Examines an earlier run of a batch: whether it is the same batch, and which fits are complete.
 
 use super::{check::Checked, row::Scores};
 use crate::{
@@ -12,7 +12,7 @@ use lookalike_coordinator::journal::{self, JOURNAL_FILE, RunIdentity};
 use serde_json::Value;
 use std::fs;
 
-/// What the run of these fits is a run of. Their order does not matter.
+/// The identity of a batch of these fits. Their order does not matter.
 pub(super) fn identity(fits: &[BatchFit], checks: &[Checked]) -> RunIdentity {
     fits.iter().zip(checks).fold(version(), |identity, (fit, checked)| {
         let parts = checked.identity.iter();
@@ -20,22 +20,21 @@ pub(super) fn identity(fits: &[BatchFit], checks: &[Checked]) -> RunIdentity {
     })
 }
 
-/// What an earlier run of a batch has left.
+/// The state of an earlier run of a batch.
 #[derive(Debug)]
 pub(super) struct Earlier {
     /// Whether there is nothing left to do.
     pub(super) is_finished: bool,
-    /// The scores of each fit whose files are all there as it wrote them, with its seconds.
+    /// For each fit whose files are all there as the run wrote them, its scores and its seconds.
     pub(super) complete: Vec<Option<(Scores, f64)>>,
-    /// What the user should know of it.
+    /// A remark for the user.
     pub(super) remark: Option<String>,
 }
 
-/// What the run in a folder has left, if there is one and it is resumed. Only files that its journal lists count as
-/// its results.
+/// The state of the run in a folder, if it is resumed. Only files that its journal lists count as its results.
 ///
 /// # Errors
-/// If the run there is one of other inputs or settings, or a result was changed.
+/// If that run has other inputs or settings, or a result was changed.
 pub(super) fn earlier(
     out: &OutFolder,
     out_name: &str,
@@ -67,7 +66,7 @@ pub(super) fn earlier(
     Ok(Earlier { is_finished, complete, remark })
 }
 
-/// The scores of a fit whose files are there, with its seconds.
+/// The scores and the seconds of a fit whose files are there.
 fn complete_fit(out: &OutFolder, fit: &BatchFit, files: &[(String, String)]) -> Option<(Scores, f64)> {
     let json: Value = serde_json::from_slice(&fs::read(out.file(&fit.name).join(MARK)).ok()?).ok()?;
     let (stage_two, polished) = (&json["stage_two"], &json["polished"]);
@@ -86,7 +85,7 @@ fn complete_fit(out: &OutFolder, fit: &BatchFit, files: &[(String, String)]) -> 
     Some((scores, json["timing"]["seconds"]["total"].as_f64()?))
 }
 
-/// The flat vector of parameters by name.
+/// The flat parameter vector from parameters by name.
 fn flat(model: &dyn Model, parameters: &Value) -> Option<Vec<f64>> {
     let mut flat = Vec::new();
     for parameter in model.parameters() {

@@ -1,4 +1,4 @@
-//! A fit of a batch: how far it is, and its scores.
+//! A fit of a batch: its state and its scores.
 
 use lookalike::brdf::Model;
 use lookalike_coordinator::journal::{PartRow, PartStatus};
@@ -11,27 +11,27 @@ pub(super) struct Row {
     pub(super) env: String,
     pub(super) model: &'static dyn Model,
     pub(super) state: State,
-    /// From its start to its end, so far as it has one.
+    /// From its start to its end; `None` before its end.
     pub(super) seconds: Option<f64>,
 }
 
-/// How far a fit is.
+/// The state of a fit.
 #[derive(Debug, Clone)]
 pub(super) enum State {
-    /// Its turn has not come.
+    /// It has not begun.
     Waiting,
-    /// Its nodes run, or its results are being written.
+    /// Its nodes are running, or its results are being written.
     Running,
-    /// Its results are there.
+    /// Its results are written.
     Done(Scores),
-    /// It has no results and gets none.
+    /// It failed and has no results.
     Failed(String),
-    /// The run ended before it did.
+    /// The run ended before the fit did.
     Stopped,
 }
 
 impl State {
-    /// In one word, as the summaries and the metrics have it.
+    /// The word for it in the summaries and the metrics.
     pub(super) fn name(&self) -> &'static str {
         match self {
             Self::Waiting => "waiting",
@@ -45,7 +45,7 @@ impl State {
 }
 
 impl Row {
-    /// As the journal has it.
+    /// Its row in the journal.
     pub(super) fn journal_row(&self, number: u32) -> PartRow {
         let (scores, error) = match &self.state {
             State::Done(scores) => (Some(scores), None),
@@ -63,17 +63,17 @@ impl Row {
     }
 }
 
-/// All words that [`State::name`] can say.
+/// All values of [`State::name`].
 pub(super) const STATES: [&str; 6] = ["waiting", "running", "done", "missed", "failed", "stopped"];
 
-/// What the summaries say of a fit with results.
+/// The part of a fit's results that the summaries show.
 #[derive(Debug, Clone)]
 pub(super) struct Scores {
     pub(super) cssim: f64,
     pub(super) cssim_object: f64,
-    /// Of the winner of stage two.
+    /// The gamma of the winner of stage two.
     pub(super) gamma: f64,
-    /// The flat vector that the fit ends with.
+    /// The final flat parameter vector.
     pub(super) parameters: Vec<f64>,
     pub(super) is_polished: bool,
     /// Whether the score lies above the fit's `max-cssim`.

@@ -16,7 +16,7 @@ const SCHEMA: &str = "lookalike.batch/1";
 /// The name of the summary for spreadsheets.
 pub(super) const CSV: &str = "summary.csv";
 
-/// All fits at a time.
+/// The state of all fits at one time.
 #[derive(Debug)]
 pub(super) struct Summary {
     pub(super) rows: Vec<Row>,
@@ -26,7 +26,7 @@ pub(super) struct Summary {
     pub(super) seconds: f64,
 }
 
-/// Writes both summaries, each in one piece.
+/// Writes both summaries, each atomically.
 pub(super) fn write(summary: &Summary, out: &OutFolder) -> anyhow::Result<()> {
     let text = serde_json::to_string_pretty(&summary.json()).context(BATCH_MARK)? + "\n";
     out.write(CSV, summary.csv().as_bytes())?;
@@ -95,7 +95,7 @@ impl Summary {
         all
     }
 
-    /// For people.
+    /// The table for the terminal.
     pub(super) fn table(&self) -> String {
         let header = ["fit", "state", "CSSIM", "on object", "gamma", "seconds"];
         let mut rows = vec![header.map(str::to_owned).to_vec()];
@@ -145,7 +145,7 @@ fn of_row(row: &Row) -> Value {
     object
 }
 
-/// A parameter of a fit by its flat name; empty where the fit has none.
+/// A parameter of a fit by its flat name; empty if its model has no such parameter.
 fn parameter(row: &Row, name: &str) -> String {
     let State::Done(scores) = &row.state else { return String::new() };
     let place = flat_names(row.model.parameters()).iter().position(|known| known == name);
@@ -156,7 +156,7 @@ fn milliseconds(seconds: f64) -> f64 {
     (seconds * 1000.0).round() / 1000.0
 }
 
-/// A text as a cell: in quotes where commas, quotes or line feeds would break the table.
+/// A text as a CSV cell: quoted if it contains commas, quotes or line feeds.
 fn quoted(text: &str) -> String {
     if text.contains([',', '"', '\n', '\r']) { format!("\"{}\"", text.replace('"', "\"\"")) } else { text.to_owned() }
 }

@@ -1,4 +1,4 @@
-//! Where the parts of the run come from, and where they go: the loader's fits in, results out.
+//! The parts of the run: takes fits from the loader, and hands ended ones to the writers of results.
 
 use super::{
     backlog::Load,
@@ -21,13 +21,13 @@ use lookalike::{
 use std::{collections::BTreeMap, sync::Arc};
 use tokio::sync::Notify;
 
-/// What a supply is made of.
+/// The parameters of a [`Supply`].
 #[derive(Debug)]
 pub(super) struct SupplyOptions {
     pub(super) fits: Arc<[BatchFit]>,
     /// The numbers of the fits that have no results yet, in order.
     pub(super) open: Arc<[u32]>,
-    /// One per fit.
+    /// One result per fit.
     pub(super) checks: Arc<[Checked]>,
     pub(super) lights: Arc<Lights>,
     pub(super) board: Arc<Board>,
@@ -36,7 +36,7 @@ pub(super) struct SupplyOptions {
     pub(super) is_fail_fast: bool,
     pub(super) out: OutFolder,
     pub(super) out_name: String,
-    /// Told whenever there may be more to begin.
+    /// Notified whenever there may be another fit to begin.
     pub(super) wake: Arc<Notify>,
 }
 
@@ -45,13 +45,13 @@ pub(super) struct SupplyOptions {
 pub(super) struct Supply {
     options: SupplyOptions,
     loader: Loader,
-    /// How many fits the loader has handed over.
+    /// How many fits the loader has delivered.
     taken: usize,
     active: BTreeMap<u32, Active>,
     writers: Writers,
 }
 
-/// What the results of a fit under way will need.
+/// Data of a running fit that its results will need.
 #[derive(Debug)]
 struct Active {
     inputs: Inputs,
@@ -59,7 +59,7 @@ struct Active {
 }
 
 impl Supply {
-    /// The supply, and the end that waits until all results are written, which the supply has to be dropped for.
+    /// The supply, and a handle that waits until all results are written. The supply must be dropped before that wait.
     pub(super) fn new(options: SupplyOptions) -> anyhow::Result<(Self, Written)> {
         let loader = Loader::start(Shelf {
             fits: Arc::clone(&options.fits),
@@ -78,7 +78,7 @@ impl Supply {
         Ok((Self { options, loader, taken: 0, active: BTreeMap::new(), writers }, written))
     }
 
-    /// The part of a fit whose inputs are there; none if they are not usable any more.
+    /// The part of a loaded fit; `None` if its inputs have become unusable.
     fn begin(&mut self, (number, loaded): Loaded) -> Result<Option<Part<FitPlanner>>, PlanError> {
         self.taken += 1;
         let fit = &self.options.fits[number as usize];
@@ -108,7 +108,7 @@ impl Supply {
         self.check_failures()
     }
 
-    /// With `--fail-fast`, the error that ends the run once a fit has failed, wherever that was.
+    /// With `--fail-fast`, the error that ends the run once any fit has failed.
     fn check_failures(&self) -> Result<(), PlanError> {
         if self.options.is_fail_fast && self.options.board.stop_if_failed() {
             return Err(PlanError::new("a fit failed, and --fail-fast ends the batch then"));
@@ -123,7 +123,7 @@ impl Parts for Supply {
     fn next(&mut self, wait: bool) -> Result<Next<FitPlanner>, PlanError> {
         loop {
             if wait {
-                // Nothing else is under way, but what is being written takes its room.
+                // No other fit is running, but fits that are being written take memory.
                 self.writers.backlog().wait_until(|load| self.has_room(load, 0));
             }
             self.check_failures()?;
@@ -135,7 +135,7 @@ impl Parts for Supply {
                     }
                 }
                 Err(true) if self.taken < self.options.open.len() => {
-                    return Err(PlanError::new("the thread that reads the inputs is gone: please report this"));
+                    return Err(PlanError::new("the thread that reads inputs ended too early; please report this"));
                 }
                 Err(true) => return Ok(Next::End),
                 Err(false) => return Ok(Next::NotYet),
@@ -183,7 +183,7 @@ mod tests {
     use lookalike_coordinator::journal::PartLedger;
     use serde_json::Value;
 
-    /// A supply whose next fit has so many pixels, for one worker of one thread.
+    /// A supply whose next fit has this many pixels, for one worker of one thread.
     fn supply(out: &OutFolder, pixels: usize) -> Supply {
         let watchers =
             Watchers { display: display_of_many(ProgressKind::None, 0), metrics: None, ledger: PartLedger::default() };

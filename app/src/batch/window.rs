@@ -1,4 +1,4 @@
-//! How many fits are under way at a time: enough to keep all workers busy, few enough for memory.
+//! How many fits run at a time: enough to keep all workers busy, few enough for memory.
 
 use super::backlog::Load;
 use crate::settings::StageTwo;
@@ -12,7 +12,7 @@ use std::{
     },
 };
 
-/// How many nodes the workers can run at a time. One side counts them, the other asks.
+/// How many nodes the workers can run at a time, updated by the run's events and read by [`Window`].
 #[derive(Debug)]
 pub(super) struct Demand {
     threads: AtomicUsize,
@@ -21,12 +21,12 @@ pub(super) struct Demand {
 }
 
 impl Demand {
-    /// At first, the workers that will come are taken for one thread each.
+    /// Before workers join, each expected worker counts as one thread.
     pub(super) fn expecting(workers: usize) -> Self {
         Self { threads: AtomicUsize::new(workers), workers: Mutex::default(), expected: workers }
     }
 
-    /// Takes note of workers that come and go.
+    /// Counts workers that join and leave.
     pub(super) fn note(&self, event: &RunEvent) {
         let mut workers = self.workers.lock().unwrap_or_else(PoisonError::into_inner);
         match event {
@@ -43,14 +43,14 @@ impl Demand {
     }
 }
 
-/// Nodes that shall be ready for each thread of the workers: one that it runs and one that it runs next.
+/// Nodes that should be ready for each thread of the workers: one to run now and one to run next.
 const READY_PER_THREAD: usize = 2;
 
-/// What fits under way may take together, in bytes, unless one alone takes more (1 GiB).
+/// The most bytes that running fits may take together (1 GiB), unless a single fit takes more.
 const MOST_BYTES: usize = 1 << 30;
 
-/// Bytes that a fit takes per pixel of its photo: photo, coverage and view, and of a full-resolution table what is usual. Tables of
-/// materials whose candidates differ much in width take up to three times that.
+/// Bytes that a fit takes per pixel of its photo: photo, coverage, view, and a full-resolution table of typical size. If the
+/// widths of a material's candidates differ much, its tables take up to three times as much.
 const BYTES_PER_PIXEL: usize = 400;
 
 /// Decides whether another fit begins.
@@ -67,10 +67,11 @@ impl Window {
         Self { demand, stage_two, cores: rayon::current_num_threads() }
     }
 
-    /// Whether another fit of so many pixels should begin beside those that are in memory, with `ready` nodes for the workers.
+    /// Whether another fit with this many pixels should begin beside those that are in memory, with `ready` nodes for the
+    /// workers.
     pub(super) fn has_room(&self, there: Load, ready: usize, pixels: usize) -> bool {
         let threads = self.demand.threads();
-        // Polish occupies one thread per fit: of the workers, or here, where fits would only queue up for it.
+        // Polish occupies one thread per fit. If it runs in this process, more fits would only wait for its threads.
         let most_active = match self.stage_two {
             StageTwo::Workers => 2 * threads,
             StageTwo::Coordinator => self.cores + threads.div_ceil(4) + 1,

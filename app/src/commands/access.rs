@@ -1,4 +1,4 @@
-//! `lookalike access new`: an access file before the runs it is for.
+//! `lookalike access new`: makes an access file before the runs that use it.
 
 use crate::settings::AccessSettings;
 use lookalike_coordinator::access::{Credentials, key_path};

@@ -93,8 +93,8 @@ fn check_sizes(settings: &CompareSettings, reference: &LoadedPhoto, image: &Load
     Err(MetricError::SizeMismatch { expected, found }).context(pair)
 }
 
-/// Display values are decoded to linear light, and the exposure applies to them as to radiance; where that is likely to
-/// mislead, it is said.
+/// A warning if display values are likely to be compared with radiance by mistake: they are decoded to linear light, and the
+/// exposure applies to them as to radiance.
 fn mixed_encodings(reference: &LoadedPhoto, image: &LoadedPhoto, exposure: f64) -> Option<String> {
     let is_display = |photo: &LoadedPhoto| photo.encoding == Encoding::Srgb;
     let made_at = |photo: &LoadedPhoto| {
@@ -145,8 +145,8 @@ fn write_map(path: &Path, map: &ErrorMap, settings: &CompareSettings) -> anyhow:
     Ok(())
 }
 
-/// The smallest of 0.1, 0.2, 0.5, 1 and 2 that no window exceeds (2 if none). Below 0.1 nothing is visible, and a map of noise
-/// should not look alarming.
+/// The smallest of 0.1, 0.2, 0.5, 1 and 2 that no window exceeds; 2 if there is none. A difference below 0.1 is invisible, so a
+/// smaller scale would exaggerate noise.
 fn full_scale(map: &ErrorMap) -> f64 {
     let largest = map.error.iter().copied().fold(0.0, f64::max);
     [0.1, 0.2, 0.5, 1.0].into_iter().find(|&scale| largest <= scale).unwrap_or(2.0)

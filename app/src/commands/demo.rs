@@ -1,4 +1,4 @@
-//! `lookalike demo`: the whole program at work on a scene that it makes itself.
+//! `lookalike demo`: fits a scene that the program generates itself.
 
 use crate::{
     demo::{environment, material, photo},
@@ -22,9 +22,9 @@ use std::{process::ExitCode, sync::Arc, time::Instant};
 const SIZE: usize = 192;
 /// Rows of the environment map.
 const MAP_ROWS: usize = 256;
-/// What the demo writes beside the files of its fit.
+/// The files that the demo writes in addition to those of its fit.
 const FILES: [&str; 4] = ["photo.exr", "environment.exr", "environment.png", "strip.png"];
-/// The gammas that the strip shows beside the winner.
+/// The gammas whose candidates the strip shows in addition to the winner.
 const SHOWN: [f64; 3] = [1.0, 2.0, 3.0];
 
 pub(crate) fn run(settings: DemoSettings) -> anyhow::Result<ExitCode> {
@@ -59,7 +59,7 @@ pub(crate) fn run(settings: DemoSettings) -> anyhow::Result<ExitCode> {
         resume: false,
         input_seconds: began.elapsed().as_secs_f64(),
     };
-    let finished = fit::run(job)?.context("a fit that nobody has made is finished: please report this")?;
+    let finished = fit::run(job)?.context("the demo's run was finished before it began; please report this")?;
     let picture = picture(&finished.outcome, &finished.pictures);
     out.write("strip.png", &png::write(&picture, &[]).context("strip.png")?)?;
     print_result(&format!(
@@ -70,7 +70,7 @@ pub(crate) fn run(settings: DemoSettings) -> anyhow::Result<ExitCode> {
     Ok(finished.code)
 }
 
-/// An input that the demo made, as `fit.json` names it.
+/// A generated input, as `fit.json` describes it.
 fn generated(path: &str, image: &Image) -> Value {
     json!({ "path": path, "blake3": content_hash(image).to_hex().to_string(), "generated": true })
 }
@@ -82,7 +82,7 @@ fn write_scene(out: &OutFolder, photo: &Image, map: &Image) -> anyhow::Result<()
     out.write("environment.png", &png::write(map, &about).context("environment.png")?)
 }
 
-/// Photo, fits at a few gammas, winner, polished, difference.
+/// The strip: photo, candidates of a few gammas, winner, polished match, difference.
 fn picture(outcome: &FitOutcome, pictures: &Pictures) -> Image {
     let winner = &outcome.judged[outcome.winner];
     let score = |gamma: f64| outcome.judged.iter().find(|j| j.candidate.gamma == gamma).map_or(f64::NAN, |j| j.cssim);

@@ -10,7 +10,7 @@ use std::{process::ExitCode, sync::Arc, time::Instant};
 
 pub(crate) fn run(settings: FitSettings) -> anyhow::Result<ExitCode> {
     let began = Instant::now();
-    // Whatever can fail fails before any work is done.
+    // Check for errors before any work is done.
     let folder = ClaimedFolder::take(&claim(&settings))?;
     let loaded = load_capture(&settings.capture)?;
     show_warnings(&loaded.warnings);
@@ -35,7 +35,7 @@ pub(crate) fn run(settings: FitSettings) -> anyhow::Result<ExitCode> {
     Ok(fit::run(job)?.map_or(ExitCode::SUCCESS, |finished| finished.code))
 }
 
-/// What the fit asks of its folder.
+/// The files that the fit reads and writes.
 fn claim(settings: &FitSettings) -> Claim<'_> {
     let mut inputs = settings.capture.files();
     inputs.extend(settings.display_exposure.file());

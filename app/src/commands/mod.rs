@@ -1,5 +1,4 @@
-//! The commands: what each does with its settings. They return the exit code of a run that was carried out; errors are
-//! reported by the command line.
+//! The commands. Each takes its settings and returns the exit code of a completed run; the command line reports errors.
 
 pub(crate) mod access;
 pub(crate) mod batch;

@@ -3,7 +3,7 @@
 use anyhow::{Context, anyhow, bail};
 use std::{fs, io::ErrorKind, path::Path};
 
-/// Fails early when a file could not be written in the end, before the work that fills it.
+/// Checks whether a file can be written, before the work whose result it will hold.
 pub(crate) fn check_writable(path: &Path) -> anyhow::Result<()> {
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let writable = || {

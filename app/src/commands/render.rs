@@ -67,7 +67,7 @@ fn shape(settings: &RenderSettings) -> anyhow::Result<LoadedGeometry> {
     }
 }
 
-/// Renders under a bar of rows on stderr; where none can be drawn, with a line now and then.
+/// Renders with a progress bar of rows on stderr, or with occasional lines where no bar can be drawn.
 fn with_progress(shot: &Shot<'_>) -> Rendering {
     let rows = ProgressBar::new(shot.geometry.height() as u64);
     if let Ok(style) = ProgressStyle::with_template("rendering {wide_bar} {pos}/{len} rows, {eta} left") {
@@ -76,7 +76,7 @@ fn with_progress(shot: &Shot<'_>) -> Rendering {
     let told = Mutex::new(Instant::now());
     let rendering = shot.render(|| {
         rows.inc(1);
-        // A row that finds another one at it leaves the line to that one.
+        // Skip the line if another thread is printing one.
         if let (true, Ok(mut told)) = (rows.is_hidden(), told.try_lock())
             && told.elapsed() >= PAUSE
         {
@@ -88,7 +88,7 @@ fn with_progress(shot: &Shot<'_>) -> Rendering {
     rendering
 }
 
-/// What was made, for people.
+/// Prints a summary of the rendering on stderr.
 fn tell(settings: &RenderSettings, light: &LoadedEnvironment, rendering: &Rendering, exposure: Option<f64>) {
     let Rgb { x: r, y: g, z: b } = rendering.mean_radiance;
     eprintln!("light: {} ({})", light.source.path.display(), light.mapping);
@@ -111,8 +111,8 @@ fn tell(settings: &RenderSettings, light: &LoadedEnvironment, rendering: &Render
     eprintln!("wrote {}", settings.out.display());
 }
 
-/// Between two lines.
+/// The time between two lines.
 const PAUSE: Duration = Duration::from_secs(10);
 
-/// What the image writers and readers take.
+/// The largest width or height that the image writers and readers support.
 const LARGEST_PX: usize = 1 << 14;

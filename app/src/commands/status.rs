@@ -1,4 +1,4 @@
-//! `lookalike status`: the state of a run, from its journal, without disturbing it.
+//! `lookalike status`: shows the state of a run from its journal, without disturbing the run.
 
 use crate::{outputs::print_result, settings::StatusSettings};
 use anyhow::Context;
@@ -8,7 +8,7 @@ use lookalike_coordinator::journal::{
 };
 use std::{process::ExitCode, time::Duration};
 
-/// The most fits that are listed, and the states that come first where there are more.
+/// The most fits that are listed. If there are more, fits in these states come first.
 const MOST_FITS: usize = 40;
 const FIRST_STATES: [&str; 3] = ["running", "failed", "missed"];
 
@@ -26,7 +26,7 @@ pub(crate) fn run(settings: &StatusSettings) -> anyhow::Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// The status for people.
+/// The status as text.
 fn table(status: &Status, folder: &str) -> String {
     let mut text = format!("{folder}: {}\n\n", headline(status));
     let mut line = |name: &str, value: String| text.push_str(&format!("{name:<12}{value}\n"));
@@ -51,13 +51,13 @@ fn table(status: &Status, folder: &str) -> String {
     for failure in &status.failures {
         text.push_str(&format!("\nfailed: {} {:?}: {}\n", failure.kind, failure.label, failure.error));
     }
-    let why = status.error.as_deref().unwrap_or("it does not say why");
+    let why = status.error.as_deref().unwrap_or("no reason is recorded");
     match status.state {
         RunState::Stopped => {
-            text.push_str(&format!("\nstopped: {why}\ngo on with it: the same command with --resume\n"));
+            text.push_str(&format!("\nstopped: {why}\nresume it: the same command with --resume\n"));
         }
         RunState::Ended => {
-            text.push_str(&format!("\nended: {why}\ntry what failed again: the same command with --resume\n"));
+            text.push_str(&format!("\nended: {why}\nretry what failed: the same command with --resume\n"));
         }
         RunState::Running | RunState::Finished => {}
     }
@@ -76,7 +76,7 @@ fn fit_count(fits: &[PartStatus]) -> String {
     text
 }
 
-/// A line per fit. Of many, those first that somebody may want to look at.
+/// One line per fit. If there are too many, failed and unusual ones come first.
 fn fits(all: &[PartStatus]) -> String {
     if all.is_empty() {
         return String::new();
@@ -99,7 +99,7 @@ fn fits(all: &[PartStatus]) -> String {
     }
     match all.len() - shown.len() {
         0 => {}
-        more => text.push_str(&format!("and {more} more fits (--json has them all)\n")),
+        more => text.push_str(&format!("and {more} more fits (--json lists them all)\n")),
     }
     text
 }
@@ -157,12 +157,12 @@ fn workers(status: &Status) -> String {
     }
     match status.workers.len().saturating_sub(MOST_WORKERS) {
         0 => {}
-        more => text.push_str(&format!("and {more} more workers (--json has them all)\n")),
+        more => text.push_str(&format!("and {more} more workers (--json lists them all)\n")),
     }
     text
 }
 
-/// `2026-11-22 09:20:11 UTC` of an instant in RFC 3339.
+/// Formats an RFC 3339 time as `2026-11-22 09:20:11 UTC`.
 fn short(instant: &str) -> String {
     match (instant.get(..10), instant.get(11..19)) {
         (Some(day), Some(time)) => format!("{day} {time} UTC"),
@@ -222,7 +222,7 @@ search       21        1        4        3        1
 failed: search \"gamma 1\": black
 
 stopped: interrupted
-go on with it: the same command with --resume
+resume it: the same command with --resume
 ";
         assert_eq!(table(&status, "run"), expected);
         assert_eq!([1, 2, 3, 11, 22, 112].map(ordinal), ["1st", "2nd", "3rd", "11th", "22nd", "112th"]);

@@ -1,4 +1,4 @@
-//! A run as a job of Slurm: what is submitted, and what the user is told.
+//! Submits a run as a Slurm job.
 
 use crate::{
     outputs::print_result,
@@ -8,7 +8,7 @@ use crate::{
 use anyhow::Context;
 use std::{env, path, path::Path, process::ExitCode};
 
-/// Submits a run whose results go to the folder `out`. What `check` finds wrong is told now, and not when the job's turn comes.
+/// Submits a run whose results go to the folder `out`. The problems that `check` finds are reported before the job is queued.
 pub(crate) fn submit(
     job: JobSettings,
     out: &Path,
@@ -16,8 +16,8 @@ pub(crate) fn submit(
 ) -> anyhow::Result<ExitCode> {
     let job = SlurmJob {
         command: command_line(&job.typed)?,
-        program: env::current_exe().context("the system does not tell where this program is")?,
-        folder: env::current_dir().context("the current folder cannot be told")?,
+        program: env::current_exe().context("cannot find the path of this program")?,
+        folder: env::current_dir().context("cannot find the current folder")?,
         options: job.options,
         out: path::absolute(out).context("--out")?,
     };
@@ -25,8 +25,8 @@ pub(crate) fn submit(
     check()?;
     if job.options.is_empty() {
         eprintln!(
-            "note: no options of sbatch behind a lone --, such as -- --nodes=4 --cpus-per-task=16: the job gets what the \
-             cluster gives by itself, often one CPU"
+            "note: no options for sbatch after a lone --, such as -- --nodes=4 --cpus-per-task=16: the job gets the cluster's \
+             defaults, often one CPU"
         );
     }
     let submitted = job.submit("sbatch")?;

@@ -1,4 +1,4 @@
-//! `lookalike worker`: the same as `lookalike-worker`.
+//! `lookalike worker`: an alias of `lookalike-worker`.
 
 use lookalike::nodes;
 use lookalike_worker::{Arguments, run_and_report};

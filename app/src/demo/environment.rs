@@ -1,8 +1,8 @@
 //! The light of the bundled scene: a garden pavilion on a sunny morning, as a lat-long map.
 //!
-//! The observer stands in a room that is open to a terrace on +Z; windows glow on -X, a panel and a doorway are on +X.
-//! Indoors is the module `pavilion`; this file has what lies outside it, and the map. It is a picture to look at in a mirror
-//! sphere, not a solution of light transport.
+//! The observer stands in a room that opens to a terrace on +Z; windows are on -X, a panel and a doorway on +X. The module
+//! `pavilion` holds the room; this file holds the surroundings and the map. The radiance is made up to look plausible in a
+//! mirror sphere; it is not a solution of light transport.
 
 use super::{
     pavilion,
@@ -40,13 +40,13 @@ pub fn lat_long(height: usize) -> Image {
     Image::from_pixels(width, height, (0..width * height).into_par_iter().map(texel).collect())
 }
 
-/// Radiance that arrives from a unit direction.
+/// Radiance from a unit direction.
 #[must_use]
 pub fn radiance(direction: Vec3) -> Rgb {
     pavilion::radiance(direction).unwrap_or_else(|| outdoors(direction))
 }
 
-/// What is seen where the pavilion does not stand in the way.
+/// Radiance from outside the pavilion.
 fn outdoors(d: Vec3) -> Rgb {
     let elevation = FRAC_PI_2 - acos(d.y);
     let azimuth = atan2(d.x, d.z);
@@ -109,10 +109,10 @@ fn cypress(azimuth: f64, elevation: f64) -> Option<Rgb> {
 
 /// Points along each side of a texel.
 const POINTS: usize = 6;
-/// Radians: three texels across at 512 x 256, a third of that its soft edge.
+/// In radians: the sun is three texels wide at 512 x 256, and a third of that is its soft edge.
 const SUN_RADIUS: f64 = 0.020;
 const SUN_EDGE: f64 = 0.006;
-/// About 300 times the sky beside it.
+/// About 300 times the radiance of the sky beside it.
 const SUN: Rgb = Rgb::new(420.0, 345.0, 235.0);
 const ZENITH: Rgb = Rgb::new(0.22, 0.46, 1.05);
 const HORIZON: Rgb = Rgb::new(1.25, 1.30, 1.32);
@@ -159,7 +159,7 @@ mod tests {
             };
             (0..map.pixels().len()).map(weighted).sum::<f64>() * PI * PI / (map.pixels().len() as f64)
         };
-        // The sun, a third of a texel at 32 rows, is resolved by 6 x 6 points to a few per cent of the light.
+        // At 32 rows the sun is a third of a texel wide; 6 x 6 points resolve its light to a few per cent.
         let (coarse, fine) = (mean(32), mean(128));
         assert!((coarse / fine - 1.0).abs() < 0.05, "{coarse} {fine}");
     }

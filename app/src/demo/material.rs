@@ -8,8 +8,8 @@
 //! with D and V of design section 4, F Schlick's Fresnel term and F5(c) = (1 - c)^5. The last factor brightens the
 //! material towards the light, as rough pigments do. Every factor is symmetric in l and v, so f is reciprocal.
 //!
-//! Energy: the coat reflects at most F; what passes it reaches a base whose albedo is below 1 for these constants, and
-//! T is paid on the way in and on the way out (a test integrates the whole: at most 0.69).
+//! Energy: the coat reflects at most F. The transmitted light reaches a base whose albedo is below 1 for these constants, and
+//! is attenuated by T on the way in and on the way out (a test integrates the whole: at most 0.69).
 
 use lookalike::{
     brdf::Reflectance,
@@ -17,7 +17,7 @@ use lookalike::{
 };
 use std::f64::consts::PI;
 
-/// What the material is, in one line.
+/// A description of the material in one line.
 pub const DESCRIPTION: &str = "pearl paint under lacquer: two GGX lobes, a clear coat, a retro-reflective diffuse part";
 
 /// The material as something to render.
@@ -34,8 +34,8 @@ impl Reflectance for Target {
     }
 }
 
-/// The BRDF in 1/sr, without the cosine, for unit directions that point away from the surface, in the frame whose +Z
-/// is the normal. Zero where either lies at or below the surface.
+/// The BRDF in 1/sr, without the cosine, for unit directions that point away from the surface, in the frame whose +Z is the
+/// normal. Zero if either direction lies at or below the surface.
 #[must_use]
 pub fn eval(wi_local: Vec3, wo_local: Vec3) -> Rgb {
     let (cos_i, cos_o) = (wi_local.z, wo_local.z);
@@ -59,7 +59,7 @@ struct Pigment {
     f0: Rgb,
 }
 
-/// The coloured diffuse part with its rise towards the light.
+/// The coloured diffuse part, with its retro-reflection.
 fn diffuse(cos_i: f64, cos_o: f64, cos_between: f64) -> Rgb {
     let towards = (0.5 * (1.0 + cos_between)).max(0.0);
     let squared = towards * towards;
@@ -85,7 +85,7 @@ fn fresnel(f0: Rgb, cos: f64) -> Rgb {
 const COAT_ALPHA: f64 = 0.03;
 /// Lacquer of refractive index 1.5.
 const COAT_F0: Rgb = Rgb::splat(0.04);
-/// A narrow golden lobe of flakes and a broad one, magenta.
+/// A narrow golden lobe (flakes) and a broad magenta one.
 const PIGMENT: [Pigment; 2] = [
     Pigment { weight: 0.40, alpha: 0.07, f0: Rgb::new(0.80, 0.46, 0.17) },
     Pigment { weight: 0.50, alpha: 0.40, f0: Rgb::new(0.34, 0.07, 0.13) },
@@ -110,7 +110,7 @@ mod tests {
 
     #[test]
     fn the_material_is_reciprocal_and_not_negative() {
-        // The products are formed in another order: a few roundings of the value.
+        // The products are formed in a different order, so the values differ by a few roundings.
         const TOLERANCE: f64 = 1e-13;
         let stream = PointStream::new(1);
         for i in 0..2000 {
@@ -126,7 +126,7 @@ mod tests {
 
     #[test]
     fn no_direction_reflects_more_than_arrives() {
-        // One sample in three from the diffuse density, the coat's lobe and the broad lobe each; balance heuristic.
+        // One third of the samples each from the diffuse density, the coat's lobe and the broad lobe; balance heuristic.
         let n = 30_000;
         for cos_o in [1.0, 0.9, 0.7, 0.5, 0.3, 0.15, 0.05, 0.01] {
             let (wo, stream) = (direction(cos_o, 0.4), PointStream::new(2));

@@ -1,5 +1,5 @@
-//! The bundled scene: a light and a material, both closed formulas, so that the demo needs no files and every machine
-//! makes the same bits.
+//! The bundled scene: a light and a material in closed form, so that the demo needs no files and gives the same bits on every
+//! machine.
 //!
 //! Radiance is linear Rec. 709; directions are those of the conventions: +Y up, the camera on +Z.
 

@@ -8,10 +8,10 @@ use lookalike::math::{
 };
 use std::f64::consts::PI;
 
-/// Height of the floor below the observer's eye.
+/// Y of the floor, relative to the observer's eye.
 pub(super) const FLOOR: f64 = -1.2;
 
-/// Radiance of the room in a unit direction; none where the direction leaves through the opening.
+/// Radiance of the room from a unit direction; `None` if the direction passes through the opening.
 pub(super) fn radiance(d: Vec3) -> Option<Rgb> {
     let far = |component: f64, low: f64, high: f64| if component > 0.0 { high / component } else { low / component };
     let to = Vec3::new(far(d.x, LOW.x, HIGH.x), far(d.y, LOW.y, HIGH.y), far(d.z, LOW.z, HIGH.z));
@@ -26,7 +26,7 @@ pub(super) fn radiance(d: Vec3) -> Option<Rgb> {
     if d.z < 0.0 { Some(back_wall(p)) } else { front_wall(p) }
 }
 
-/// Stone tiles, light and dark in turn, each of its own tone.
+/// Light and dark stone tiles in a checkerboard, each of a slightly different tone.
 fn floor(p: Vec3) -> Rgb {
     let (column, row) = ((p.x / TILE).floor(), (p.z / TILE).floor());
     let (x, z) = (p.x / TILE - column, p.z / TILE - row);
@@ -38,7 +38,7 @@ fn floor(p: Vec3) -> Rgb {
     lit(p, Vec3::Y, albedo)
 }
 
-/// White boards under dark beams that run across the room.
+/// White boards and, across the room, dark beams.
 fn ceiling(p: Vec3) -> Rgb {
     let along = p.z / 1.15 - (p.z / 1.15).floor();
     let albedo = if along < 0.24 { Rgb::new(0.17, 0.10, 0.06) } else { Rgb::new(0.80, 0.76, 0.70) };
@@ -98,7 +98,7 @@ fn front_wall(p: Vec3) -> Option<Rgb> {
     }
     let across = COLUMNS.iter().map(|x| (p.x - x) / COLUMN_RADIUS).find(|x| x.abs() < 1.0);
     match across {
-        // Round columns against the light: bright towards the windows, dark in the middle.
+        // Backlit round columns: bright towards the windows, dark in the middle.
         Some(x) if p.y < OPENING_TOP => Some(Rgb::new(0.75, 0.70, 0.62) * (0.16 + 0.5 * smooth_step(0.1, -1.0, x))),
         _ => Some(lit(p, Vec3::NEG_Z, PLASTER)),
     }
@@ -108,7 +108,7 @@ fn in_opening(x: f64, y: f64) -> bool {
     x.abs() < OPENING_HALF_WIDTH && y < OPENING_TOP && COLUMNS.iter().all(|c| (x - c).abs() >= COLUMN_RADIUS)
 }
 
-/// A diffuse surface at `p` with its normal into the room, under light from the opening, the windows and the sun.
+/// Radiance of a diffuse surface at `p`, lit by the opening, the windows and the sun; `normal` points into the room.
 fn lit(p: Vec3, normal: Vec3, albedo: Rgb) -> Rgb {
     let opening = Vec3::new(0.0, 0.5 * (FLOOR + OPENING_TOP), HIGH.z);
     let mut light = AMBIENT + OPENING_LIGHT * disc_factor(p, normal, opening, Vec3::NEG_Z, 14.0);
@@ -125,7 +125,7 @@ fn lit(p: Vec3, normal: Vec3, albedo: Rgb) -> Rgb {
     albedo * light * corner_shade(p)
 }
 
-/// The share of a point's hemisphere that a facing disc of that area fills, cosine-weighted and approximate.
+/// The approximate form factor at `p` of a disc of this area (cosine-weighted).
 fn disc_factor(p: Vec3, normal: Vec3, center: Vec3, facing: Vec3, area: f64) -> f64 {
     let to = center - p;
     let squared = to.length_squared();
@@ -137,7 +137,7 @@ fn disc_factor(p: Vec3, normal: Vec3, center: Vec3, facing: Vec3, area: f64) -> 
 fn corner_shade(p: Vec3) -> f64 {
     let near = |x: f64, low: f64, high: f64| {
         let distance = (x - low).min(high - x).max(0.0);
-        // The wall that the point lies on is not a corner.
+        // The wall on which the point lies does not count.
         if distance < 1e-9 { 1.0 } else { 1.0 - 0.45 * exp(-distance / 0.3) }
     };
     near(p.x, LOW.x, HIGH.x) * near(p.y, LOW.y, HIGH.y) * near(p.z, LOW.z, HIGH.z)
@@ -159,5 +159,5 @@ const COLUMNS: [f64; 2] = [-1.15, 1.15];
 const COLUMN_RADIUS: f64 = 0.13;
 const AMBIENT: Rgb = Rgb::new(0.20, 0.19, 0.18);
 const OPENING_LIGHT: Rgb = Rgb::new(1.5, 1.5, 1.5);
-/// Radiance that the sun adds to a white surface facing it: stronger than its map value gives, for the picture's sake.
+/// Radiance that the sun adds to a white surface facing it: more than its radiance in the map gives, because that looks better.
 const SUNLIGHT: Rgb = Rgb::new(3.4, 2.8, 1.9);

@@ -1,7 +1,7 @@
 //! The demo's "photograph": the target material under the demo's light, with noise like that of a camera.
 //!
-//! The light is integrated by the adaptive cut of the transport tables, but the material is evaluated as it is, direction by
-//! direction: no table, no basis lobes, no interpolation over widths. One position stands for each pixel.
+//! The light is integrated by the adaptive cut of the transport tables, but the material is evaluated exactly for each
+//! direction: no table, no basis lobes, no interpolation over widths. Each pixel is evaluated at one position.
 
 use super::material::Target;
 use lookalike::{
@@ -25,14 +25,14 @@ use lookalike::{
 use rayon::prelude::*;
 use std::f64::consts::TAU;
 
-/// Largest error of a node of the light, in units of the mean radiance, for a lobe that reflects everything.
+/// Largest error of a node of the light, in units of the mean radiance, for a lobe of albedo 1.
 const TOLERANCE: f64 = 3e-4;
 /// Camera noise: photon noise at mean radiance, and read noise, as shares of the mean radiance.
 const PHOTON_NOISE: f64 = 0.004;
 const READ_NOISE: f64 = 0.001;
 const SEED: u64 = 2020;
 
-/// Takes the photo: linear, multiplied by coverage at the silhouette, black outside. The same bits on every machine.
+/// Renders the photo: linear, multiplied by coverage at the silhouette, black outside. Every machine gives the same bits.
 #[must_use]
 pub fn take(geometry: &Geometry, light: &Environment) -> Image {
     let pyramid = LightPyramid::new(light.clone());
@@ -50,7 +50,7 @@ pub fn take(geometry: &Geometry, light: &Environment) -> Image {
     Image::from_pixels(width, height, noisy.collect())
 }
 
-/// Radiance at the middle of a pixel, or at the first of a few positions that see the object.
+/// Radiance at the centre of a pixel or, if that misses the object, at the first of a few positions that hit it.
 fn radiance_at(geometry: &Geometry, pyramid: &LightPyramid, column: usize, row: usize, cut: &mut Cut) -> Rgb {
     let positions = [(0.5, 0.5), (0.2, 0.2), (0.8, 0.2), (0.2, 0.8), (0.8, 0.8)];
     let see = |(x, y)| geometry.point(column as f64 + x, row as f64 + y);
@@ -81,7 +81,7 @@ fn with_noise(radiance: Rgb, mean: f64, pixel: u64) -> Rgb {
     Rgb::new(channel(0), channel(1), channel(2))
 }
 
-/// A normally distributed number (Box & Muller 1958), a pure function of the key.
+/// A normally distributed number (Box & Muller 1958). A pure function of the key.
 fn gaussian(key: u64) -> f64 {
     let radius = (-2.0 * ln(1.0 - uniform(key))).sqrt();
     radius * sin_cos(TAU * uniform(key ^ 0x5555_5555_5555_5555)).1
@@ -97,7 +97,7 @@ mod tests {
         let values: Vec<f64> = (0..n).map(|i| gaussian(key(&[7, i]))).collect();
         let mean = values.iter().sum::<f64>() / n as f64;
         let variance = values.iter().map(|v| (v - mean) * (v - mean)).sum::<f64>() / n as f64;
-        // Standard errors 0.007 and 0.01; five of them.
+        // The standard errors are 0.007 and 0.01; the bounds are five of them.
         assert!(mean.abs() < 0.035 && (variance - 1.0).abs() < 0.05, "{mean} {variance}");
     }
 }

@@ -1,4 +1,4 @@
-//! Where the sun of the bundled scene stands, and soft edges: what the garden and the room share.
+//! The position of the sun, and the soft edge that the garden and the room both use.
 
 use lookalike::math::{Vec3, elementary::sin_cos};
 

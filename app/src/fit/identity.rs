@@ -1,4 +1,4 @@
-//! The identity of a fit: what may not change when its run is resumed.
+//! The identity of a fit: the inputs and settings that may not change when its run is resumed.
 
 use anyhow::Context;
 use lookalike::{
@@ -8,32 +8,32 @@ use lookalike::{
 use lookalike_coordinator::journal::RunIdentity;
 use serde_json::Value;
 
-/// Everything that shapes the result of a fit.
+/// Everything that determines the result of a fit.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct FitIdentity<'a> {
     /// The `inputs` of `fit.json`.
     pub(crate) inputs: &'a Value,
     pub(crate) capture: &'a Capture,
     pub(crate) method: &'a Method,
-    /// Exposure before the metric.
+    /// The exposure that is applied before the metric.
     pub(crate) exposure: f64,
-    /// Gammas whose candidates are rendered as well.
+    /// Additional gammas whose candidates are rendered.
     pub(crate) also_render: &'a [f64],
 }
 
 impl FitIdentity<'_> {
-    /// As the identity of a run of this fit alone.
+    /// The identity of a run that consists of this fit alone.
     pub(crate) fn of_run(&self) -> anyhow::Result<RunIdentity> {
         Ok(self.parts()?.into_iter().fold(version(), |identity, (name, value)| identity.with(name, value)))
     }
 
-    /// The inputs, by content, and the method. Names are those of the command line.
+    /// The inputs, by content, and the method, by the names of the command line.
     pub(crate) fn parts(&self) -> anyhow::Result<Vec<(&'static str, String)>> {
         let mut parts = Vec::new();
         let inputs = [("photo", "the photo"), ("environment", "--env"), ("mask", "--mask"), ("normals", "--normals")];
         for (role, name) in inputs {
             if let Some(content) = self.inputs[role]["blake3"].as_str() {
-                // Enough to tell contents apart, and short enough to be read.
+                // Long enough to tell contents apart, short enough to read.
                 parts.push((name, content.get(..16).unwrap_or(content).to_owned()));
             }
         }
@@ -67,7 +67,7 @@ impl FitIdentity<'_> {
     }
 }
 
-/// What every run is a run of: this version.
+/// The part of the identity that all runs share: the version of this program.
 pub(crate) fn version() -> RunIdentity {
     RunIdentity::default().with("the version of lookalike", env!("CARGO_PKG_VERSION"))
 }

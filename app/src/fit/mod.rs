@@ -1,4 +1,4 @@
-//! One fit from a checked capture to a folder of results: plans the graph, runs it on workers, writes what came out.
+//! One fit, from a checked capture to a folder of results: plans the graph, runs it on workers, writes the results.
 
 mod identity;
 mod notes;
@@ -33,7 +33,7 @@ use std::{process::ExitCode, sync::Arc};
 pub(crate) struct FitJob {
     pub(crate) capture: Arc<Capture>,
     pub(crate) method: Method,
-    /// Exposure before the metric.
+    /// The exposure that is applied before the metric.
     pub(crate) exposure: f64,
     /// The `inputs` of `fit.json`.
     pub(crate) inputs: Value,
@@ -42,17 +42,17 @@ pub(crate) struct FitJob {
     pub(crate) metrics: Option<MetricsAddress>,
     pub(crate) out: OutFolder,
     pub(crate) out_name: String,
-    /// A final score above this makes the exit code 1.
+    /// The exit code is 1 if the final score exceeds this.
     pub(crate) max_cssim: Option<f64>,
-    /// Gammas whose candidates are rendered as well.
+    /// Additional gammas whose candidates are rendered.
     pub(crate) also_render: Vec<f64>,
-    /// Go on with the run that is in the folder, if there is one.
+    /// Resume the run in the folder, if there is one.
     pub(crate) resume: bool,
-    /// Seconds spent on loading or making the inputs.
+    /// Seconds spent on loading or generating the inputs.
     pub(crate) input_seconds: f64,
 }
 
-/// What a finished fit leaves for pictures of its own.
+/// The data of a finished fit for further pictures.
 #[derive(Debug)]
 pub(crate) struct Finished {
     pub(crate) outcome: FitOutcome,
@@ -60,7 +60,7 @@ pub(crate) struct Finished {
     pub(crate) code: ExitCode,
 }
 
-/// Runs a fit and writes its results; `None` if that was done before.
+/// Runs a fit and writes its results; `None` if an earlier run has finished it.
 pub(crate) fn run(job: FitJob) -> anyhow::Result<Option<Finished>> {
     let method = job.method.clone();
     let planner = FitPlanner::new(Arc::clone(&job.capture), method.clone(), job.exposure)
@@ -91,7 +91,7 @@ struct Done {
     notes: Vec<String>,
 }
 
-/// The part of a fit that its display shows: up to its last file.
+/// Runs the fit while its display is shown, and writes its files.
 fn run_shown(
     job: &FitJob,
     method: &Method,
@@ -137,7 +137,7 @@ fn run_shown(
         attempts: summary.attempts,
         requeued: summary.requeued_nodes,
     };
-    // A disk that is full may have room later, and then nothing is computed again.
+    // Not an error of the input: a full disk may have room later, and the resumed run computes nothing again.
     let pictures = write_results(&job.out, &record(job, method, &outcome, &notes), &timing);
     let pictures = pictures.context(Exit::ClusterFailed)?;
     let finished = journal::Finished { outputs: job.out.results().context(Exit::ClusterFailed)? };

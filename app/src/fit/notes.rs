@@ -1,4 +1,4 @@
-//! What a user should know about a result beyond its numbers.
+//! Notes for the user on a result.
 
 use lookalike::{
     brdf::{Model, flat_bounds, flat_names},
@@ -6,7 +6,8 @@ use lookalike::{
     plan::FitOutcome,
 };
 
-/// Notes on the winner: at an end of the gammas, parameters at their bounds, reflecting more than it receives.
+/// Notes on the winner: its gamma is the first or the last one, parameters are at their bounds, it reflects more light than it
+/// receives.
 pub(crate) fn notes(method: &Method, outcome: &FitOutcome) -> Vec<String> {
     let winner = &outcome.judged[outcome.winner].candidate;
     let last = outcome.polished.as_ref().map_or(&winner.parameters, |p| &p.parameters);
@@ -36,8 +37,8 @@ pub(crate) fn notes(method: &Method, outcome: &FitOutcome) -> Vec<String> {
 fn at_bounds(model: &dyn Model, parameters: &[f64], is_determined: impl Fn(usize) -> bool) -> Option<String> {
     let (lower, upper) = flat_bounds(model.parameters());
     let names = flat_names(model.parameters());
-    // A lower bound is an answer (no diffuse part, a dielectric), except that of a width. An upper bound is a limit of the model, except
-    // where it is a kind of surface.
+    // A parameter at its lower bound is a valid result (no diffuse part, a dielectric), except for a width. At its upper bound
+    // it is limited by the model, unless that bound stands for a kind of surface.
     let is_width = |i: usize| model.lobes().iter().any(|b| b.width.is_some_and(|width| width.entry == i));
     let is_kind: Vec<bool> =
         model.parameters().iter().flat_map(|p| std::iter::repeat_n(p.upper_is_kind, p.channels.count())).collect();
@@ -51,7 +52,7 @@ fn at_bounds(model: &dyn Model, parameters: &[f64], is_determined: impl Fn(usize
     (!limited.is_empty()).then(|| format!("at the limit of the model's range: {list}; the photo asks for more"))
 }
 
-/// The parameters of which much of the range matches the photo as well.
+/// The parameters that the photo does not determine: values from much of their range match it equally well.
 fn undetermined(model: &dyn Model, uncertainty: &[Uncertainty]) -> Option<String> {
     let names = flat_names(model.parameters());
     let mut list = Vec::new();
@@ -72,7 +73,7 @@ fn undetermined(model: &dyn Model, uncertainty: &[Uncertainty]) -> Option<String
     })
 }
 
-/// Colours are free, so a fit may reflect more light than it receives.
+/// A fit may reflect more light than it receives, because its colours are not limited.
 fn bright(model: &dyn Model, parameters: &[f64]) -> Option<String> {
     let sum = model.diffuse_albedo(parameters) + model.normal_incidence_specular(parameters);
     let most = (0..3).map(|c| sum[c]).fold(0.0, f64::max);
@@ -112,7 +113,7 @@ mod tests {
         let rim = |f90: f64, f0: f64| at_bounds(&GgxF90, &[0.3, 0.3, 0.3, f0, 0.1, 0.1, f90, 0.2], |_| true);
         assert_eq!(rim(1.0, 0.1), None);
         assert!(rim(1.0, 1.0).is_some_and(|note| note.contains("f0.r = 1;")));
-        // Base colour, subsurface, metallic, specular, roughness, sheen, clear coat, its gloss.
+        // The order is base colour, subsurface, metallic, specular, roughness, sheen, clear coat, clear-coat gloss.
         let disney = |coat: f64| at_bounds(&Disney, &[0.5, 0.5, 0.5, 1.0, 1.0, 0.5, 0.5, 0.0, coat, 0.5], |_| true);
         assert_eq!(disney(0.5), None);
         assert!(disney(1.0).is_some_and(|note| note.contains("clearcoat = 1;") && !note.contains("metallic")));

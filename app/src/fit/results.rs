@@ -4,7 +4,7 @@ use crate::outputs::{FitRecord, OutFolder, Pictures, Timing, candidates_csv, par
 use anyhow::Context;
 use lookalike::{fit::Method, image::metadata, plan::FitOutcome};
 
-/// Writes everything that a fit leaves behind, `fit.json` last: it marks a finished fit.
+/// Writes all files of a finished fit. `fit.json` comes last, because it marks the fit as finished.
 pub(crate) fn write_results(out: &OutFolder, record: &FitRecord<'_>, timing: &Timing) -> anyhow::Result<Pictures> {
     let (method, outcome, exposure) = (record.method, record.outcome, record.display_exposure);
     let pictures = Pictures::new(record.capture, outcome, exposure);
@@ -26,7 +26,7 @@ pub(crate) fn write_results(out: &OutFolder, record: &FitRecord<'_>, timing: &Ti
     Ok(pictures)
 }
 
-/// The parameters that a fit ends with: of polish, if it ran, else of the winner of stage two.
+/// The final parameters: those of polish if it ran, otherwise those of the winner of stage two.
 pub(crate) fn final_parameters(outcome: &FitOutcome) -> &[f64] {
     let winner = &outcome.judged[outcome.winner].candidate.parameters;
     outcome.polished.as_ref().map_or(winner, |p| &p.parameters)
@@ -39,7 +39,7 @@ pub(crate) fn final_scores(outcome: &FitOutcome) -> (f64, f64) {
     polished.unwrap_or((winner.cssim, winner.cssim_object))
 }
 
-/// The one of these scores that selects and polishes.
+/// The score that the method selects and polishes by.
 pub(crate) fn final_score(method: &Method, outcome: &FitOutcome) -> f64 {
     let (image, object) = final_scores(outcome);
     method.judge.pick(image, object)

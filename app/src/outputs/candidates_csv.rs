@@ -6,7 +6,7 @@ use lookalike::{
 };
 use std::fmt::Write as _;
 
-/// The table as text; numbers with all their digits.
+/// The table as text. Numbers have all their digits.
 pub(crate) fn candidates_csv(model: &dyn Model, judged: &[Judged]) -> String {
     let mut text = String::from("gamma,subset,cost,cssim,cssim_object,evaluations,termination");
     for name in flat_names(model.parameters()) {

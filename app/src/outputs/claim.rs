@@ -1,4 +1,4 @@
-//! The one check of an output folder before any work: a run replaces no file that it did not write itself.
+//! The check of an output folder before any work: a run replaces only files that it wrote itself.
 //!
 //! | what is in OUT | new run | `--resume` | `--force` | `demo` |
 //! |---|---|---|---|---|
@@ -22,26 +22,26 @@ use std::{
     path::{Path, PathBuf},
 };
 
-/// The mark of a finished fit.
+/// The file that marks a finished fit.
 pub(crate) const MARK: &str = "fit.json";
 
-/// The mark of a batch that has begun.
+/// The file that marks a batch that has begun.
 pub(crate) const BATCH_MARK: &str = "summary.json";
 
-/// What every fit leaves behind.
+/// The files of every fit.
 pub(crate) const FIT_FILES: [&str; 6] =
     ["candidates.csv", "match.exr", "match.png", "reference.png", "difference.png", MARK];
 
-/// Where workers find the run.
+/// The file that tells workers how to reach the run.
 pub(crate) const ACCESS_FILE: &str = "access.json";
 
-/// The secret half of [`ACCESS_FILE`].
+/// The private key for [`ACCESS_FILE`].
 const KEY_FILE: &str = "access.key.pem";
 
-/// Files of every run beside its journal. They are written again all the time, so that their hashes say nothing.
+/// Files of every run beside its journal. They are rewritten throughout the run, so their hashes are not checked.
 const RUN_FILES: [&str; 3] = [STATUS_FILE, ACCESS_FILE, KEY_FILE];
 
-/// What a run does with what is in its folder.
+/// What a run does with existing files.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum OldFiles {
     /// Refuse them.
@@ -50,12 +50,12 @@ pub(crate) enum OldFiles {
     Resume,
     /// Replace them.
     Replace,
-    /// Replace those of a demo.
+    /// Replace them if they are those of a demo.
     ReplaceDemo,
 }
 
 impl OldFiles {
-    /// As the flags `--resume` and `--force` say.
+    /// The choice for the flags `--resume` and `--force`.
     pub(crate) fn of(is_resumed: bool, is_forced: bool) -> Self {
         match (is_resumed, is_forced) {
             (_, true) => Self::Replace,
@@ -65,7 +65,7 @@ impl OldFiles {
     }
 }
 
-/// What a run asks of its folder.
+/// The files that a run reads and writes.
 #[derive(Debug, Clone)]
 pub(crate) struct Claim<'a> {
     /// The command: `fit`, `batch`, `study` or `demo`.
@@ -74,15 +74,15 @@ pub(crate) struct Claim<'a> {
     pub(crate) old: OldFiles,
     /// Names of files in the folder that the run writes.
     pub(crate) files: Vec<&'static str>,
-    /// Names of files that grow: a hash would say nothing of them.
+    /// Names of files that the run appends to, so their hashes are not checked.
     pub(crate) growing: Vec<&'static str>,
-    /// Names of folders in the folder that the run makes and fills.
+    /// Names of folders in the folder that the run creates and fills.
     pub(crate) folders: Vec<&'static str>,
-    /// Names of folders in the folder that get the files of a fit each.
+    /// Names of folders in the folder that each receive the files of one fit.
     pub(crate) fits: Vec<&'a str>,
     /// Files that the run reads.
     pub(crate) inputs: Vec<&'a Path>,
-    /// The access file that was made beforehand.
+    /// The access file that was made beforehand, if any.
     pub(crate) access: Option<&'a Path>,
 }
 
@@ -93,19 +93,19 @@ impl<'a> Claim<'a> {
         Self { command: "fit", out, old, files: FIT_FILES.into(), growing, folders, fits, inputs, access: None }
     }
 
-    /// Refuses the folder if the run would replace what it must not. Changes nothing.
+    /// Refuses the folder if the run would replace files that it must not. Changes nothing.
     ///
     /// # Errors
-    /// All that is in the way, with what to do.
+    /// All files in the way, and what to do about them.
     pub(crate) fn check(&self) -> anyhow::Result<()> {
         self.check_lock()?;
         self.check_against(&Ledger::read(self.out)?)
     }
 
-    /// Refuses a folder whose lock file or ledger is not one of ours, which the run may write to.
+    /// Refuses a lock file or a ledger that this program did not write.
     pub(super) fn check_lock(&self) -> anyhow::Result<()> {
         if self.out.exists() && !self.out.is_dir() {
-            bail!("{} is a file: --out takes a folder, which is made if it is not there", self.out.display());
+            bail!("{} is a file: --out takes a folder, which is created if necessary", self.out.display());
         }
         for (name, beginning) in [(LOCK_FILE, b"process "), (LEDGER, b"# lookal")] {
             let path = self.out.join(name);
@@ -121,7 +121,7 @@ impl<'a> Claim<'a> {
         Ok(())
     }
 
-    /// The check, for a ledger of the folder.
+    /// Checks everything else, against the ledger of the folder.
     pub(super) fn check_against(&self, ledger: &Ledger) -> anyhow::Result<()> {
         let shown = self.out.display();
         self.check_inputs(ledger)?;
@@ -165,9 +165,9 @@ impl<'a> Claim<'a> {
         Problems::check(problems, &shown.to_string())
     }
 
-    /// The files that the run replaces, of those that are there.
+    /// The existing files that the run replaces.
     pub(super) fn replaced(&self, ledger: &Ledger) -> Vec<PathBuf> {
-        // Without its mark, a fit is not taken for a finished one while the others go.
+        // The mark goes first, so that a partly removed fit does not count as finished.
         let names = [MARK.to_owned()].into_iter().chain(self.names()).chain(ledger.names());
         let mut seen = BTreeSet::new();
         names
@@ -177,7 +177,7 @@ impl<'a> Claim<'a> {
             .collect()
     }
 
-    /// Whether a file is there that only a run leaves behind.
+    /// Whether the folder holds the file that marks a run of this command.
     fn has_mark(&self) -> bool {
         match self.command {
             "batch" => is_there(&self.out.join(BATCH_MARK)),
@@ -186,7 +186,7 @@ impl<'a> Claim<'a> {
         }
     }
 
-    /// All names that the run writes, below its folder.
+    /// All names that the run writes, relative to its folder.
     fn names(&self) -> Vec<String> {
         let own = self.files.iter().chain(&self.growing).chain(&self.folders).map(|name| (*name).to_owned());
         let of_fits = self.fits.iter().flat_map(|fit| FIT_FILES.map(|file| format!("{fit}/{file}")));
@@ -194,7 +194,7 @@ impl<'a> Claim<'a> {
         own.chain(of_fits).chain(RUN_FILES.into_iter().filter(own_access).map(str::to_owned)).collect()
     }
 
-    /// An input is never replaced.
+    /// Refuses to replace an input of the run.
     fn check_inputs(&self, ledger: &Ledger) -> anyhow::Result<()> {
         let mut names: BTreeSet<String> = self.names().into_iter().collect();
         if self.old == OldFiles::Replace {
@@ -210,7 +210,7 @@ impl<'a> Claim<'a> {
         Problems::check(lines.collect(), &self.out.display().to_string())
     }
 
-    /// A demo replaces demos only.
+    /// Refuses to replace anything but a demo.
     fn check_demo(&self, ledger: &Ledger) -> anyhow::Result<()> {
         let generated =
             fs::read(self.out.join(MARK)).ok().and_then(|bytes| serde_json::from_slice::<Value>(&bytes).ok());
@@ -229,12 +229,12 @@ impl<'a> Claim<'a> {
         )
     }
 
-    /// What is wrong with a file that the run writes, if it is there.
+    /// The problem with a file that the run writes, if it exists and may not be replaced.
     fn problem_with(&self, name: &str, ledger: &Ledger, has_journal: bool) -> Option<String> {
         let path = self.out.join(name);
         let draft = draft_of(&path);
         if is_there(&draft) && !fs::symlink_metadata(&draft).is_ok_and(|it| it.is_dir()) {
-            // Drafts are left by processes that were killed.
+            // A killed process leaves drafts behind.
             if !is_file(&draft) || !ledger.is_begun() {
                 let name = format!("{name}.partial");
                 return Some(self.in_the_way(&name));
@@ -251,14 +251,14 @@ impl<'a> Claim<'a> {
         let is_passing = is_folder || self.growing.contains(&name) || RUN_FILES.contains(&name);
         let is_fine = match self.old {
             OldFiles::Replace => !is_folder || ledger.is_begun(),
-            // Of a run that ended before its journal was there.
+            // Left by a run that ended before it had a journal.
             OldFiles::Refuse => (RUN_FILES.contains(&name) || self.growing.contains(&name)) && ledger.is_begun(),
             OldFiles::Resume if is_passing => has_journal || ledger.is_begun(),
             OldFiles::Resume | OldFiles::ReplaceDemo if ledger.is_begun() => {
                 is_passing || self.is_of_run(name, &path, ledger)
             }
             OldFiles::Resume => false,
-            // Made before there were ledgers.
+            // Written by a version without ledgers.
             OldFiles::ReplaceDemo => true,
         };
         match (is_fine, self.old) {
@@ -277,7 +277,7 @@ impl<'a> Claim<'a> {
         }
     }
 
-    /// Whether the run in the folder wrote this file.
+    /// Whether the run in the folder wrote this file with its present content.
     fn is_of_run(&self, name: &str, path: &Path, ledger: &Ledger) -> bool {
         fs::read(path).is_ok_and(|bytes| ledger.has(name, &hash_of(&bytes)))
     }
@@ -292,7 +292,7 @@ impl<'a> Claim<'a> {
         format!("{} {what}: choose another --out, or move it elsewhere", path.display())
     }
 
-    /// Why the run that is there is in the way.
+    /// The message that the folder holds a run already.
     fn old_run(&self) -> String {
         let shown = self.out.display();
         let has_mark = self.has_mark();
@@ -316,19 +316,19 @@ impl<'a> Claim<'a> {
     }
 }
 
-/// Of a file that is not as the run wrote it.
+/// The message that a file differs from what the run wrote.
 pub(crate) fn changed(name: &str, out_name: &str) -> String {
     format!(
         "{name} is not what the run in {out_name} wrote; keep a changed file elsewhere and remove it here, then --resume makes it again"
     )
 }
 
-/// Whether there is anything of this name, also a link to nothing.
+/// Whether anything of this name exists, including a dangling symbolic link.
 pub(super) fn is_there(path: &Path) -> bool {
     !matches!(fs::symlink_metadata(path), Err(error) if matches!(error.kind(), ErrorKind::NotFound | ErrorKind::NotADirectory))
 }
 
-/// Whether it is a file, and no link to one.
+/// Whether it is a regular file, not a symbolic link.
 pub(super) fn is_file(path: &Path) -> bool {
     fs::symlink_metadata(path).is_ok_and(|it| it.is_file())
 }

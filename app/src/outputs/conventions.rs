@@ -1,8 +1,8 @@
-//! The conventions (design section 3) as they are written into every output.
+//! The conventions (design section 3), as every output states them.
 
 use serde_json::{Value, json};
 
-/// What the numbers of a fit mean.
+/// The conventions for the numbers of a fit.
 pub(crate) fn conventions() -> Value {
     json!({
         "world": "right-handed, +Y up; the camera sits on +Z and looks along -Z; image x grows to +X",

@@ -1,7 +1,7 @@
 //! `fit.json`, the result of a fit for programs (design section 10).
 //!
-//! Without its `timing` block it is bit-identical from run to run: everything that depends on the run and not on the inputs
-//! lives there.
+//! Without its `timing` block it is bit-identical from run to run: everything that depends on the run rather than on the inputs
+//! is in that block.
 
 use super::conventions;
 use lookalike::{
@@ -16,20 +16,20 @@ use serde_json::{Map, Value, json};
 /// The schema of the document.
 const SCHEMA: &str = "lookalike.fit/1";
 
-/// Everything that goes into the document.
+/// The data for the document.
 #[derive(Debug)]
 pub(crate) struct FitRecord<'a> {
     pub(crate) method: &'a Method,
     pub(crate) capture: &'a Capture,
-    /// What the fit was made from.
+    /// The inputs of the fit.
     pub(crate) inputs: &'a Value,
     pub(crate) outcome: &'a FitOutcome,
     pub(crate) display_exposure: f64,
-    /// Things a user should know about the result.
+    /// Notes for the user on the result.
     pub(crate) notes: &'a [String],
 }
 
-/// What depends on the run.
+/// The part that depends on the run.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Timing {
     /// Wall-clock seconds, by stage.
@@ -129,7 +129,7 @@ impl Timing {
             "workers": self.workers,
             "attempts": self.attempts,
             "requeued": self.requeued,
-            // Not `args()`, which panics on what is not UTF-8.
+            // Not `args()`, which panics on arguments that are not UTF-8.
             "command_line": std::env::args_os().map(|a| a.to_string_lossy().into_owned()).collect::<Vec<_>>(),
             "out": self.out,
             "os": std::env::consts::OS,
@@ -138,7 +138,7 @@ impl Timing {
     }
 }
 
-/// A flat parameter vector by name: colours as three numbers, scalars as one.
+/// A flat parameter vector by name: a colour as three numbers, a scalar as one.
 pub(crate) fn parameters_json(model: &dyn Model, parameters: &[f64]) -> Value {
     by_name(model, &parameters.iter().map(|value| json!(value)).collect::<Vec<_>>())
 }
@@ -160,8 +160,8 @@ fn by_name(model: &dyn Model, entries: &[Value]) -> Value {
     Value::Object(object)
 }
 
-/// What the photo says of each parameter: the standard error as a share of the value, `null` where there is none, and whether the
-/// value is `determined`, held `at-bound`, or `undetermined`.
+/// How well the photo determines each parameter: the standard error relative to the value (`null` if there is none), and
+/// whether the value is `determined`, held `at-bound`, or `undetermined`.
 fn uncertainty_json(model: &dyn Model, parameters: &[f64], uncertainty: &[Uncertainty]) -> Value {
     let relative = parameters.iter().zip(uncertainty).map(|(value, known)| match known {
         Uncertainty::StandardError(error) => json!(error / value.abs()),

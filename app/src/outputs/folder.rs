@@ -1,4 +1,4 @@
-//! The folder of results: claimed before any work, and written to so that no file is replaced that the run did not write.
+//! The folder of results: checked and locked before any work. Only files that the run wrote are replaced.
 
 use super::{
     claim::{Claim, FIT_FILES, OldFiles, changed, is_file, is_there},
@@ -16,20 +16,20 @@ use std::{
     sync::Arc,
 };
 
-/// An OUT folder that is locked for this process, and as it was.
+/// A locked OUT folder whose old files are still there.
 #[derive(Debug)]
 pub(crate) struct ClaimedFolder {
     folder: OutFolder,
     command: &'static str,
     old: OldFiles,
-    /// What is removed when the run begins.
+    /// Files to remove when the run begins.
     replaced: Vec<PathBuf>,
 }
 
-/// An OUT folder that can be written to, or a folder in it.
+/// An OUT folder, or a folder in it, that can be written to.
 #[derive(Debug, Clone)]
 pub(crate) struct OutFolder {
-    /// What comes before names in the ledger.
+    /// The prefix of its file names in the ledger.
     prefix: String,
     root: Arc<Root>,
 }
@@ -38,15 +38,15 @@ pub(crate) struct OutFolder {
 struct Root {
     path: PathBuf,
     ledger: Ledger,
-    /// Held while this lives.
+    /// Held until the last clone is dropped.
     _lock: RunLock,
 }
 
 impl ClaimedFolder {
-    /// Locks a folder, which is made if it is not there.
+    /// Creates the folder if necessary, checks it and locks it.
     ///
     /// # Errors
-    /// If it cannot be written to, another process has it, or the claim is refused.
+    /// If it cannot be written to, another process holds its lock, or the claim is refused.
     pub(crate) fn take(claim: &Claim<'_>) -> anyhow::Result<Self> {
         claim.check_lock()?;
         let path = claim.out;
@@ -67,7 +67,7 @@ impl ClaimedFolder {
         Ok(Self { folder, command: claim.command, old: claim.old, replaced })
     }
 
-    /// The folder, for a run that begins now: of an old one that it replaces, nothing is left.
+    /// Begins the run: removes the files of an old run that it replaces.
     ///
     /// # Errors
     /// If an old file cannot be removed, or the folder cannot be written to.
@@ -78,7 +78,7 @@ impl ClaimedFolder {
             for path in &replaced {
                 fs::remove_file(path).with_context(|| cannot(path))?;
             }
-            // The ledger, which says whose run it was, is replaced last.
+            // The ledger is replaced last, because it identifies the run that wrote the files.
             let journal = folder.file(JOURNAL_FILE);
             journal::remove(&journal).with_context(|| cannot(&journal))?;
         }
@@ -90,12 +90,12 @@ impl ClaimedFolder {
 }
 
 impl OutFolder {
-    /// The results of a fit that are there, each with the BLAKE3 of its bytes.
+    /// The files of a fit that exist, each with the BLAKE3 of its bytes.
     pub(crate) fn results(&self) -> anyhow::Result<Vec<(String, String)>> {
         self.hashes(FIT_FILES)
     }
 
-    /// Those of some files that are there, each with the BLAKE3 of its bytes.
+    /// The existing ones of the named files, each with the BLAKE3 of its bytes.
     pub(crate) fn hashes<'a>(&self, names: impl IntoIterator<Item = &'a str>) -> anyhow::Result<Vec<(String, String)>> {
         let there = names.into_iter().filter_map(|name| Some((name.to_owned(), self.hash(name).transpose()?)));
         there.map(|(name, hash)| Ok((name, hash?))).collect()
@@ -110,10 +110,10 @@ impl OutFolder {
         }
     }
 
-    /// Makes a folder in this one.
+    /// Creates a folder in this one.
     ///
     /// # Errors
-    /// If it cannot be made, or is a symbolic link, which may lead anywhere.
+    /// If it cannot be created, or is a symbolic link, which may point anywhere.
     pub(crate) fn sub(&self, name: &str) -> anyhow::Result<Self> {
         let path = self.file(name);
         if path.is_symlink() {
@@ -128,10 +128,10 @@ impl OutFolder {
         self.root.path.join(format!("{}{name}", self.prefix))
     }
 
-    /// Writes a file in one piece.
+    /// Writes a file atomically.
     ///
     /// # Errors
-    /// If it cannot be written, or a file of this name is there that the run did not write.
+    /// If it cannot be written, or a file of this name exists that the run did not write.
     pub(crate) fn write(&self, name: &str, bytes: &[u8]) -> anyhow::Result<()> {
         let (path, full_name) = (self.file(name), format!("{}{name}", self.prefix));
         if is_there(&path) {
@@ -145,5 +145,5 @@ impl OutFolder {
     }
 }
 
-/// A file that is written and removed to see whether a folder can be written to.
+/// A file that is written and removed to check whether a folder can be written to.
 const PROBE: &str = ".lookalike-write-test";

@@ -1,5 +1,4 @@
-//! `run.written`: which files a run wrote into its folder, each with the hash of its bytes. A file is replaced only if it is one of
-//! them.
+//! `run.written`: the files that a run wrote into its folder, each with the hash of its bytes. Only these may be replaced.
 
 use anyhow::Context;
 use lookalike::graph::BlobHash;
@@ -14,7 +13,7 @@ use std::{
 /// The name of the ledger.
 pub(super) const LEDGER: &str = "run.written";
 
-/// What a run wrote.
+/// The files that a run wrote.
 #[derive(Debug)]
 pub(super) struct Ledger {
     path: PathBuf,
@@ -25,13 +24,13 @@ pub(super) struct Ledger {
 struct State {
     /// The command that began the run.
     command: Option<String>,
-    /// Names below the folder, with hashes.
+    /// Names relative to the folder, with hashes.
     written: BTreeSet<(String, String)>,
     file: Option<File>,
 }
 
 impl Ledger {
-    /// The ledger of a folder; empty where there is none.
+    /// The ledger of a folder; empty if there is none.
     pub(super) fn read(folder: &Path) -> anyhow::Result<Self> {
         let path = folder.join(LEDGER);
         let text = match fs::read_to_string(&path) {
@@ -39,7 +38,7 @@ impl Ledger {
             text => text.with_context(|| format!("cannot read {}", path.display()))?,
         };
         let mut state = State::default();
-        // The last line may have been cut off by the end of the process.
+        // If the process was killed, the last line may be incomplete.
         for line in text.split_inclusive('\n').filter_map(|line| line.strip_suffix('\n')) {
             match (line.strip_prefix("# lookalike "), line.split_once("  ")) {
                 (Some(command), _) => state.command = Some(command.to_owned()),
@@ -83,15 +82,15 @@ impl Ledger {
         Ok(())
     }
 
-    /// Notes a file before it is put in its place. The line is on the disk before the file is: after a power loss, a file without
-    /// a line would look like the user's.
+    /// Adds a file to the ledger, before it is moved into place. The line is synchronised to the disk first, because after a power
+    /// loss a file without a line would be taken for the user's.
     pub(super) fn note(&self, name: &str, hash: &str) -> anyhow::Result<()> {
         let mut state = self.lock();
         let entry = (name.to_owned(), hash.to_owned());
         if state.written.contains(&entry) {
             return Ok(());
         }
-        // Opened anew after a failure, so that the next line does not continue one that was cut off.
+        // Reopened after a failure, so that the next line does not continue an incomplete one.
         let file = state.file.take().map_or_else(|| self.open(), Ok);
         let noted = file.and_then(|mut file| {
             file.write_all(format!("{hash}  {name}\n").as_bytes())?;
@@ -103,7 +102,7 @@ impl Ledger {
         Ok(())
     }
 
-    /// The file, ready for the next line: a line that was cut off is ended, so that it is not continued.
+    /// Opens the file for appending, and ends an incomplete last line.
     fn open(&self) -> io::Result<File> {
         let mut file = OpenOptions::new().read(true).append(true).open(&self.path)?;
         let mut last = [b'\n'];
@@ -118,12 +117,12 @@ impl Ledger {
     }
 
     fn lock(&self) -> std::sync::MutexGuard<'_, State> {
-        // A set and a file, neither of which is left half changed.
+        // A panic leaves neither the set nor the file half changed.
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
-/// The hash of a file's bytes, as the ledger and the journal have it.
+/// The hash of a file's bytes, in the form that the ledger and the journal use.
 pub(super) fn hash_of(bytes: &[u8]) -> String {
     BlobHash::of(bytes).to_string()
 }

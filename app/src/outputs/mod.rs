@@ -1,4 +1,4 @@
-//! What a fit leaves behind in OUT (design section 10): numbers for programs, pictures for people.
+//! The files that a fit writes to OUT (design section 10): numbers and pictures.
 
 mod candidates_csv;
 mod claim;

@@ -12,13 +12,13 @@ use lookalike::{
 /// Images ready to be written, linear Rec. 709, over black.
 #[derive(Debug)]
 pub(crate) struct Pictures {
-    /// The photo where it is scored.
+    /// The photo, black where it is not scored.
     pub(crate) reference: Image,
     /// The match, linear.
     pub(crate) matched: Image,
     /// The error of the match in false colours.
     pub(crate) difference: Image,
-    /// The error that the brightest colour stands for.
+    /// The error that the brightest false colour stands for.
     pub(crate) difference_scale: f64,
     coverage: Vec<f32>,
     exposure: f64,
@@ -39,7 +39,7 @@ impl Pictures {
         }
     }
 
-    /// A linear image as it looks on a display: exposed; the PNG writer clips and encodes.
+    /// A linear image times the display exposure; the PNG writer clips and encodes it.
     pub(crate) fn displayed(&self, image: &Image) -> Image {
         exposed(image, self.exposure)
     }
@@ -65,7 +65,7 @@ pub(crate) fn write_pictures(
     png("difference.png", &pictures.difference, Some((metadata::COMMENTS, scale)))
 }
 
-/// The smallest of a few round numbers that all but one in a hundred of the errors on the object stay below.
+/// The smallest of a few round numbers that 99 % of the errors on the object do not exceed.
 fn full_scale(errors: &mut Vec<f64>) -> f64 {
     errors.retain(|e| *e > 0.0);
     errors.sort_by(f64::total_cmp);
@@ -73,7 +73,7 @@ fn full_scale(errors: &mut Vec<f64>) -> f64 {
     [0.02, 0.05, 0.1, 0.2, 0.5].into_iter().find(|&scale| high <= scale).unwrap_or(1.0)
 }
 
-/// The photo where it is scored, else black.
+/// The photo, black where it is not scored.
 fn scored(photo: &Image, coverage: &[f32]) -> Image {
     let pixels = photo.pixels().iter().zip(coverage);
     let pixels = pixels.map(|(p, &c)| if c > 0.0 { *p } else { [0.0; 3] }).collect();

@@ -19,7 +19,7 @@ pub(crate) struct Panel<'a> {
 
 const MARGIN: usize = 12;
 const LABEL_HEIGHT: usize = 44;
-/// Linear light greys of ground and text.
+/// Linear grey values of the background and the text.
 const GROUND: f32 = 0.006;
 const INK: f32 = 0.7;
 

@@ -1,4 +1,4 @@
-//! The short table that a fit ends with, on stdout.
+//! The table that a fit prints on stdout at its end.
 
 use super::{FitRecord, Timing};
 use lookalike::brdf::{Channels, Model};
@@ -7,12 +7,12 @@ use std::{
     io::{self, Write as _},
 };
 
-/// Prints what was found: winner, parameters, scores, seconds.
+/// Prints the result: winner, parameters, scores, seconds.
 pub(crate) fn print_summary(record: &FitRecord<'_>, timing: &Timing, out: &str) -> io::Result<()> {
     print_result(&summary(record, timing, out))
 }
 
-/// Writes a result to stdout. A reader that has gone away (`| head`) is no error.
+/// Writes a result to stdout. A closed pipe (`| head`) is not an error.
 pub(crate) fn print_result(text: &str) -> io::Result<()> {
     let mut stdout = io::stdout().lock();
     match stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()) {
@@ -75,7 +75,7 @@ fn row(model: &dyn Model, name: &str, gamma: &str, cssim: f64, object: f64, para
     row
 }
 
-/// Columns as wide as their widest entry; the first column left, the others right.
+/// Aligns columns to their widest entries: the first column left, the others right.
 pub(crate) fn aligned(rows: &[Vec<String>]) -> String {
     let columns = rows.iter().map(Vec::len).max().unwrap_or(0);
     let width = |c: usize| rows.iter().filter_map(|r| r.get(c)).map(String::len).max().unwrap_or(0);

@@ -62,11 +62,11 @@ fn demo_replaces_demos_only() {
     }
     let unfinished = folder(&[("run.sqlite", "")]);
     refused(&demo(unfinished.path(), OldFiles::ReplaceDemo), &["holds something else than a demo (run.sqlite)"]);
-    // One that was made before there were ledgers.
+    // A demo from a version without ledgers.
     let old = folder(&[("fit.json", DEMO), ("strip.png", "old"), ("run.sqlite", "")]);
     let out = begin(&demo(old.path(), OldFiles::ReplaceDemo));
     assert!(!old.path().join("fit.json").exists() && !old.path().join("run.sqlite").exists());
-    // One that was interrupted, and one with a file of the user's.
+    // An interrupted demo, then one with a changed file.
     out.write("strip.png", b"new").unwrap();
     drop(out);
     drop(begin(&demo(old.path(), OldFiles::ReplaceDemo)));
@@ -85,7 +85,7 @@ fn input_is_never_replaced() {
         refused(&claim, &["match.exr is an input of this run", "choose another --out"]);
     }
     assert_eq!(fs::read(&photo).unwrap(), b"photo");
-    // A demo's photo has a name that a fit does not write, but that a forced fit would remove.
+    // A fit writes no file of the photo's name, but with --force it would remove the demo's file.
     let out = folder.path().join("demo");
     begin(&demo(&out, OldFiles::ReplaceDemo)).write("strip.png", b"photo").unwrap();
     let photo = out.join("strip.png");
@@ -130,7 +130,7 @@ fn resumed_run_replaces_what_it_wrote_and_nothing_else() {
     fs::write(folder.path().join("run.sqlite"), "").unwrap();
     refused(&fit(folder.path(), OldFiles::Resume), &["match.exr is not what the run in", "--resume makes it again"]);
     fs::remove_file(folder.path().join("match.exr")).unwrap();
-    // Killed while it wrote: an older version stands, or a draft.
+    // The process was killed while it wrote: the file has its older version, or a draft is left.
     fs::write(folder.path().join("match.png"), "one").unwrap();
     fs::write(folder.path().join("match.exr.partial"), "ha").unwrap();
     let out = begin(&fit(folder.path(), OldFiles::Resume));

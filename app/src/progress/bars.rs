@@ -17,7 +17,7 @@ pub(super) struct Bars {
 }
 
 impl Bars {
-    /// Bars on stderr; `None` where they cannot be drawn.
+    /// Bars on stderr; `None` if stderr cannot show them.
     pub(super) fn new(best: Arc<BestScore>) -> Option<Self> {
         let all = MultiProgress::new();
         (!all.is_hidden()).then(|| Self { all, bars: BTreeMap::new(), tally: Tally::default(), best })
@@ -62,7 +62,7 @@ impl Display for Bars {
     }
 
     fn finish(&mut self, _ending: Ending<'_>) {
-        // A bar that is complete keeps the time at which it was: drawing it again would show the time of now.
+        // A finished bar keeps its final time. Drawing it again would show the present time.
         for bar in self.bars.values().filter(|bar| !bar.is_finished()) {
             bar.disable_steady_tick();
             bar.abandon();
@@ -71,7 +71,7 @@ impl Display for Bars {
 }
 
 fn style() -> ProgressStyle {
-    // The bar takes what is left of the line, 11 columns of a terminal with 60.
+    // The bar takes the rest of the line: 11 columns on a terminal of 60.
     ProgressStyle::with_template("{prefix:<20} {msg:<17} {elapsed:>4} {percent:>3}% {wide_bar:.cyan/blue}")
         .unwrap_or_else(|_| ProgressStyle::default_bar())
         .progress_chars("━━─")

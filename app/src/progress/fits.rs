@@ -1,12 +1,12 @@
-//! What is told of the fits of a batch, beside the events of its nodes.
+//! Events about the fits of a batch, in addition to those about their nodes.
 
 use lookalike::fit::BestScore;
 use std::sync::Arc;
 
-/// Something that happened to a fit.
+/// An event about a fit.
 #[derive(Debug, Clone)]
 pub(crate) enum FitEvent {
-    /// Its inputs are there; its first nodes follow.
+    /// Its inputs are loaded; its first nodes follow.
     Started {
         /// Its place in the manifest, from 0.
         number: u32,
@@ -27,37 +27,37 @@ pub(crate) enum FitEvent {
         cssim_object: f64,
         /// Whether its score lies above its `max-cssim`.
         is_missed: bool,
-        /// From its start to its last file.
+        /// From its start until its last file was written.
         seconds: f64,
     },
-    /// It gave up.
+    /// It failed.
     Failed {
         /// Its place in the manifest, from 0.
         number: u32,
         /// Its name.
         name: String,
-        /// Why.
+        /// The error.
         error: String,
     },
 }
 
-/// How many fits there are, and how many have come to which end.
+/// The number of fits in each state.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub(crate) struct FitCount {
     /// All of them.
     pub(crate) total: usize,
-    /// Under way.
+    /// Those that are running.
     pub(crate) running: usize,
-    /// With results, those included that missed their score.
+    /// Those with results, including those that missed their score.
     pub(crate) done: usize,
-    /// With results and a score above their `max-cssim`.
+    /// Those with results and a score above their `max-cssim`.
     pub(crate) missed: usize,
-    /// Without results.
+    /// Those that failed.
     pub(crate) failed: usize,
 }
 
 impl FitCount {
-    /// `5 of 12 done`, and what went wrong.
+    /// `5 of 12 done`, followed by the numbers of missed and failed fits.
     pub(crate) fn text(&self) -> String {
         let mut text = format!("{} of {} done", self.done, self.total);
         for (count, what) in [(self.missed, "missed"), (self.failed, "failed")] {
@@ -70,7 +70,7 @@ impl FitCount {
 }
 
 impl FitEvent {
-    /// The end of a fit in a line for people; none for its start.
+    /// The line that reports the end of a fit; `None` for its start.
     pub(crate) fn line(&self) -> Option<String> {
         match self {
             Self::Started { .. } => None,

@@ -10,7 +10,7 @@ use lookalike_coordinator::events::{NodeName, RunEvent, Site};
 use serde_json::{Value, json};
 use std::time::Instant;
 
-/// The version of the stream: fields may be added under one number, never change their meaning.
+/// The version of the stream. Fields may be added to a version; the meaning of a field never changes.
 const SCHEMA: &str = "lookalike.progress/1";
 
 pub(super) struct JsonLines {
@@ -18,7 +18,7 @@ pub(super) struct JsonLines {
 }
 
 impl JsonLines {
-    /// Says what follows: the progress of so many fits.
+    /// Writes the first line, which announces this number of fits.
     pub(super) fn new(fits: usize) -> Self {
         let lines = Self { began: Instant::now() };
         lines.print(json!({ "event": "start", "schema": SCHEMA, "version": env!("CARGO_PKG_VERSION"), "fits": fits }));
@@ -133,7 +133,7 @@ fn node(event: &str, name: &NodeName, rest: Value) -> Value {
     object
 }
 
-/// The number of the worker; none for the coordinator itself.
+/// The number of the worker; `None` for the coordinator itself.
 fn worker_of(site: Site) -> Option<u64> {
     match site {
         Site::Worker(worker) => Some(worker.0),

@@ -1,4 +1,4 @@
-//! A line when a stage is complete, and now and then one in between, for logs and pipes.
+//! Plain lines for logs and pipes: one when a stage is complete, and occasional ones in between.
 
 use super::{
     Display, Ending, PAUSE, print_line, remark,

@@ -1,4 +1,4 @@
-//! A batch on a terminal: a bar of all fits, a line for each of the first that are under way, and above them the fits that have
+//! A batch on a terminal: one bar for all fits, one line each for the first running fits, and above them the fits that have
 //! ended.
 
 use super::{
@@ -12,36 +12,36 @@ use lookalike::{fit::BestScore, graph::NodeId, graph::split_label};
 use lookalike_coordinator::events::RunEvent;
 use std::{collections::BTreeMap, sync::Arc, time::Duration};
 
-/// Fits that have a line of their own, at most; with a small window, fewer.
+/// The most fits that have a line of their own; fewer in a small window.
 const MOST_ROWS: usize = 10;
-/// Lines of the terminal that are not for rows.
+/// Lines of the terminal that are not used for fits.
 const OTHER_LINES: usize = 6;
-/// Columns of a fit's name.
+/// The width of a fit's name, in columns.
 const NAME_COLUMNS: usize = 30;
 
 pub(super) struct ManyBars {
     all: MultiProgress,
     total: ProgressBar,
-    /// How many more fits are under way than there are rows.
+    /// The number of running fits without a line.
     more: ProgressBar,
     count: FitCount,
     fits: BTreeMap<u32, Row>,
     numbers: BTreeMap<String, u32>,
-    /// Of the nodes that have begun, whose they are.
+    /// The fits that the running nodes belong to.
     owners: BTreeMap<NodeId, u32>,
 }
 
-/// A fit that is under way.
+/// A running fit.
 struct Row {
     name: String,
     best: Arc<BestScore>,
     tally: Tally,
-    /// None while there are too many.
+    /// `None` while there are too many fits.
     bar: Option<ProgressBar>,
 }
 
 impl ManyBars {
-    /// Bars on stderr; `None` where they cannot be drawn.
+    /// Bars on stderr; `None` if stderr cannot show them.
     pub(super) fn new(total: usize) -> Option<Self> {
         let all = MultiProgress::new();
         if all.is_hidden() {
@@ -59,12 +59,12 @@ impl ManyBars {
         Some(Self { all, total: bar, more, count, fits, numbers, owners })
     }
 
-    /// Gives bars to the first fits that have none.
+    /// Gives bars to the first fits that have none, as far as there is room.
     fn fill(&mut self) {
         let height = usize::from(console_height());
         let most = MOST_ROWS.min(height.saturating_sub(OTHER_LINES)).max(1);
         let mut shown = self.fits.values().filter(|row| row.bar.is_some()).count();
-        // Fits begin in order, so that a new row is the last one.
+        // Fits begin in order, so a new row goes last.
         for row in self.fits.values_mut() {
             if shown >= most {
                 break;
@@ -79,10 +79,10 @@ impl ManyBars {
             }
         }
         let hidden = self.fits.len() - shown;
-        self.more.set_message(if hidden > 0 { format!("and {hidden} more under way") } else { String::new() });
+        self.more.set_message(if hidden > 0 { format!("and {hidden} more running") } else { String::new() });
     }
 
-    /// Takes a row away.
+    /// Removes a row.
     fn clear(&self, row: Row) {
         if let Some(bar) = row.bar {
             bar.finish_and_clear();
@@ -170,7 +170,7 @@ impl Display for ManyBars {
     }
 }
 
-/// A name that fits its column: its end is cut off.
+/// A name cut to the width of its column.
 fn shortened(name: &str) -> String {
     if name.chars().count() <= NAME_COLUMNS {
         return name.to_owned();

@@ -1,4 +1,4 @@
-//! A line when a fit of a batch has ended, and now and then one in between, for logs and pipes.
+//! Plain lines for logs and pipes: one when a fit of a batch has ended, and occasional ones in between.
 
 use super::{
     Display, Ending, PAUSE,
@@ -28,7 +28,7 @@ impl Display for ManyLines {
         if self.count.running > 0 && self.told.elapsed() >= PAUSE {
             self.told = Instant::now();
             let (seconds, running) = (self.began.elapsed().as_secs_f64(), self.count.running);
-            self.say(&format!("{seconds:7.1} s  {}, {running} under way", self.count.text()));
+            self.say(&format!("{seconds:7.1} s  {}, {running} running", self.count.text()));
         }
     }
 

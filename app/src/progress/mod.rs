@@ -1,4 +1,4 @@
-//! How a run is shown while it goes: bars on a terminal, plain lines elsewhere, JSON lines for programs. All on stderr.
+//! Shows a run while it goes on, all on stderr: bars on a terminal, plain lines elsewhere, JSON lines for programs.
 
 mod bars;
 mod fits;
@@ -19,32 +19,32 @@ use std::{
     time::Duration,
 };
 
-/// Between two lines of progress where no bars can be drawn.
+/// The time between two lines of progress where bars cannot be drawn.
 const PAUSE: Duration = Duration::from_secs(10);
 
 /// How a run ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Ending<'a> {
-    /// All has come to its end.
+    /// All nodes have ended.
     Finished,
-    /// It was ended early, as it was asked to be; why.
+    /// It was stopped early on request, for this reason.
     Stopped(&'a str),
-    /// It could not go on; why.
+    /// It failed, with this error.
     Failed(&'a str),
 }
 
-/// Something that watches a run.
+/// Shows the events of a run.
 pub(crate) trait Display: Send {
-    /// Takes note of what happened.
+    /// Processes an event.
     fn event(&mut self, event: &RunEvent);
 
-    /// Takes note of what happened to a fit of a batch.
+    /// Processes an event about a fit of a batch.
     fn fit(&mut self, _event: &FitEvent, _count: FitCount) {}
 
-    /// A line of text for people, above any bars.
+    /// Prints a line of text, above any bars.
     fn say(&mut self, text: &str);
 
-    /// The run is over, and all that it leaves is written; nothing may be left moving.
+    /// The run is over, and all its files are written. Stops all animation.
     fn finish(&mut self, ending: Ending<'_>);
 }
 
@@ -53,11 +53,11 @@ fn print_line(text: &str) {
     let _ = writeln!(io::stderr(), "{text}");
 }
 
-/// The display that the user asked for. `best` holds the best score so far.
+/// The display of this kind. `best` holds the best score so far.
 pub(crate) fn display(kind: ProgressKind, best: Arc<BestScore>) -> Box<dyn Display> {
     match kind {
         ProgressKind::Auto if !io::stderr().is_terminal() => Box::new(lines::Lines::new(best)),
-        // Where bars cannot be drawn (a pipe, a dumb terminal), lines are printed.
+        // Print lines where bars cannot be drawn (a pipe, a dumb terminal).
         ProgressKind::Bar | ProgressKind::Auto => match bars::Bars::new(Arc::clone(&best)) {
             Some(bars) => Box::new(bars),
             None => Box::new(lines::Lines::new(best)),
@@ -67,7 +67,7 @@ pub(crate) fn display(kind: ProgressKind, best: Arc<BestScore>) -> Box<dyn Displ
     }
 }
 
-/// The display of a batch of so many fits that the user asked for.
+/// The display of this kind, for a batch with this many fits.
 pub(crate) fn display_of_many(kind: ProgressKind, fits: usize) -> Box<dyn Display> {
     match kind {
         ProgressKind::Auto if !io::stderr().is_terminal() => Box::new(many_lines::ManyLines::new()),
@@ -92,7 +92,7 @@ impl Display for Silent {
     fn finish(&mut self, _ending: Ending<'_>) {}
 }
 
-/// Shows only fits that failed.
+/// Shows failed fits only.
 struct SilentMany;
 
 impl Display for SilentMany {
@@ -111,12 +111,12 @@ impl Display for SilentMany {
     fn finish(&mut self, _ending: Ending<'_>) {}
 }
 
-/// As [`remark`], for a batch, which reports a failed node as a failed fit.
+/// Like [`remark`], for a batch, which reports a failed node as a failed fit.
 fn remark_of_many(event: &RunEvent) -> Option<String> {
     if matches!(event, RunEvent::NodeFailed { .. }) { None } else { remark(event) }
 }
 
-/// A line for people about what does not go as planned; `None` for all other events.
+/// A line about an unexpected event; `None` for all other events.
 fn remark(event: &RunEvent) -> Option<String> {
     match event {
         RunEvent::Resumed { results, .. } => Some(format!("resuming the run: {results} results are there already")),

@@ -1,4 +1,4 @@
-//! The stages of a fit as a user sees them, counted from the events of its nodes.
+//! The stages of a fit that the display shows, counted from the events of its nodes.
 
 use lookalike::{graph::NodeId, nodes};
 use lookalike_coordinator::events::{NodeName, RunEvent};
@@ -10,9 +10,9 @@ pub(super) enum Stage {
     /// Transport tables of the pixel subsets.
     Tables,
     Searches,
-    /// The full-resolution table, and the scores of the candidates.
+    /// The full-resolution table and the scores of the candidates.
     Judging,
-    /// With the tables that it adds.
+    /// Polish, with the tables that it adds.
     Polish,
     Pictures,
 }
@@ -30,7 +30,7 @@ impl Stage {
         }
     }
 
-    /// The kind of node that ends the stage.
+    /// The kind of node that completes the stage.
     fn last_kind(self) -> &'static str {
         match self {
             Self::Tables => nodes::TRANSPORT,
@@ -47,9 +47,9 @@ impl Stage {
 pub(super) struct Count {
     pub(super) planned: u64,
     pub(super) done: u64,
-    /// Of the node that is under way, in thousandths.
+    /// The progress of the running node, in thousandths.
     pub(super) permille: u64,
-    /// Whether a node has ended that ends the stage.
+    /// Whether a node of the kind that completes the stage has ended.
     has_ended: bool,
 }
 
@@ -58,7 +58,7 @@ impl Count {
         self.has_ended && self.done == self.planned
     }
 
-    /// How much of the stage is done, in thousandths.
+    /// The completed share of the stage, in thousandths.
     pub(super) fn thousandths(self) -> u64 {
         (self.done * 1000 + self.permille).checked_div(self.planned).unwrap_or(0).min(1000)
     }
@@ -72,7 +72,7 @@ pub(super) struct Tally {
 }
 
 impl Tally {
-    /// Takes note of an event; the stage it concerns, with its count.
+    /// Counts an event. Returns the stage it belongs to, with its count.
     pub(super) fn note(&mut self, event: &RunEvent) -> Option<(Stage, Count)> {
         let stage = match event {
             RunEvent::NodeAdded { name } => {
@@ -99,7 +99,7 @@ impl Tally {
         Some((stage, self.counts[&stage]))
     }
 
-    /// The first stage that is not complete, else the last one.
+    /// The first stage that is not complete; the last one if all are.
     pub(super) fn latest(&self) -> Option<(Stage, Count)> {
         let open = self.counts.iter().find(|(_, count)| !count.is_complete());
         open.or_else(|| self.counts.last_key_value()).map(|(stage, count)| (*stage, *count))
@@ -109,7 +109,7 @@ impl Tally {
     fn stage_of(&self, name: &NodeName) -> Option<Stage> {
         let is_judged = self.counts.get(&Stage::Judging).is_some_and(|count| count.has_ended);
         Some(match name.kind.as_str() {
-            // What is integrated after the candidates were judged is for polish.
+            // Tables that are added after the candidates were judged are for polish.
             nodes::TRANSPORT | nodes::TRANSPORT_FULL if is_judged => Stage::Polish,
             nodes::TRANSPORT => Stage::Tables,
             nodes::SEARCH => Stage::Searches,

@@ -1,4 +1,4 @@
-//! Seconds per stage and per process, for people: nothing of it reaches a result.
+//! Seconds per stage and per process. They are shown to the user; no result depends on them.
 
 use lookalike::nodes;
 use lookalike_coordinator::events::RunEvent;
@@ -8,7 +8,7 @@ use nix::sys::{
 };
 use std::time::Instant;
 
-/// Notes when the stages end.
+/// Records when the stages end.
 #[derive(Debug)]
 pub(crate) struct Clock {
     began: Instant,
@@ -31,7 +31,7 @@ impl Clock {
         }
     }
 
-    /// The last stage ends now.
+    /// Ends the last stage.
     pub(crate) fn end(&mut self) {
         self.ends[NAMES.len() - 1] = Some(self.total());
     }
@@ -53,7 +53,7 @@ impl Clock {
     }
 }
 
-/// User and system time of this process and of its local workers, which have ended.
+/// User and system time of this process and of its local workers, which must have ended.
 pub(crate) fn cpu_seconds() -> Vec<(&'static str, f64)> {
     let seconds = |time: TimeVal| time.tv_sec() as f64 + time.tv_usec() as f64 * 1e-6;
     let of = |usage: Usage| seconds(usage.user_time()) + seconds(usage.system_time());

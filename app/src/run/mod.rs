@@ -1,4 +1,4 @@
-//! What fits, batches and studies share of running: the engine with its runtime, the clock, a run that is finished already.
+//! Running a graph, as fits, batches and studies do it: the engine with its runtime, the clock, the check for a finished run.
 
 mod clock;
 mod failure;

@@ -1,13 +1,13 @@
-//! A run that is finished already, and is asked for again.
+//! Detects that the requested run is finished already.
 
 use crate::outputs::{OutFolder, changed};
 use anyhow::bail;
 use lookalike_coordinator::journal::{self, JOURNAL_FILE, RunIdentity};
 
-/// Whether there is nothing left to do: the run in a folder is finished, and its results are as it wrote them.
+/// Whether nothing is left to do: the run in a folder is finished, and its results are as it wrote them.
 ///
 /// # Errors
-/// If the run there is one of other inputs or settings, or a result was changed.
+/// If that run has other inputs or settings, or a result was changed.
 pub(crate) fn is_finished(
     out: &OutFolder,
     out_name: &str,
@@ -30,10 +30,10 @@ pub(crate) fn is_finished(
     Ok(false)
 }
 
-/// Which of the files that the run in a folder wrote are not there any more.
+/// The missing ones of the files that the run in a folder wrote.
 ///
 /// # Errors
-/// If one was changed: it may be somebody's.
+/// If one was changed: a user may have edited it.
 pub(crate) fn missing(out: &OutFolder, out_name: &str, files: &[(String, String)]) -> anyhow::Result<Vec<String>> {
     let mut missing = Vec::new();
     for (name, hash) in files {

@@ -1,4 +1,4 @@
-//! A run from its settings to its end: what a fit and a batch have in common.
+//! Runs a planner with the given settings to its end; fits, batches and studies use it.
 
 use crate::{
     exit::Exit,
@@ -15,7 +15,7 @@ use lookalike_coordinator::{
 };
 use std::sync::Arc;
 
-/// How a run with these settings treats its workers; its access file goes to `out`. The seed decides which outputs are verified.
+/// The options of a run with these settings. Its access file goes to `out`; the seed decides which outputs are verified.
 pub(crate) fn runner_options(cluster: &ClusterSettings, out: &OutFolder, seed: u64) -> RunnerOptions {
     let mut options = RunnerOptions::new(cluster.workers.count(), out.file(ACCESS_FILE));
     options.listen = cluster.listen_for_others();
@@ -51,7 +51,7 @@ pub(crate) fn run_to_end<P: Planner>(
     runtime.block_on(run).map_err(|error| {
         match error.exit_code() {
             2 => anyhow::Error::new(error).context(Exit::BadInput),
-            // The heading says it all.
+            // The heading is enough; the error would repeat it.
             130 => Exit::Interrupted.into(),
             _ => anyhow::Error::new(error).context(Exit::ClusterFailed),
         }

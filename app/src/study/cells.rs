@@ -1,4 +1,4 @@
-//! A study as a list of cells: what is computed as one part of the run, and which other cells it needs first.
+//! A study as a list of cells. A cell is computed as one part of the run, and may need other cells first.
 
 use super::file::{Experiment, Study};
 use anyhow::bail;
@@ -11,7 +11,7 @@ use std::collections::BTreeMap;
 /// The number of a cell.
 pub(super) type CellId = usize;
 
-/// Where and what: numbers of a material and a light, and columns and rows.
+/// A material and a light, by number, and the width and height in pixels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct Scene {
     pub(super) material: usize,
@@ -22,20 +22,20 @@ pub(super) struct Scene {
 /// A part of the run.
 #[derive(Debug, Clone)]
 pub(super) struct Cell {
-    /// Its name, which is also that of its files.
+    /// Its name, and that of its files.
     pub(super) name: String,
     pub(super) scene: Scene,
     pub(super) task: Task,
-    /// The cells that have to be complete before it can begin; the photo of its scene is the first.
+    /// The cells that must be complete before it can begin. The photo of its scene comes first.
     pub(super) needs: Vec<CellId>,
 }
 
-/// What a cell computes.
+/// The task of a cell.
 #[derive(Debug, Clone)]
 pub(super) enum Task {
     /// The photo of its scene.
     Photo,
-    /// The table of its light and size, for all that follow.
+    /// The table of its light and size, which other cells share.
     Table,
     /// A fit.
     Fit(Box<FitTask>),
@@ -45,7 +45,7 @@ pub(super) enum Task {
     LowRes,
     /// The matches of other cells, scored and rendered in this scene.
     Appraise { of: Vec<(CellId, What)>, pictures: usize },
-    /// All matches of other cells and many beside the winner, scored by CSSIM and Eq. 1.
+    /// All matches of other cells, and many points around the winner, scored by CSSIM and Eq. 1.
     Agreement { of: Vec<CellId> },
     /// The candidates of a fit, rendered by the direct integrator.
     Direct { of: CellId, candidate: usize, samples: u32 },
@@ -62,7 +62,7 @@ pub(super) enum What {
     L2,
     /// The best candidate of the gammas that are at least [`APART`] from the winner's.
     RunnerUp,
-    /// The best that brute force has found.
+    /// The best point that brute force has found.
     Minimum,
 }
 
@@ -73,13 +73,13 @@ pub(super) struct FitTask {
     pub(super) method: Method,
     /// Whether candidates are judged on the shared table.
     pub(super) is_shared: bool,
-    /// Whether Eq. 1 is clamped to what a display shows.
+    /// Whether radiance in Eq. 1 is clamped to what a display shows.
     pub(super) is_clamped: bool,
-    /// Its pictures: how the match, and the polished match, are called in names of files.
+    /// The word for the match in the names of its pictures; `None` without pictures.
     pub(super) pictures: Option<&'static str>,
 }
 
-/// All cells, each after those that it needs.
+/// All cells. A cell comes after those that it needs.
 pub(super) fn plan(study: &Study) -> anyhow::Result<Vec<Cell>> {
     let mut plan =
         Plan { study, model: brdf::model(&study.file.model)?, cells: Vec::new(), known: BTreeMap::new(), clash: None };
@@ -95,12 +95,12 @@ struct Plan<'a> {
     model: &'static dyn Model,
     cells: Vec<Cell>,
     known: BTreeMap<String, CellId>,
-    /// A name that two different cells would have.
+    /// A name that two different cells share.
     clash: Option<String>,
 }
 
 impl Plan<'_> {
-    /// In the order in which their nodes are to run: what much depends on first.
+    /// Adds all cells in the order in which their nodes should run: those that many others need come first.
     fn everything(&mut self) -> anyhow::Result<()> {
         let (all, probes) = ((0..self.study.materials.len()).collect::<Vec<_>>(), self.study.probes);
         let six = self.study.numbers(&self.study.file.six);
@@ -170,10 +170,10 @@ impl Plan<'_> {
         Method { model: self.model, seed: self.study.file.seed, ..Method::default() }
     }
 
-    /// The number of the cell of this name, which is made if it is not there.
+    /// The number of the cell of this name, which is added if it is new.
     fn cell(&mut self, name: String, scene: Scene, task: Task, needs: Vec<CellId>) -> CellId {
         if let Some(&known) = self.known.get(&name) {
-            // Names are made of those of material and light: "a" under "b-c" and "a-b" under "c" would be one.
+            // Names consist of those of material and light, so "a" under "b-c" and "a-b" under "c" would share one.
             if self.cells[known].scene != scene && !matches!(task, Task::Table) {
                 self.clash.get_or_insert(name);
             }
@@ -193,7 +193,7 @@ impl Plan<'_> {
         self.cell(self.name(scene, "photo"), scene, Task::Photo, Vec::new())
     }
 
-    /// The table of a light and a size; which material is photographed for it does not matter.
+    /// The table of a light and a size. It is the same for every material.
     fn table(&mut self, scene: Scene) -> CellId {
         let photo = self.photo(scene);
         let name = format!("table-{}-{}", self.study.lights[scene.light].0, scene.size);
@@ -221,7 +221,7 @@ impl Plan<'_> {
         self.cell(self.name(scene, "brute"), scene, task, needs)
     }
 
-    /// The paper's method and single costs.
+    /// The paper's method, and a fit with a single cost (logarithm).
     fn rivals(&mut self, scene: Scene) -> anyhow::Result<()> {
         let paper = Method {
             model: brdf::PAPER_MODEL,
@@ -265,7 +265,7 @@ impl Plan<'_> {
         }
     }
 
-    /// Numbers of pixels, and ways to draw them.
+    /// Fits with different numbers of pixels, and different ways of drawing them.
     fn sampled(&mut self, six: &[usize]) -> anyhow::Result<()> {
         let (samples, sampling) = (self.study.has(Experiment::Samples), self.study.has(Experiment::Sampling));
         let repeated = self.study.numbers(&self.study.file.repeat_materials);
@@ -333,7 +333,7 @@ impl Plan<'_> {
         }
     }
 
-    /// The same fit with other models: some in every scene, more where experiments repeat.
+    /// The same fit with other models: some in every scene, more in the scenes of the experiments that repeat.
     fn other_models(&mut self, scene: Scene, is_repeat_probe: bool) -> anyhow::Result<()> {
         let file = &self.study.file;
         let repeats = is_repeat_probe && self.study.numbers(&file.repeat_materials).contains(&scene.material);
@@ -364,7 +364,7 @@ impl Plan<'_> {
         }
     }
 
-    /// What an evaluation costs without tables, per light; and brute force without them, on a small photo.
+    /// The cost of an evaluation without tables, per light; and brute force without tables, on a small photo.
     fn direct(&mut self) {
         let size = self.study.file.size;
         let first = self.study.numbers(&self.study.file.six).first().copied().unwrap_or(0);
@@ -391,11 +391,11 @@ impl Plan<'_> {
     }
 }
 
-/// Subsets of the experiment on several of them.
+/// The number of subsets in the experiment on several subsets.
 const SUBSETS: u32 = 4;
 
 impl FitTask {
-    /// What tells it from the other fits of its scene.
+    /// Distinguishes it from the other fits of its scene.
     fn label(&self) -> String {
         let Method { model, samples, sampling, subsets, seed, polish, gammas, .. } = &self.method;
         let samples = match samples {
@@ -411,13 +411,13 @@ impl FitTask {
     }
 }
 
-/// Lights outside, materials inside: all that is under one light at a time shares its tables.
+/// Pairs of light and material, with the light in the outer loop: cells under one light share its tables.
 fn product(lights: usize, materials: &[usize]) -> impl Iterator<Item = (usize, usize)> + use<> {
     let materials = materials.to_vec();
     (0..lights).flat_map(move |light| materials.clone().into_iter().map(move |material| (light, material)))
 }
 
-/// Where brute force starts: at the paper's point; as a plastic, and as a metal.
+/// The starts of brute force: the paper's start, a plastic, and a metal.
 fn starts(model: &dyn Model) -> Vec<(&'static str, Vec<f64>)> {
     let paper: Vec<f64> =
         model.parameters().iter().flat_map(|p| std::iter::repeat_n(p.start, p.channels.count())).collect();
@@ -474,7 +474,7 @@ mod tests {
     fn an_experiment_alone_plans_what_it_needs_and_no_more() {
         let cells = plan(&study("experiments = ['samples']")).unwrap();
         let fits = cells.iter().filter(|cell| matches!(cell.task, Task::Fit(_))).count();
-        // 256 pixels, 32, 64 and all.
+        // 256 pixels, 32, 64, and all pixels.
         assert_eq!(fits, 2 * 4);
         assert!(!cells.iter().any(|cell| matches!(cell.task, Task::Brute { .. } | Task::Appraise { .. })));
     }

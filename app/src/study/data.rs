@@ -1,4 +1,4 @@
-//! From the records of all cells to the table that the report is made of.
+//! Collects the records of all cells in the table that the report is made from.
 
 use super::{
     cells::{Cell, FitTask, Task, What},
@@ -18,7 +18,7 @@ use lookalike::{
 use lookalike_report::measured::{Agreement, DirectCost, Method as MethodName, Photo, Row};
 use std::collections::BTreeMap;
 
-/// What the report's tables are made of.
+/// The data for the report's tables.
 #[derive(Debug, Default)]
 pub(super) struct Data {
     pub(super) photos: Vec<Photo>,
@@ -54,7 +54,7 @@ impl Collector<'_> {
             (Task::Fit(task), Content::Fit { .. }) => self.fit(cell, task, record),
             (Task::Brute { starts, direct }, Content::Survey { minima, .. }) => {
                 let method = if direct.is_some() { MethodName::BruteDirect } else { MethodName::Brute };
-                // All starts read one table.
+                // All starts read the same table.
                 let table = self.seconds.sum(&record.labels, |node| node.starts_with("transport "));
                 for (s, ((name, _), minimum)) in starts.iter().zip(minima).enumerate() {
                     let label = format!("brute-force from start {s}");
@@ -122,7 +122,7 @@ impl Collector<'_> {
         Ok(())
     }
 
-    /// Exposure before the metric of a scene, if its photo is there.
+    /// The exposure before the metric for a scene, if its photo is written.
     fn exposure(&self, cell: &Cell) -> anyhow::Result<Option<f64>> {
         let name = format!("{}-photo", base(self.inputs, cell.scene));
         let Some(photo) = record::read_image(&self.inputs.out, &name)? else { return Ok(None) };
@@ -132,7 +132,7 @@ impl Collector<'_> {
         Ok(Some(auto_exposure(&photo, &coverage)?))
     }
 
-    /// A row of a match on the light and at the size of its cell.
+    /// A row of a match under the light and at the size of its cell.
     fn row(&self, cell: &Cell, model: &str, method: MethodName, found: &Match, cpu_seconds: f64) -> Row {
         let (material, probe) = self.names(cell);
         Row {
@@ -162,7 +162,7 @@ impl Collector<'_> {
         }
     }
 
-    /// The rows of a fit: what each method would have taken of it, and what that alone costs.
+    /// The rows of a fit: for each method, the part of the fit that it consists of, and the cost of that part.
     fn fit(&mut self, cell: &Cell, task: &FitTask, record: &Record) -> anyhow::Result<()> {
         let Content::Fit { candidates, winner, polished, explored } = &record.content else { return Ok(()) };
         let model = task.method.model.name();
@@ -231,7 +231,7 @@ impl Collector<'_> {
         Ok(())
     }
 
-    /// Rows of a match by other metrics.
+    /// Rows of a match for the variants of the metric.
     fn variants(&mut self, cell: &Cell, method: MethodName, what: &str, found: Option<&Match>) -> anyhow::Result<()> {
         if cell.scene.size < variants::SMALLEST {
             return Ok(());
@@ -283,9 +283,9 @@ impl Collector<'_> {
     }
 }
 
-/// What is wrong with a record that another version, or somebody else, has written.
+/// The message about a record whose content does not belong to its cell.
 fn foreign(cell: &Cell) -> String {
-    format!("cells/{}.json is no record of this study; remove it, and --resume computes it again", cell.name)
+    format!("cells/{}.json is not a record of this study; remove it, and --resume computes it again", cell.name)
 }
 
 fn named(model: &str, parameters: &[f64]) -> BTreeMap<String, f64> {
@@ -293,7 +293,7 @@ fn named(model: &str, parameters: &[f64]) -> BTreeMap<String, f64> {
     names.into_iter().zip(parameters.iter().copied()).collect()
 }
 
-/// Spearman's rank correlation; ranks of equal values are their mean.
+/// Spearman's rank correlation. Equal values get the mean of their ranks.
 fn spearman(a: &[f64], b: &[f64]) -> f64 {
     let (a, b) = (ranks(a), ranks(b));
     let mean = (a.len() as f64 - 1.0) / 2.0;

@@ -1,4 +1,4 @@
-//! What all processes of a study have taken together, for the report.
+//! The time and the workers that all processes of a study used, for the report.
 
 use crate::outputs::OutFolder;
 use anyhow::Context;
@@ -10,14 +10,14 @@ pub(super) const FILE: &str = "effort.json";
 /// Time and workers.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct Effort {
-    /// Seconds that cells were computed, from the start of each process to the end of its last cell.
+    /// Seconds during which cells were computed: from the start of each process to the end of its last cell.
     pub(super) seconds: f64,
-    /// The most workers that joined one process.
+    /// The most workers that joined a single process.
     pub(super) workers: u32,
 }
 
 impl Effort {
-    /// That of earlier processes; none where none has ended in order.
+    /// The effort of earlier processes; zero if no process has ended in order.
     pub(super) fn read(out: &OutFolder) -> Self {
         fs::read_to_string(out.file(FILE)).ok().and_then(|text| serde_json::from_str(&text).ok()).unwrap_or_default()
     }

@@ -1,4 +1,4 @@
-//! STUDY.toml: which materials, lights and experiments.
+//! Reads STUDY.toml: materials, lights and experiments.
 
 use anyhow::{Context, bail, ensure};
 use glob::{MatchOptions, Pattern};
@@ -10,27 +10,27 @@ use std::{
     path::{Path, PathBuf},
 };
 
-/// A study as its file describes it. docs/study.md explains every key.
+/// The content of a study's file. docs/study.md explains every key.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub(super) struct StudyFile {
-    /// Measured materials: files in MERL's format, or patterns of them.
+    /// Measured materials: files in MERL's format, or glob patterns.
     materials: Vec<String>,
     /// Lights to fit under.
     probes: Vec<String>,
-    /// Lights to show matches under, never to fit to.
+    /// Lights under which matches are shown and to which none are fitted.
     #[serde(default)]
     held_out: Vec<String>,
-    /// The materials of the paper's tables, by name; the first six if left out.
+    /// The materials of the paper's tables, by name. Default: the first six.
     #[serde(default)]
     pub(super) six: Vec<String>,
     /// The model of most experiments.
     #[serde(default = "default_model")]
     pub(super) model: String,
-    /// Models of the table of models, beside it, on every material under every probe.
+    /// Further models for the table of models, on every material under every probe.
     #[serde(default)]
     pub(super) models: Vec<String>,
-    /// More of them, on the materials of the experiments that repeat and under the light of these alone.
+    /// Further models, only on the materials and under the light of the experiments that repeat.
     #[serde(default)]
     pub(super) more_models: Vec<String>,
     /// Columns and rows of the photos.
@@ -42,39 +42,39 @@ pub(super) struct StudyFile {
     /// Pairs of material and probe that are also fitted at the size `large`.
     #[serde(default)]
     pub(super) large_cells: Vec<[String; 2]>,
-    /// Sizes of low-resolution brute force; those below `size` (and below `large` for its cells) count.
+    /// Sizes of low-resolution brute force. Only those below `size` (or `large`, for its cells) are used.
     #[serde(default = "default_low")]
     pub(super) low_resolutions: Vec<u32>,
     /// Samples per pixel of photos.
     #[serde(default = "default_photo_samples")]
     pub(super) photo_samples: u32,
-    /// Samples per pixel of the direct renderings whose cost brute force is charged.
+    /// Samples per pixel of direct renderings. Brute force is charged their cost.
     #[serde(default = "default_direct_samples")]
     pub(super) direct_samples: u32,
-    /// Columns and rows of brute force without tables; 0 leaves it out.
+    /// Columns and rows of the photo for brute force without tables; 0 skips it.
     #[serde(default)]
     pub(super) direct_size: u32,
-    /// Seeds of the experiments that repeat.
+    /// The number of seeds of the experiments that repeat.
     #[serde(default = "default_seeds")]
     pub(super) seeds: u32,
-    /// The gammas of fits to all pixels, which take minutes; the default ones if left out.
+    /// The gammas of fits to all pixels, which take minutes. Default: those of all fits.
     #[serde(default)]
     pub(super) full_gammas: Vec<f64>,
-    /// The light of the experiments that repeat, of models and of subsets, by name; the first probe if left out.
+    /// The light of the experiments that repeat, of models and of subsets, by name. Default: the first probe.
     #[serde(default)]
     pub(super) repeat_probe: String,
-    /// The materials of the experiments that repeat, and of the ways to draw pixels, by name; the first three of `six` if left out.
+    /// The materials of the experiments that repeat and of the ways to draw pixels, by name. Default: the first three of `six`.
     #[serde(default)]
     pub(super) repeat_materials: Vec<String>,
     /// The seed of everything else.
     #[serde(default)]
     pub(super) seed: u64,
-    /// Experiments; all if left out.
+    /// Experiments. Default: all.
     #[serde(default = "all_experiments")]
     experiments: BTreeSet<Experiment>,
 }
 
-/// A part of a study.
+/// An experiment of a study.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub(super) enum Experiment {
@@ -100,7 +100,7 @@ pub(super) enum Experiment {
     Agreement,
     /// Several subsets of pixels.
     Subsets,
-    /// What direct renderings cost.
+    /// The cost of direct renderings.
     Direct,
 }
 
@@ -121,7 +121,7 @@ impl Experiment {
     ];
 }
 
-/// A study with its files found.
+/// A study whose files were found.
 #[derive(Debug, Clone)]
 pub(super) struct Study {
     pub(super) file: StudyFile,
@@ -129,9 +129,9 @@ pub(super) struct Study {
     pub(super) text: String,
     /// Measured materials by name.
     pub(super) materials: Vec<(String, PathBuf)>,
-    /// Lights by name: those to fit under first.
+    /// Lights by name. Those to fit to come first.
     pub(super) lights: Vec<(String, PathBuf)>,
-    /// How many lights are fitted under.
+    /// The number of lights to fit to.
     pub(super) probes: usize,
 }
 
@@ -139,7 +139,7 @@ impl Study {
     /// Reads a study and finds its files.
     ///
     /// # Errors
-    /// If the file cannot be read, or says something that makes no study.
+    /// If the file cannot be read or is not a valid study.
     pub(super) fn read(path: &Path) -> anyhow::Result<Self> {
         let text = fs::read_to_string(path).with_context(|| format!("cannot read the study {}", path.display()))?;
         let shown = path.display().to_string();
@@ -154,7 +154,7 @@ impl Study {
         Ok(study)
     }
 
-    /// Whether an experiment is part of it.
+    /// Whether the study includes an experiment.
     pub(super) fn has(&self, experiment: Experiment) -> bool {
         self.file.experiments.contains(&experiment)
     }
@@ -218,7 +218,7 @@ impl Study {
         }
         let sizes = [self.file.size, self.file.large].into_iter().chain(self.file.low_resolutions.iter().copied());
         for size in sizes.chain((self.file.direct_size > 0).then_some(self.file.direct_size)) {
-            // A fit to all pixels of a larger photo would not fit into memory.
+            // A fit to all pixels of a larger photo needs too much memory.
             ensure!((16..=512).contains(&size), "sizes must lie between 16 and 512 pixels, found {size}");
         }
         for (name, samples) in
@@ -235,7 +235,7 @@ impl Study {
     }
 }
 
-/// The files of some names or patterns, each with the name that the study knows it by.
+/// The files of names or patterns, each with its name in the study.
 fn named(patterns: &[String], folder: &Path) -> anyhow::Result<Vec<(String, PathBuf)>> {
     let mut found = Vec::new();
     for text in patterns {
@@ -258,7 +258,7 @@ fn named(patterns: &[String], folder: &Path) -> anyhow::Result<Vec<(String, Path
     found.into_iter().map(|path| Ok((name_of(&path)?, path))).collect()
 }
 
-/// The name of a file without its ending: what the report, the names of pictures and other keys of the study call it.
+/// The name of a file without its extension: the name in the report, in picture names and in other keys of the study.
 fn name_of(path: &Path) -> anyhow::Result<String> {
     let stem = path.file_stem().and_then(|stem| stem.to_str()).unwrap_or_default();
     let is_plain = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_' || c == '.';

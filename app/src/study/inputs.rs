@@ -1,4 +1,4 @@
-//! What the cells of a study are made from.
+//! The inputs of the cells of a study.
 
 use super::{cells::Cell, file::Study};
 use crate::outputs::OutFolder;
@@ -16,7 +16,7 @@ pub(super) struct Light {
     pub(super) encoded: Blob,
 }
 
-/// What all cells are made from.
+/// The inputs of all cells.
 #[derive(Debug)]
 pub(super) struct Inputs {
     pub(super) study: Study,

@@ -1,5 +1,5 @@
-//! `lookalike study`: the paper's experiments on measured materials under real light, beside rival methods, as one run on the job
-//! graph.
+//! `lookalike study`: runs the paper's experiments and rival methods on measured materials under real light, as one run on the
+//! job graph.
 //!
 //! ```text
 //!   STUDY.toml ──► cells (a photo, a fit, brute force, ..), each with those it needs
@@ -75,7 +75,7 @@ pub(crate) fn run(settings: StudySettings) -> anyhow::Result<ExitCode> {
     let mut effort = Effort::read(&inputs.out);
     let journal = inputs.out.file(JOURNAL_FILE);
     if journal.exists() {
-        // Refuses the run of another study, also where nothing is left to compute.
+        // Refuses to resume the run of another study, even if nothing is left to compute.
         journal::finished(&journal, &identity(&inputs)?).map_err(journal_failed)?;
     }
     if !supply.is_complete() || !journal.exists() {
@@ -95,7 +95,7 @@ pub(crate) fn run(settings: StudySettings) -> anyhow::Result<ExitCode> {
     Ok(if failed.is_empty() { Exit::Done } else { Exit::SomeFitsFailed }.into())
 }
 
-/// Tells what is wrong with a study, without running it.
+/// Checks a study without running it.
 pub(crate) fn check(settings: &StudySettings) -> anyhow::Result<()> {
     let study = Study::read(&settings.study)?;
     claim(settings, &study).check()?;
@@ -104,7 +104,7 @@ pub(crate) fn check(settings: &StudySettings) -> anyhow::Result<()> {
     read_lights(&study).map(|_| ())
 }
 
-/// Computes the cells that are not complete; how many workers there were.
+/// Computes the cells that are not complete. Returns how many workers joined.
 fn run_cells(
     settings: &StudySettings,
     inputs: &Arc<Inputs>,
@@ -112,12 +112,12 @@ fn run_cells(
     (supply, seconds): (Supply, &mut Seconds),
     metrics: Option<&Metrics>,
 ) -> anyhow::Result<u32> {
-    // Tables stay until the run ends.
+    // Tables do not end before the run.
     let ending = inputs.cells.iter().filter(|cell| !matches!(cell.task, cells::Task::Table)).count();
     let mut progress = Progress::new(settings.progress, ending);
     progress.complete(lock(tally).complete);
     let mut options = runner_options(&settings.cluster, &inputs.out, inputs.study.file.seed);
-    // Seconds of a node are those of one core.
+    // The seconds of a node are to be those of one core.
     options.threads_per_worker = std::num::NonZeroUsize::new(1);
     options.journal = Some(JournalOptions {
         path: inputs.out.file(JOURNAL_FILE),
@@ -139,7 +139,7 @@ fn run_cells(
     Ok(workers)
 }
 
-/// What the study asks of its folder.
+/// The files that the study reads and writes.
 fn claim<'a>(settings: &'a StudySettings, study: &'a Study) -> Claim<'a> {
     let mut inputs: Vec<&Path> = study.materials.iter().chain(&study.lights).map(|(_, path)| path.as_path()).collect();
     inputs.push(&settings.study);
@@ -155,7 +155,7 @@ fn claim<'a>(settings: &'a StudySettings, study: &'a Study) -> Claim<'a> {
     }
 }
 
-/// Tells the journal that all has ended.
+/// Marks the run as ended in the journal.
 fn end(out: &OutFolder, failed: usize) -> anyhow::Result<()> {
     let path = out.file(JOURNAL_FILE);
     if failed > 0 {
@@ -193,7 +193,7 @@ fn read_lights(study: &Study) -> anyhow::Result<Vec<Light>> {
     Ok(lights)
 }
 
-/// What the run is a run of. What the file says counts, not how it is written.
+/// The identity of the run. It depends on the settings in the file, not on how the file is written.
 fn identity(inputs: &Inputs) -> anyhow::Result<RunIdentity> {
     let study = &inputs.study;
     let mut identity = version();

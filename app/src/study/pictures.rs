@@ -1,4 +1,4 @@
-//! The pictures of a study: what a display shows, for the report, and linear ones of the main methods, for other metrics.
+//! The pictures of a study: as a display shows them, for the report; linear ones of the main methods, for other metrics.
 
 use super::{
     cells::{Cell, Scene, Task},
@@ -9,7 +9,7 @@ use super::{
 use lookalike::image::Image;
 use lookalike_report::measured::Method as MethodName;
 
-/// Writes the pictures of a cell. `exposure` is that of a scene's photo.
+/// Writes the pictures of a cell. `exposure` is that of the scene's photo.
 pub(super) fn write(
     inputs: &Inputs,
     cell: &Cell,
@@ -62,20 +62,20 @@ pub(super) fn write(
     }
 }
 
-/// The name of a scene in names of files.
+/// A scene's part of file names.
 pub(super) fn base(inputs: &Inputs, scene: Scene) -> String {
     let (material, light) = (&inputs.study.materials[scene.material].0, &inputs.study.lights[scene.light].0);
     format!("{material}-{light}-{}", scene.size)
 }
 
-/// The name of a match under another light.
+/// The file name of a match under another light.
 fn held_out_base(inputs: &Inputs, fitted: Scene, shown: Scene) -> String {
     let material = &inputs.study.materials[fitted.material].0;
     let (light, at) = (&inputs.study.lights[fitted.light].0, &inputs.study.lights[shown.light].0);
     format!("{material}-{light}-at-{at}-{}", shown.size)
 }
 
-/// The exposure of a photo that is not a capture yet.
+/// The exposure for a photo that has no capture yet.
 fn own_exposure(photo: &Image, size: u32) -> anyhow::Result<f64> {
     let geometry = geometry(size)?;
     let (width, height) = (photo.width(), photo.height());

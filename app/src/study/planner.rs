@@ -1,4 +1,4 @@
-//! What plans a cell, whatever it computes, and remembers which nodes it was told of: they say what the cell cost.
+//! The planner of a cell. It records the labels of the cell's nodes, from which the cell's cost is computed.
 
 use lookalike::{
     graph::{Blob, GraphEdit, NodeId, NodeSpec, PlanError, Planner},
@@ -21,7 +21,7 @@ enum Inner {
     Survey(Box<SurveyPlanner>),
 }
 
-/// What a cell has computed.
+/// The outcome of a cell.
 #[derive(Debug)]
 pub(super) enum Outcome {
     /// The image, and the standard error of a typical pixel.
@@ -43,7 +43,7 @@ impl CellPlanner {
         Self { inner: Inner::Survey(Box::new(planner)), labels: BTreeSet::new() }
     }
 
-    /// The labels of its nodes, and what it has computed, once its nodes are complete.
+    /// The labels of its nodes, and its outcome if all of them are complete.
     pub(super) fn into_outcome(self) -> (BTreeSet<String>, Option<Outcome>) {
         let outcome = match self.inner {
             Inner::Photo(planner) => planner.into_photo().map(|(image, noise)| Outcome::Photo(image, noise)),

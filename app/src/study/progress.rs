@@ -1,4 +1,4 @@
-//! How a study is shown while it runs: a bar of cells on a terminal, now and then a line elsewhere.
+//! Shows a study while it runs: a bar of cells on a terminal, occasional lines elsewhere.
 
 use crate::{
     progress::{Display, Ending, display_of_many},
@@ -16,7 +16,7 @@ pub(super) struct Progress {
     cells: usize,
     complete: usize,
     kind: Kind,
-    /// What tells of workers and nodes.
+    /// Shows the events of workers and nodes.
     display: Box<dyn Display>,
     began: Instant,
     told: Instant,
@@ -28,7 +28,7 @@ enum Kind {
     Silent,
 }
 
-/// Between two lines.
+/// The time between two lines.
 const PAUSE: Duration = Duration::from_secs(10);
 
 impl Progress {
@@ -51,7 +51,7 @@ impl Progress {
         }
     }
 
-    /// So many cells are complete.
+    /// Sets the number of complete cells.
     pub(super) fn complete(&mut self, complete: usize) {
         match &self.kind {
             Kind::Bar(bar) => bar.set_position(complete as u64),

@@ -1,5 +1,5 @@
-//! What is kept of a cell: its numbers as JSON, its images as OpenEXR and PNG, in the folder of results. A cell whose record is there is
-//! complete and never computed again.
+//! The stored results of a cell, in the folder of results: numbers as JSON, images as OpenEXR and PNG. A cell that has a record
+//! is complete and is not computed again.
 
 use super::planner::Outcome;
 use crate::outputs::OutFolder;
@@ -21,7 +21,7 @@ pub(super) struct Record {
     pub(super) content: Content,
 }
 
-/// What they are about.
+/// The numbers, depending on the task of the cell.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) enum Content {
     Photo {
@@ -51,9 +51,9 @@ pub(super) struct Match {
     pub(super) cssim: f64,
     pub(super) cssim_object: f64,
     pub(super) evaluations: usize,
-    /// Of a candidate.
+    /// `None` unless it is a candidate.
     pub(super) gamma: Option<f64>,
-    /// Of a candidate.
+    /// `None` unless it is a candidate.
     pub(super) cost: Option<f64>,
 }
 
@@ -91,7 +91,7 @@ impl Match {
 }
 
 impl Content {
-    /// What is kept of an outcome.
+    /// The numbers of an outcome.
     pub(super) fn of(outcome: &Outcome, points: Vec<Vec<f64>>) -> Self {
         match outcome {
             Outcome::Photo(_, noise) => Self::Photo { noise: *noise },
@@ -116,14 +116,14 @@ impl Content {
         }
     }
 
-    /// The lowest of its minima.
+    /// The minimum with the lowest value.
     pub(super) fn minimum(&self) -> Option<&Match> {
         let Self::Survey { minima, .. } = self else { return None };
         minima.iter().min_by(|a, b| a.cssim.total_cmp(&b.cssim))
     }
 }
 
-/// Writes the record of a cell; it counts as complete from then on.
+/// Writes the record of a cell, which makes the cell complete.
 pub(super) fn write(out: &OutFolder, name: &str, record: &Record) -> anyhow::Result<()> {
     let text = serde_json::to_string(record).context("a record")?;
     out.sub("cells")?.write(&format!("{name}.json"), text.as_bytes())
@@ -139,12 +139,13 @@ pub(super) fn read(out: &OutFolder, name: &str) -> anyhow::Result<Option<Record>
     let text = fs::read_to_string(&path).with_context(|| format!("cannot read {shown}"))?;
     let record = serde_json::from_str(&text);
     Ok(Some(
-        record
-            .with_context(|| format!("{shown} is no record of a study; remove it, and --resume computes it again"))?,
+        record.with_context(|| {
+            format!("{shown} is not a record of a study; remove it, and --resume computes it again")
+        })?,
     ))
 }
 
-/// Writes an image of a cell, linear.
+/// Writes a linear image of a cell.
 pub(super) fn write_image(out: &OutFolder, name: &str, image: &Image) -> anyhow::Result<()> {
     let bytes = openexr::write(image, None, &[]).with_context(|| name.to_owned())?;
     out.sub("cells")?.write(&format!("{name}.exr"), &bytes)

@@ -1,5 +1,6 @@
-//! What nodes cost: seconds from their start to the arrival of their output, by label. Workers of one thread each, one per core, make
-//! them seconds of one core. Kept in a file, so that a resumed run knows what was computed before.
+//! The cost of nodes, by label: seconds from the start of a node to the arrival of its output. There is one worker of one
+//! thread per core, so these are seconds of one core. They are kept in a file, so that a resumed run includes earlier
+//! processes.
 
 use crate::outputs::OutFolder;
 use anyhow::Context;
@@ -12,21 +13,21 @@ use std::{
 
 pub(super) const FILE: &str = "seconds.tsv";
 
-/// What begins the lines of another process.
+/// The line that separates processes.
 const EPOCH: &str = "#";
 
 /// The seconds of all nodes.
 #[derive(Debug)]
 pub(super) struct Seconds {
-    /// Of earlier processes.
+    /// Nodes of earlier processes.
     before: BTreeMap<String, f64>,
-    /// Of this one.
+    /// Nodes of this process.
     now: BTreeMap<String, f64>,
     file: File,
 }
 
 impl Seconds {
-    /// Those of an earlier run in the folder, if there was one, and a file to add more to.
+    /// Reads the seconds of an earlier run in the folder, if there was one, and opens their file to append to it.
     pub(super) fn open(out: &OutFolder) -> anyhow::Result<Self> {
         let path = out.file(FILE);
         let shown = path.display().to_string();
@@ -38,13 +39,13 @@ impl Seconds {
         let before = read(&text);
         let file = OpenOptions::new().create(true).append(true).open(&path);
         let mut file = file.with_context(|| format!("cannot write {shown}"))?;
-        // A line that was cut off ends here.
+        // End a line that was cut off.
         let end = if text.is_empty() || text.ends_with('\n') { "" } else { "\n" };
         writeln!(file, "{end}{EPOCH}").with_context(|| format!("cannot write {shown}"))?;
         Ok(Self { before, now: BTreeMap::new(), file })
     }
 
-    /// Takes note of what an event says.
+    /// Adds the seconds of a node that has finished.
     pub(super) fn note(&mut self, event: &RunEvent) {
         let RunEvent::NodeFinished { name, elapsed, .. } = event else { return };
         let seconds = elapsed.as_secs_f64();
@@ -54,7 +55,7 @@ impl Seconds {
         }
     }
 
-    /// The sum over those of the labels that `counts`. A label is that of a node with the name of a cell before it.
+    /// The sum over the labels for which `counts` returns true, which gets each label without the name of its cell.
     pub(super) fn sum(&self, labels: &BTreeSet<String>, counts: impl Fn(&str) -> bool) -> f64 {
         let own = |label: &str| counts(lookalike::graph::split_label(label).1);
         let known = |label: &String| self.now.get(label).or_else(|| self.before.get(label));
@@ -62,11 +63,12 @@ impl Seconds {
     }
 }
 
-/// The seconds by label: several nodes of one label in one process are added up; what a later process computed again counts alone.
+/// The seconds by label. Within one process, nodes with one label are added up; a later process replaces the sum of an earlier
+/// one.
 fn read(text: &str) -> BTreeMap<String, f64> {
     let mut all = BTreeMap::new();
     let mut of_process: BTreeMap<String, f64> = BTreeMap::new();
-    // The last line may have been cut off by the end of the process.
+    // If the process was killed, the last line may be incomplete.
     for line in text.split_inclusive('\n').filter_map(|line| line.strip_suffix('\n')) {
         if line == EPOCH {
             all.append(&mut of_process);

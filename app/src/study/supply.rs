@@ -1,5 +1,5 @@
-//! The cells as parts of the run: each begins when the cells that it needs are complete and workers have little to do, and leaves its
-//! record and its images behind.
+//! The cells as parts of the run. A cell begins when the cells that it needs are complete and the workers have little to do. At
+//! its end its record and its images are written.
 
 use super::{
     cells::{Cell, CellId, Scene, Task, What},
@@ -24,7 +24,7 @@ use std::{
     sync::{Arc, Mutex, PoisonError},
 };
 
-/// How many cells there are, are complete, and have failed: for the display.
+/// The numbers of cells, of complete ones and of failed ones, for the display.
 #[derive(Debug, Default)]
 pub(super) struct Tally {
     pub(super) complete: usize,
@@ -38,7 +38,7 @@ pub(super) struct Supply {
     state: Vec<State>,
     records: BTreeMap<CellId, Record>,
     captures: BTreeMap<Scene, (Arc<Capture>, f64)>,
-    /// Cells under way that end.
+    /// Running cells, without those that last until the run ends.
     active: usize,
     safe: Vec<u32>,
     tally: Arc<Mutex<Tally>>,
@@ -52,7 +52,7 @@ enum State {
     Failed,
 }
 
-/// Cells under way beside one another: enough to share the tables that several of them need.
+/// The most cells that run at a time: enough to share the tables that several of them need.
 const MOST_ACTIVE: usize = 48;
 
 impl Supply {
@@ -92,7 +92,7 @@ impl Supply {
         change(&mut self.tally.lock().unwrap_or_else(PoisonError::into_inner));
     }
 
-    /// Tables that no open cell needs are not computed again.
+    /// Marks tables as complete that no open cell needs, so that they are not computed again.
     fn settle_tables(&mut self) {
         let inputs = Arc::clone(&self.inputs);
         for (id, cell) in inputs.cells.iter().enumerate() {
@@ -127,7 +127,7 @@ impl Supply {
                 continue;
             }
             let is_there = |need: &CellId| match inputs.cells[*need].task {
-                // It is under way until the run ends.
+                // A table runs until the run ends.
                 Task::Table => self.state[*need] != State::Waiting,
                 _ => self.state[*need] == State::Complete,
             };
@@ -248,7 +248,7 @@ impl Supply {
         Some(found.parameters.clone())
     }
 
-    /// Keeps what a cell has computed.
+    /// Writes what a cell has computed.
     fn keep(&mut self, id: CellId, planner: CellPlanner) -> anyhow::Result<()> {
         let inputs = Arc::clone(&self.inputs);
         let cell = &inputs.cells[id];
@@ -316,7 +316,7 @@ impl Parts for Supply {
     }
 }
 
-/// Matches around one: each parameter moved by up to a fifth of its range, less and less.
+/// Points around a match: each parameter is moved by up to a fifth of its range, decreasing from point to point.
 fn around(point: &[f64], model: &str) -> anyhow::Result<Vec<Vec<f64>>> {
     const COUNT: u64 = 40;
     let (lower, upper) = brdf::flat_bounds(brdf::model(model)?.parameters());
@@ -332,5 +332,5 @@ fn around(point: &[f64], model: &str) -> anyhow::Result<Vec<Vec<f64>>> {
 }
 
 fn missing(cell: &Cell) -> anyhow::Error {
-    anyhow!("{}: what it needs has no such match: please report this", cell.name)
+    anyhow!("{}: a cell that it needs has no such match; please report this", cell.name)
 }

@@ -1,4 +1,5 @@
-//! The metric's variants on the matches of the main methods: whether what the study concludes depends on how CSSIM is set.
+//! Scores the matches of the main methods by variants of the metric, to test whether the study's conclusions depend on CSSIM's
+//! settings.
 
 use lookalike::{
     image::Image,
@@ -8,10 +9,10 @@ use lookalike::{
     },
 };
 
-/// Columns and rows below which a photo has no variants: half of them, and a quarter, have to hold the metric's windows.
+/// The smallest width and height for variants: half and a quarter of the photo must still hold the metric's windows.
 pub(super) const SMALLEST: u32 = 44;
 
-/// Scores of an image against a photo over black, by the name of the variant.
+/// Scores of an image against a photo over black, by name of the variant.
 pub(super) fn scores(photo: &Image, image: &Image, exposure: f64) -> Result<Vec<(&'static str, f64)>, MetricError> {
     let coverage: Vec<f32> = vec![1.0; photo.width() * photo.height()];
     let displayed = |image: &Image, exposure| {
@@ -37,14 +38,14 @@ pub(super) fn scores(photo: &Image, image: &Image, exposure: f64) -> Result<Vec<
         ("iCID", icid(&reference, &shown, &coverage, &IcidOptions::default())?.icid),
     ];
     scores.push(("three scales", with(CidOptions { scales: Scales::Three, ..CidOptions::default() })?));
-    // The coarsest of five has a sixteenth of the columns and rows.
+    // The coarsest of five scales has a sixteenth of the columns and rows.
     if photo.width().min(photo.height()) >= 176 {
         scores.push(("five scales", with(CidOptions { scales: Scales::Five, ..CidOptions::default() })?));
     }
     Ok(scores)
 }
 
-/// Half the columns and rows, each pixel the mean of four.
+/// Halves columns and rows; a pixel is the mean of four.
 fn halved(image: &Image) -> Image {
     let (width, height) = (image.width() / 2, image.height() / 2);
     let mean = |i: usize| {

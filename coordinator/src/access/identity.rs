@@ -10,13 +10,13 @@ use rustls::CertificateError;
 use rustls::pki_types::pem::PemObject;
 use rustls::pki_types::{CertificateDer, PrivateKeyDer, UnixTime};
 
-/// How far the clocks of workers may be behind when a certificate is new.
+/// A new certificate is accepted by workers whose clocks are slow by up to this.
 const CLOCK_SKEW: Duration = Duration::from_hours(48);
-/// How long a certificate is valid: longer than any run, and long enough for an access file that is made once for a cluster.
+/// How long a certificate is valid: longer than any run, so that an access file can be made once for a cluster.
 const VALIDITY: Duration = Duration::from_hours(24 * 365 * 2);
 
-/// A self-signed certificate with its Ed25519 key: what a coordinator shows to workers, and what makes it theirs. A copy of it can
-/// stand in for the coordinator as far as TLS goes, so it stays with the coordinator.
+/// A self-signed certificate with its Ed25519 key, by which workers recognise the coordinator. A process with a copy of the key
+/// passes TLS as the coordinator, so it stays with the coordinator.
 pub struct Identity {
     certificate: CertificateDer<'static>,
     key: PrivateKeyDer<'static>,
@@ -27,7 +27,7 @@ impl Identity {
     /// A new identity, valid from two days before `now` for two years.
     ///
     /// # Errors
-    /// When the system gives no random bytes.
+    /// When the system provides no random bytes.
     pub fn new(now: SystemTime) -> Result<Self, rcgen::Error> {
         let key = KeyPair::generate_for(&PKCS_ED25519)?;
         let mut parameters = CertificateParams::new([SERVER_NAME.to_owned()])?;
@@ -46,7 +46,7 @@ impl Identity {
     /// Parse a certificate and a key in PEM.
     ///
     /// # Errors
-    /// What is missing; nothing of the text is repeated.
+    /// What is missing. The message repeats nothing of the text.
     pub fn from_pem(pem: &str) -> Result<Self, &'static str> {
         let certificate =
             CertificateDer::from_pem_slice(pem.as_bytes()).map_err(|_| "expected a CERTIFICATE in PEM, found none")?;
@@ -67,16 +67,16 @@ impl Identity {
         &self.certificate
     }
 
-    /// The pin by which workers know the certificate.
+    /// The pin by which workers recognise the certificate.
     #[must_use]
     pub fn pin(&self) -> CertificatePin {
         CertificatePin::of(&self.certificate)
     }
 
-    /// Whether workers whose clock says `now` will accept the certificate.
+    /// Check that workers whose clock says `now` accept the certificate.
     ///
     /// # Errors
-    /// Why they will not.
+    /// Why workers reject it.
     pub fn check(&self, now: SystemTime) -> Result<(), CertificateError> {
         let since_1970 = now.duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
         check_certificate(&self.certificate, UnixTime::since_unix_epoch(since_1970))
@@ -88,7 +88,7 @@ impl Identity {
     }
 }
 
-/// Does not show the key.
+/// Omits the key.
 impl fmt::Debug for Identity {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(formatter, "Identity({})", self.pin())

@@ -1,12 +1,12 @@
-//! Who may join a run: the access file, which workers get, and the key file, which they do not.
+//! Permission to join a run: the access file, which workers get, and the key file, which they do not.
 //!
 //! ```text
 //!   access.json      address, hash of the certificate, secret: what a worker needs to join
 //!   access.key.pem   certificate and private key: what makes a process the coordinator of the access file
 //! ```
-//! Two files, because the first one is copied to every worker: with the key in it, each of those machines could stand in for
-//! the coordinator. They lie beside each other, so that a coordinator that takes an access file made beforehand, or a run that
-//! is taken up again, finds both; a Kubernetes Secret holds them under two keys and mounts only the first one in workers.
+//! There are two files because the first one is copied to every worker: with the key in it, any of those machines could
+//! impersonate the coordinator. They lie side by side, so that a coordinator finds both when it uses an access file made
+//! beforehand or resumes a run; a Kubernetes Secret holds them under two keys and mounts only the first one in workers.
 
 mod identity;
 mod private_file;
@@ -25,31 +25,31 @@ use crate::atomic;
 
 pub use self::identity::Identity;
 
-/// What a coordinator needs to let workers in: what both files hold.
+/// The content of both files, which a coordinator needs to admit workers.
 #[derive(Debug)]
 pub struct Credentials {
-    /// What workers get to know.
+    /// The part that workers get.
     pub access: Access,
-    /// What they do not.
+    /// The part that only the coordinator has.
     pub identity: Identity,
 }
 
-/// No access file, or no key file to it.
+/// The access file or its key file cannot be used or made.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum CredentialsError {
-    /// The system gives no random bytes.
-    #[error("the system gives no random bytes for a secret and a key: {0}")]
+    /// The system provides no random bytes.
+    #[error("the system provides no random bytes for a secret and a key: {0}")]
     Randomness(String),
     /// A file cannot be written.
     #[error("cannot write {}", path.display())]
     Write {
         /// The file.
         path: PathBuf,
-        /// What the system says.
+        /// The error of the system.
         source: io::Error,
     },
-    /// There is such a file, which a cluster may be using.
+    /// The file exists, and a cluster may be using it.
     #[error("{} is already there and may be in use; choose another name, or remove it first", path.display())]
     Exists {
         /// The file.
@@ -60,7 +60,7 @@ pub enum CredentialsError {
     ReadAccess {
         /// The file.
         path: PathBuf,
-        /// What the system says.
+        /// The error of the system.
         source: io::Error,
     },
     /// The key file cannot be read.
@@ -71,26 +71,26 @@ pub enum CredentialsError {
     ReadKey {
         /// The file.
         path: PathBuf,
-        /// What the system says.
+        /// The error of the system.
         source: io::Error,
     },
-    /// The access file is none.
+    /// The file is not an access file.
     #[error("the access file {} is not usable", path.display())]
     Access {
         /// The file.
         path: PathBuf,
-        /// What is wrong with it.
+        /// The fault.
         source: AccessError,
     },
-    /// The key file is none.
+    /// The file is not a key file.
     #[error("the coordinator's key {} is not usable: {fault}", path.display())]
     Key {
         /// The file.
         path: PathBuf,
-        /// What is wrong with it.
+        /// The fault.
         fault: String,
     },
-    /// The two files do not belong together.
+    /// The key file belongs to another access file.
     #[error(
         "the access file {} names another certificate than {} holds; take both from one `lookalike access new`",
         access.display(), key.display()
@@ -101,7 +101,7 @@ pub enum CredentialsError {
         /// The key file.
         key: PathBuf,
     },
-    /// No worker would accept the certificate.
+    /// Workers would reject the certificate.
     #[error("the certificate in {} is not usable", path.display())]
     Certificate {
         /// The key file.
@@ -112,7 +112,7 @@ pub enum CredentialsError {
 }
 
 impl CredentialsError {
-    /// The exit code of the program: 2 for bad input, 3 when the system fails us.
+    /// The exit code of the program: 2 for bad input, 3 when the system fails.
     #[must_use]
     pub fn exit_code(&self) -> u8 {
         if matches!(self, Self::Randomness(_)) { 3 } else { 2 }
@@ -126,10 +126,10 @@ pub fn key_path(access: &Path) -> PathBuf {
 }
 
 impl Credentials {
-    /// New ones, for workers that reach the coordinator at `address` (`HOST:PORT`), valid from about `now` on.
+    /// New credentials, for workers that reach the coordinator at `address` (`HOST:PORT`), valid from about `now` on.
     ///
     /// # Errors
-    /// When the system gives no random bytes.
+    /// When the system provides no random bytes.
     pub fn new(address: String, now: SystemTime) -> Result<Self, CredentialsError> {
         let mut secret = [0; 32];
         getrandom::fill(&mut secret).map_err(|error| CredentialsError::Randomness(error.to_string()))?;
@@ -160,18 +160,19 @@ impl Credentials {
         Ok(Self { access, identity })
     }
 
-    /// Write both files, mode 0600, in the place of what was there; the access file last, so that whoever sees it can use it.
+    /// Write both files with mode 0600, replacing existing ones. The access file is written last, so that it never exists without
+    /// its key.
     ///
     /// # Errors
-    /// When the system does not let us.
+    /// When a file cannot be written.
     pub fn write(&self, path: &Path) -> Result<(), CredentialsError> {
         self.write_with(path, atomic::write_private)
     }
 
-    /// Write both files, mode 0600, where none were.
+    /// Write both files with mode 0600, and replace none.
     ///
     /// # Errors
-    /// When one is there, or the system does not let us.
+    /// When one of them exists or cannot be written.
     pub fn create(&self, path: &Path) -> Result<(), CredentialsError> {
         let exists = |path: PathBuf| CredentialsError::Exists { path };
         if path.exists() {
@@ -189,16 +190,16 @@ impl Credentials {
         };
         let key = key_path(path);
         put(&key, self.identity.to_pem())?;
-        // A key without its access file would only be in the way.
+        // Remove a key without an access file, which would prevent the next attempt.
         put(path, self.access.to_json().as_str()).inspect_err(|_| drop(std::fs::remove_file(&key)))
     }
 }
 
-/// Read a file that should be private, and say so if it is not.
+/// Read a file that should be private, and warn if it is not.
 fn read_private(path: &Path) -> io::Result<String> {
     let mut file = File::open(path)?;
     if private_file::is_readable_by_others(&file) {
-        warn!(path = %path.display(), "others may read this secret file; chmod 600 would prevent it");
+        warn!(path = %path.display(), "other users may read this secret file; restrict it with chmod 600");
     }
     let mut text = String::new();
     file.read_to_string(&mut text)?;

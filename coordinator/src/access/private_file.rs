@@ -1,10 +1,10 @@
-//! Files that their owner alone can read.
+//! Files that only their owner can read.
 
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, Write};
 use std::path::Path;
 
-/// Write a file with mode 0600 where none was.
+/// Create a file with mode 0600. Fails if it exists.
 pub(super) fn create(path: &Path, content: &[u8]) -> io::Result<()> {
     let mut options = OpenOptions::new();
     options.write(true).create_new(true);
@@ -14,7 +14,7 @@ pub(super) fn create(path: &Path, content: &[u8]) -> io::Result<()> {
     file.write_all(content).and_then(|()| file.sync_all()).inspect_err(|_| remove(path))
 }
 
-/// Whether others than its owner may read a file.
+/// Whether users other than the owner may read a file.
 pub(super) fn is_readable_by_others(file: &File) -> bool {
     #[cfg(unix)]
     {
@@ -28,7 +28,7 @@ pub(super) fn is_readable_by_others(file: &File) -> bool {
     }
 }
 
-/// Clean up after an error; that one is the one to tell.
+/// Clean up after an error. Further errors are ignored, because the first one is reported.
 fn remove(path: &Path) {
     let _ = fs::remove_file(path);
 }

@@ -50,7 +50,7 @@ fn beforehand_nothing_is_overwritten() {
     let text = fs::read_to_string(&path).unwrap();
     assert!(matches!(new().create(&path), Err(CredentialsError::Exists { .. })));
     fs::remove_file(&path).unwrap();
-    // The key of another access file is not overwritten either.
+    // An existing key file is not overwritten either, as it may belong to another access file.
     let error = new().create(&path).unwrap_err();
     assert!(error.to_string().contains("cluster.key.pem is already there"), "{error}");
     fs::write(&path, text).unwrap();

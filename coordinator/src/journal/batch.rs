@@ -1,4 +1,4 @@
-//! What a group of events has changed: the rows of one transaction.
+//! The changes of a group of events: the rows of one transaction.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
@@ -9,10 +9,10 @@ use crate::actions::Action;
 use crate::events::{RunEvent, Site};
 use crate::state::{Core, Deaths, Record};
 
-/// The worker's number of what runs in the coordinator itself. Workers count from 1.
+/// The worker number of nodes that run in the coordinator itself. Workers count from 1.
 const HERE: u64 = 0;
 
-/// Where a node is; the numbers are those of the table.
+/// The state of a node. The numbers are stored in the table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum State {
     Waiting = 0,
@@ -23,7 +23,7 @@ pub(super) enum State {
     Failed = 5,
 }
 
-/// How an attempt ended; the numbers are those of the table.
+/// How an attempt ended. The numbers are stored in the table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Outcome {
     Finished = 0,
@@ -35,7 +35,7 @@ pub(super) enum Outcome {
 /// A node that was added or has changed.
 #[derive(Debug)]
 pub(super) struct NodeRow {
-    /// Kind and label, of a new one.
+    /// Kind and label, if it is new.
     pub(super) added: Option<(String, String)>,
     pub(super) state: State,
     pub(super) attempts: u32,
@@ -44,12 +44,12 @@ pub(super) struct NodeRow {
     pub(super) error: Option<String>,
 }
 
-/// What happens to attempts.
+/// A change of attempts.
 #[derive(Debug)]
 pub(super) enum AttemptChange {
-    /// One begins.
+    /// An attempt begins.
     Begun { node: u64, attempt: u32, worker: u64, at: Duration },
-    /// The open ones of a node, all or that of one worker, have ended.
+    /// Open attempts of a node end: that of one worker, or all.
     Ended { node: u64, worker: Option<u64>, outcome: Outcome, at: Duration },
 }
 
@@ -71,14 +71,14 @@ pub(super) struct LeftRow {
     pub(super) at: Duration,
 }
 
-/// What a group of events has changed.
+/// The changes of a group of events.
 #[derive(Debug, Default)]
 pub(crate) struct Batch {
     /// By number.
     pub(super) nodes: BTreeMap<u64, NodeRow>,
-    /// Nodes that did run before, and do not any more.
+    /// Nodes that have stopped running.
     pub(super) stopped: Vec<u64>,
-    /// Nodes that run since, each with the number of its attempts.
+    /// Nodes that have begun to run, each with the number of its attempts.
     pub(super) started: Vec<(u64, u32)>,
     /// Nodes that are completed, each with the number of its attempts.
     pub(super) finished: Vec<(u64, u32)>,
@@ -89,13 +89,13 @@ pub(crate) struct Batch {
     pub(super) results: Vec<(NodeKey, Blob)>,
     /// Results that turned out to be wrong.
     pub(super) forgotten: Vec<NodeKey>,
-    /// Results whose bytes are not needed any more.
+    /// Results whose bytes are no longer needed.
     pub(super) released: BTreeSet<NodeKey>,
     pub(super) listen: Option<String>,
 }
 
 impl Batch {
-    /// Note an action of the reactor.
+    /// Add an action of the reactor.
     pub(crate) fn note(&mut self, action: &Action, core: &Core, now: Duration) {
         match action {
             Action::Assign { worker, lease } => self.begin(lease.node, lease.attempt, worker.0, now),
@@ -115,7 +115,7 @@ impl Batch {
         }
     }
 
-    /// Note an event.
+    /// Add an event.
     pub(crate) fn note_event(&mut self, event: &RunEvent, core: &Core, now: Duration) {
         match event {
             RunEvent::NodeAdded { name } => {
@@ -159,24 +159,24 @@ impl Batch {
         }
     }
 
-    /// Keep the result of a node, also if it was released before.
+    /// Store the result of a node, even if it was released before.
     pub(crate) fn keep(&mut self, key: NodeKey, output: Blob) {
         self.released.remove(&key);
         self.results.push((key, output));
     }
 
-    /// Forget the result of a node: it is wrong, or may be.
+    /// Remove the result of a node, because it is or may be wrong.
     pub(crate) fn forget(&mut self, key: NodeKey) {
         self.results.retain(|(kept, _)| *kept != key);
         self.forgotten.push(key);
     }
 
-    /// Where the coordinator listens.
+    /// Set the address on which the coordinator listens.
     pub(crate) fn listens(&mut self, address: String) {
         self.listen = Some(address);
     }
 
-    /// Whether the actions of the group have to wait for this transaction: it holds more than what people see.
+    /// Whether the actions of the group must wait for this transaction. It need not if it only holds rows for people.
     pub(crate) fn is_urgent(&self) -> bool {
         let Self { nodes, workers, left, results, forgotten, released, listen, .. } = self;
         let rows = nodes.len() + workers.len() + left.len();
@@ -185,7 +185,7 @@ impl Batch {
 
     /// Whether there is nothing to write.
     pub(crate) fn is_empty(&self) -> bool {
-        // Finished nodes are among the results, stopped ones among the nodes.
+        // Finished nodes are also among the results, stopped ones among the nodes.
         !self.is_urgent() && self.started.is_empty() && self.attempts.is_empty()
     }
 
@@ -197,7 +197,7 @@ impl Batch {
         self.attempts.push(AttemptChange::Ended { node: node.0, worker, outcome, at });
     }
 
-    /// The row of a node, as the node is now.
+    /// The row of a node, updated to the node's present state.
     fn touch(&mut self, node: NodeId, core: &Core) -> &mut NodeRow {
         let unknown = Record::default();
         let index = usize::try_from(node.0).unwrap_or(usize::MAX);
@@ -224,7 +224,7 @@ impl Batch {
     }
 }
 
-/// The number of a node and that of its attempts.
+/// The number of a node, and the number of its attempts.
 fn numbers(node: NodeId, core: &Core) -> (u64, u32) {
     (node.0, core.look(node).map_or(0, |record| record.attempts))
 }

@@ -1,5 +1,6 @@
-//! Rows that are written about once a second: attempts, and that nodes run or are completed. Only people read them (a result also says that
-//! its node is completed), most of them change again before that, and a transaction over fewer tables is cheaper.
+//! Rows that are written about once a second: attempts, and nodes that start or complete. Only people read them (that a node is
+//! completed also follows from its result), most of them change again before they are written, and a transaction over fewer
+//! tables is cheaper.
 
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -9,28 +10,28 @@ use rusqlite::{Connection, params};
 use super::batch::{AttemptChange, Batch, Outcome, State};
 use super::schema::node_id;
 
-/// How many rows may wait: beyond that they are written with the next batch.
+/// The most rows that may wait. If there are more, they are written with the next batch.
 const MOST_ROWS: usize = 4096;
 
-/// What is to be written in one epoch.
+/// The waiting rows of one epoch.
 #[derive(Debug)]
 pub(super) struct Deferred {
     epoch: u64,
-    /// The open ones, by node and worker: a worker has one attempt of a node at a time.
+    /// Open attempts, by node and worker: a worker has at most one attempt of a node.
     open: BTreeMap<(u64, u64), Attempt>,
     ended: Vec<((u64, u64), Attempt, Outcome, Duration)>,
-    /// By node: its state and its attempts.
+    /// State and number of attempts, by node.
     states: BTreeMap<u64, (State, u32)>,
 }
 
-/// Where open attempts are written, by node and worker.
+/// The table's rows of newly written open attempts, by node and worker.
 pub(super) type Rows = Vec<((u64, u64), i64)>;
 
 #[derive(Clone, Copy, Debug)]
 struct Attempt {
     attempt: u32,
     begun: Duration,
-    /// Where it is written as open.
+    /// Its row in the table, if it has been written as open.
     row: Option<i64>,
 }
 
@@ -39,10 +40,10 @@ impl Deferred {
         Self { epoch, open: BTreeMap::new(), ended: Vec::new(), states: BTreeMap::new() }
     }
 
-    /// Take the rows of a batch that can wait. The rest of it is written at once.
+    /// Take those rows of a batch that can wait. The other rows are written at once.
     pub(super) fn take(&mut self, batch: &Batch) {
         for (node, row) in &batch.nodes {
-            // A node that is written as ready may have begun to run since.
+            // A node that is written as ready may have started since.
             if row.state != State::Ready {
                 self.states.remove(node);
             }
@@ -59,12 +60,12 @@ impl Deferred {
         batch.attempts.iter().for_each(|change| self.change(change));
     }
 
-    /// Whether it should not wait any longer.
+    /// Whether so many rows wait that they should be written now.
     pub(super) fn is_much(&self) -> bool {
         self.ended.len() + self.states.len() > MOST_ROWS
     }
 
-    /// Write it. The rows of the attempts that are open: theirs once the transaction is committed, and nobody's otherwise.
+    /// Write the rows. Returns those of newly open attempts, to be passed to [`Self::written`] once the transaction is committed.
     pub(super) fn write(&self, connection: &Connection) -> rusqlite::Result<Rows> {
         let epoch = self.epoch;
         let mut update = connection.prepare_cached("UPDATE nodes SET state = ?2, attempts = ?3 WHERE id = ?1")?;
@@ -82,7 +83,7 @@ impl Deferred {
         new.map(|(key, attempt)| Ok((*key, insert(connection, epoch, *key, *attempt, None)?))).collect()
     }
 
-    /// It is written, and committed.
+    /// The rows are written and committed.
     pub(super) fn written(&mut self, rows: Rows) {
         for (key, row) in rows {
             self.open.entry(key).and_modify(|attempt| attempt.row = Some(row));
@@ -119,7 +120,7 @@ fn insert(
     connection.prepare_cached(sql)?.insert(row)
 }
 
-/// Milliseconds since this coordinator began.
+/// Milliseconds since this coordinator started.
 pub(super) fn ms(at: Duration) -> i64 {
     i64::try_from(at.as_millis()).unwrap_or(i64::MAX)
 }
@@ -153,11 +154,11 @@ mod tests {
             let rows = statement.query_map([], |row| Ok((row.get(0)?, row.get(1)?, row.get(2)?, row.get(3)?))).unwrap();
             rows.collect::<Result<_, _>>().unwrap()
         };
-        // Given to a worker, taken back, given to it again.
+        // Given to a worker, taken back, and given to it again.
         let again = vec![begun(7, 1, 2), ended(7, Some(2), Outcome::Cancelled), begun(7, 2, 2)];
         assert_eq!(write(again), [(7, 2, 1, Some(3)), (7, 2, 2, None)]);
         assert_eq!(write(Vec::new()).len(), 2);
-        // With a second worker; then the node fails, and nobody has it.
+        // Given to a second worker; then the node fails, and neither worker has it.
         let both = [(7, 2, 1, Some(3)), (7, 2, 2, Some(1)), (7, 4, 3, Some(1)), (8, 4, 1, None)];
         assert_eq!(write(vec![begun(7, 3, 4), begun(8, 1, 4), ended(7, None, Outcome::Failed)]), both);
         assert_eq!(write(vec![ended(7, Some(2), Outcome::Finished)]), both);

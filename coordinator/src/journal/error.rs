@@ -1,4 +1,4 @@
-//! What can be wrong with a journal.
+//! Errors of a journal.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -8,7 +8,7 @@ use thiserror::Error;
 
 use super::identity::Difference;
 
-/// What can be wrong with a journal.
+/// Errors of a journal.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum JournalError {
@@ -24,7 +24,7 @@ pub enum JournalError {
         /// The file.
         path: PathBuf,
     },
-    /// Another version of this program wrote it in another form.
+    /// Another version of this program wrote it in another format.
     #[error(
         "{} has journal format {found}, expected {expected}; use the version of lookalike that began the run, or choose another --out",
         path.display()
@@ -45,7 +45,7 @@ pub enum JournalError {
     AnotherRun {
         /// The journal.
         path: PathBuf,
-        /// What differs.
+        /// The differences.
         differences: Vec<Difference>,
     },
     /// Another process uses the journal.
@@ -71,7 +71,7 @@ pub enum JournalError {
     Write {
         /// The journal.
         path: PathBuf,
-        /// What SQLite says.
+        /// The error of SQLite.
         source: rusqlite::Error,
     },
     /// The journal cannot be opened or read.
@@ -79,10 +79,10 @@ pub enum JournalError {
     Open {
         /// The journal.
         path: PathBuf,
-        /// What SQLite says.
+        /// The error of SQLite.
         source: rusqlite::Error,
     },
-    /// The thread that writes the journal has panicked: an error of this program.
+    /// The thread that writes the journal has panicked, which is a bug of this program.
     #[error(
         "the thread that writes the journal {} has panicked; continue with --resume, and please report this",
         path.display()
@@ -91,18 +91,18 @@ pub enum JournalError {
         /// The journal.
         path: PathBuf,
     },
-    /// The journal's file cannot be made.
+    /// The journal's file cannot be created.
     #[error("cannot make the journal {}", path.display())]
     Create {
         /// The journal.
         path: PathBuf,
-        /// What the system says.
+        /// The error of the system.
         source: io::Error,
     },
 }
 
 impl JournalError {
-    /// The same of another file: one under its name for the time being has none of its own.
+    /// The same error about another file: a temporary file's errors name the journal instead.
     pub(super) fn about(mut self, other: &Path) -> Self {
         match &mut self {
             Self::Exists { path }
@@ -119,7 +119,7 @@ impl JournalError {
         self
     }
 
-    /// The exit code of the program: 2 for a journal that does not fit, 3 when the system fails us.
+    /// The exit code of the program: 2 for a journal of another run or format, 3 when the system fails.
     #[must_use]
     pub fn exit_code(&self) -> u8 {
         match self {
@@ -150,7 +150,7 @@ impl JournalError {
     }
 }
 
-/// Of many differences, as a batch may have, so many are shown.
+/// The most differences that are shown; a batch may have many.
 const MOST_SHOWN: usize = 10;
 
 fn listed(differences: &[Difference]) -> String {

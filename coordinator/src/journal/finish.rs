@@ -1,4 +1,4 @@
-//! The end of a run: the files that it wrote, so that a second call can verify them.
+//! The end of a run: records the files that it wrote, so that a later call can verify them.
 
 use std::path::Path;
 
@@ -10,14 +10,14 @@ use super::parts::{self, PartLedger};
 use super::time::unix_ms;
 use super::{past, schema, status};
 
-/// A finished run's files of results, each with the BLAKE3 of its bytes.
+/// The result files of a finished run, each with the BLAKE3 of its bytes.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Finished {
-    /// Path below the folder of results and hash of its content, of each file.
+    /// For each file, its path below the folder of results and the hash of its content.
     pub outputs: Vec<(String, String)>,
 }
 
-/// Mark a run as finished. The outputs of its nodes are dropped: the results are written, and the outputs are large.
+/// Mark a run as finished, and drop the outputs of its nodes: they are large, and the results are written.
 pub fn finish(path: &Path, finished: &Finished) -> Result<(), JournalError> {
     let connection = schema::open(path)?;
     let outputs = parts::files_json(&finished.outputs);
@@ -32,14 +32,15 @@ pub fn finish(path: &Path, finished: &Finished) -> Result<(), JournalError> {
         Ok(())
     };
     write().map_err(|source| JournalError::writing(path, source))?;
-    // What follows only tidies up.
+    // The run is finished now, so an error below does not matter.
     let _ = status::write(&connection, path);
     let _ = connection.execute("VACUUM", []);
     let _ = connection.pragma_update(None, "journal_mode", "DELETE");
     Ok(())
 }
 
-/// Write how the parts of a run ended, after its journal was closed. With `ended`, all of them have ended and some failed: how many.
+/// Record how the parts of a run ended, after its journal was closed. `ended` is the message about failed parts, if all have
+/// ended and some failed.
 pub fn settle(path: &Path, ledger: &PartLedger, ended: Option<&str>) -> Result<(), JournalError> {
     let mut connection = schema::open(path)?;
     let rows = ledger.take();
@@ -57,13 +58,13 @@ pub fn settle(path: &Path, ledger: &PartLedger, ended: Option<&str>) -> Result<(
         transaction.commit()
     };
     write().map_err(|source| JournalError::writing(path, source))?;
-    // What follows only tidies up.
+    // The parts are recorded now, so an error below does not matter.
     let _ = status::write(&connection, path);
     let _ = connection.pragma_update(None, "journal_mode", "DELETE");
     Ok(())
 }
 
-/// The finished run of a journal, if it is finished, after a check that it is one of these inputs and settings.
+/// The result files of a journal's run, if it is finished. Checks first that it has these inputs and settings.
 pub fn finished(path: &Path, identity: &RunIdentity) -> Result<Option<Finished>, JournalError> {
     let connection = schema::open(path)?;
     past::check_identity(path, &connection, identity)?;

@@ -5,8 +5,8 @@ use std::fmt;
 
 use serde_json::{Map, Value};
 
-/// The inputs (by content) and the settings that determine the result of a run, by name. The number of workers, for example, is not part
-/// of it.
+/// The inputs (by content) and the settings that determine the result of a run, by name. Other settings, such as the number of
+/// workers, are not part of it.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct RunIdentity {
     parts: Vec<(String, String)>,
@@ -15,23 +15,23 @@ pub struct RunIdentity {
 /// A difference between two identities.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Difference {
-    /// What it is: a flag, or an input.
+    /// The flag or the input that differs.
     pub name: String,
-    /// Its value in the run that is there; `None` if there was none.
+    /// Its value in the existing run; `None` if there was none.
     pub there: Option<String>,
-    /// Its value now; `None` if there is none.
+    /// Its value in this run; `None` if there is none.
     pub here: Option<String>,
 }
 
 impl RunIdentity {
-    /// This identity with one more part.
+    /// This identity with one more entry.
     #[must_use]
     pub fn with(mut self, name: impl Into<String>, value: impl Into<String>) -> Self {
         self.parts.push((name.into(), value.into()));
         self
     }
 
-    /// What differs from the identity of the run that is there, in the order of this one.
+    /// The differences from the identity of an existing run, in the order of this one.
     #[must_use]
     pub fn differences(&self, there: &Self) -> Vec<Difference> {
         let by_name = |of: &Self| of.parts.iter().cloned().collect::<BTreeMap<String, String>>();
@@ -45,13 +45,13 @@ impl RunIdentity {
         names.filter_map(difference).collect()
     }
 
-    /// As it is stored.
+    /// The stored form.
     pub(super) fn to_json(&self) -> String {
         let parts = self.parts.iter().map(|(name, value)| (name.clone(), Value::from(value.as_str())));
         Value::Object(parts.collect::<Map<_, _>>()).to_string()
     }
 
-    /// As it was stored; `None` for anything else.
+    /// Parse the stored form; `None` for anything else.
     pub(super) fn from_json(text: &str) -> Option<Self> {
         let Ok(Value::Object(parts)) = serde_json::from_str(text) else { return None };
         let part = |(name, value): (String, Value)| Some((name, value.as_str()?.to_owned()));

@@ -1,4 +1,4 @@
-//! One coordinator per folder of results: a lock that ends with its process, however that ends.
+//! A lock for a folder of results, so that only one coordinator uses it. It ends with its process, however the process ends.
 
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{self, Read, Write};
@@ -11,11 +11,11 @@ use thiserror::Error;
 /// The lock's file in a folder of results.
 pub const LOCK_FILE: &str = "run.lock";
 
-/// How often to try, and the pause in between: `lookalike status` holds the lock for an instant to see whether it is held.
+/// How often to try, and the pause in between: `lookalike status` holds the lock briefly to test whether another process does.
 const TRIES: u32 = 10;
 const PAUSE: Duration = Duration::from_millis(20);
 
-/// A folder of results that belongs to this process as long as this lives.
+/// A locked folder of results. Dropping this releases it.
 #[derive(Debug)]
 pub struct RunLock {
     _file: File,
@@ -30,7 +30,7 @@ pub enum LockError {
     Held {
         /// The folder.
         folder: PathBuf,
-        /// Who, in its own words.
+        /// The description that the holder wrote.
         holder: String,
     },
     /// The lock's file cannot be written.
@@ -38,7 +38,7 @@ pub enum LockError {
     File {
         /// The file.
         path: PathBuf,
-        /// What the system says.
+        /// The error of the system.
         source: io::Error,
     },
 }
@@ -47,7 +47,7 @@ impl RunLock {
     /// Take the lock of a folder.
     ///
     /// # Errors
-    /// When another process has it, or its file cannot be written. On a file system without locks every process gets it.
+    /// When another process holds it, or its file cannot be written. On a file system without locks, every process gets the lock.
     pub fn take(folder: &Path) -> Result<Self, LockError> {
         let path = folder.join(LOCK_FILE);
         let file_error = |source| LockError::File { path: path.clone(), source };
@@ -67,7 +67,7 @@ impl RunLock {
         Ok(Self { _file: file })
     }
 
-    /// Whether a process holds the lock of a folder; `None` where the file system cannot tell.
+    /// Whether a process holds the lock of a folder; `None` if the file system does not say.
     #[must_use]
     pub fn is_held(folder: &Path) -> Option<bool> {
         let file = File::open(folder.join(LOCK_FILE)).ok()?;
@@ -86,7 +86,7 @@ pub(crate) fn host() -> String {
 
 fn words_of(file: &mut File) -> String {
     let mut words = String::new();
-    // Nobody has to have written anything.
+    // The file may be empty.
     let _ = file.take(256).read_to_string(&mut words);
     if words.is_empty() { "it does not say which".into() } else { words }
 }

@@ -3,10 +3,10 @@
 //! ```text
 //!   reactor --actions of a group of events--> Batch --one transaction--> thread "journal" --committed--> the actions are done
 //! ```
-//! A worker's answer is acknowledged, and the next node given out, only after the transaction that records it: whatever ends the
-//! coordinator, nothing that was acknowledged is lost. Each process that coordinates a run is an *epoch* of it, counted from 1.
-//! Planners are pure, so a later epoch plans anew from the same inputs. Nodes whose [`NodeKey`] has a result are completed from here,
-//! whatever their numbers were; the others run.
+//! A worker's answer is acknowledged, and the next node given out, only after the transaction that records it is committed. So no
+//! acknowledged answer is lost, however the coordinator ends. Each process that coordinates a run is an *epoch* of it, counted
+//! from 1. Planners are pure, so a later epoch plans anew from the same inputs. Nodes whose [`NodeKey`] has a result are
+//! completed from the journal, even if their numbers have changed; the other nodes run.
 //!
 //! The tables are in `schema.rs`, and explained in `docs/journal.md`:
 //!
@@ -20,12 +20,13 @@
 //! | `results` | node key: the hash and the bytes of its output |
 //! | `parts` | part of a run of many, such as a fit of a batch: its state, what it wrote |
 //!
-//! What nothing depends on is written about once a second: `deferred.rs`.
+//! Rows that nothing depends on are written about once a second: see `deferred.rs`.
 //!
-//! Keys and hashes have no index: they are random, and an index would write one page for each. A resuming coordinator reads all
-//! keys once. The secret of the access file is never here; the file is readable by its owner alone all the same.
+//! Keys and hashes have no index: they are random, so each insertion into an index would write another page. A resuming
+//! coordinator reads all keys once. The journal does not contain the access file's secret; it is readable by its owner only
+//! nevertheless.
 //!
-//! On a network file system the journal is locked for this process alone, and others read `status.json`.
+//! On a network file system this process locks the journal for itself, and other processes read `status.json`.
 
 mod batch;
 mod deferred;
@@ -74,11 +75,11 @@ pub(crate) struct Journal {
     path: PathBuf,
     /// The name of the run: the same for all its epochs.
     pub(crate) run: RunName,
-    /// This process's number among those of the run, from 1.
+    /// The number of this process among those of the run, from 1.
     pub(crate) epoch: u64,
-    /// What earlier epochs have left.
+    /// The data of earlier epochs.
     pub(crate) past: Past,
-    /// The keys that have a result of an earlier epoch.
+    /// The keys for which an earlier epoch has a result.
     known: HashSet<NodeKey>,
     commands: Sender<Command>,
     committed: UnboundedReceiver<Result<(), JournalError>>,
@@ -123,20 +124,20 @@ impl Journal {
         Ok(Self { path, run, epoch, past, known, commands, committed, disk, thread: Some(thread) })
     }
 
-    /// What the reactor asks for the outputs of earlier epochs.
+    /// The source from which the reactor gets outputs of earlier epochs.
     pub(crate) fn past_outputs(&self) -> Box<dyn PastOutputs> {
         let deaths = self.past.deaths.clone();
         Box::new(JournalledOutputs { known: self.known.clone(), deaths, commands: self.commands.clone() })
     }
 
-    /// Write a batch, after those before. [`Self::committed`] tells when it is written.
+    /// Write a batch, after earlier ones. [`Self::committed`] returns when it is written.
     pub(crate) fn commit(&mut self, batch: Batch) {
-        // A thread that has ended is noticed by `committed`.
+        // If the thread has ended, `committed` reports it.
         let _ = self.commands.send(Command::Commit(Box::new(batch)));
         self.disk.iter_mut().for_each(|disk| disk.wait(&self.commands));
     }
 
-    /// Wait until the earliest batch that was not told of is written.
+    /// Wait until the next batch is written.
     pub(crate) async fn committed(&mut self) -> Result<(), JournalError> {
         if let Some(disk) = &mut self.disk {
             disk.told().await;
@@ -145,13 +146,13 @@ impl Journal {
         self.committed.recv().await.unwrap_or_else(|| Err(gone()))
     }
 
-    /// Write a batch that is not [urgent](Batch::is_urgent) some time.
+    /// Write a batch that is not [urgent](Batch::is_urgent), with later rows.
     pub(crate) fn note(&mut self, batch: Batch) {
-        // A thread that has ended is noticed by `committed`.
+        // If the thread has ended, `committed` reports it.
         let _ = self.commands.send(Command::Note(Box::new(batch)));
     }
 
-    /// Write how this epoch ended, after all batches; `None` when every node is closed as the planner wants it.
+    /// Write all batches, then how this epoch ended: `None` when every node is closed as the planner wants it.
     pub(crate) fn close(mut self, ended: Option<String>) -> Result<(), JournalError> {
         let _ = self.commands.send(Command::Close(ended));
         let thread = self.thread.take().map(JoinHandle::join);
@@ -162,16 +163,16 @@ impl Journal {
         }
     }
 
-    /// Undo the beginning of a run that could not begin.
+    /// Remove the journal of a run that could not begin.
     pub(crate) fn discard(self) {
         let path = self.path.clone();
         let _ = self.close(None);
-        // The next attempt will say that there is a run already.
+        // If it cannot be removed, the next attempt will report an existing run.
         let _ = remove(&path);
     }
 }
 
-/// Dropped without [`Journal::close`] in a simulated world: the process was killed, and the next one may start at once.
+/// Dropping without [`Journal::close`] in a simulated world means that the process was killed; the next one may start at once.
 impl Drop for Journal {
     fn drop(&mut self) {
         if let (Some(_), Some(thread)) = (&self.disk, self.thread.take()) {
@@ -181,7 +182,7 @@ impl Drop for Journal {
     }
 }
 
-/// Answers the reactor from the journal.
+/// Answers the reactor's questions from the journal.
 #[derive(Debug)]
 struct JournalledOutputs {
     known: HashSet<NodeKey>,

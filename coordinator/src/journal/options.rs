@@ -1,4 +1,4 @@
-//! Where the journal of a run is, and which run it is.
+//! The location of a run's journal, and the run's identity.
 
 use std::fmt;
 use std::path::PathBuf;
@@ -10,33 +10,33 @@ use super::parts::PartLedger;
 /// The journal's file in a folder of results.
 pub const JOURNAL_FILE: &str = "run.sqlite";
 
-/// Says the best score of a run so far, once there is one; the lowest is the best.
+/// Returns the best score of a run so far, once there is one. Lower is better.
 pub type Score = Arc<dyn Fn() -> Option<f64> + Send + Sync>;
 
 /// The journal of a run: its file and the run's identity.
 #[derive(Clone)]
 pub struct JournalOptions {
-    /// The file; its folder has to exist. Only one process may use it at a time: see [`RunLock`](super::RunLock).
+    /// The file. Its folder must exist, and only one process may use it at a time: see [`RunLock`](super::RunLock).
     pub path: PathBuf,
-    /// What shapes the result.
+    /// The inputs and settings that determine the result.
     pub identity: RunIdentity,
-    /// Whether to resume an unfinished run. Without one in the file, a new run begins either way.
+    /// Whether to resume an unfinished run. If the file does not exist, a new run begins either way.
     pub resume: bool,
-    /// The best score so far, for people who look at the run.
+    /// The best score so far, shown in the status of the run.
     pub score: Option<Score>,
     /// The states of the parts, in a run of many.
     pub parts: PartLedger,
 }
 
 impl JournalOptions {
-    /// A new run.
+    /// The options of a new run.
     #[must_use]
     pub fn new(path: PathBuf, identity: RunIdentity) -> Self {
         Self { path, identity, resume: false, score: None, parts: PartLedger::default() }
     }
 }
 
-/// Without the score, which is a function.
+/// Omits the score, which is a function.
 impl fmt::Debug for JournalOptions {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { path, identity, resume, parts, .. } = self;

@@ -1,4 +1,4 @@
-//! The parts of a run of many, such as the fits of a batch, as its journal has them: the state of each, and what it wrote.
+//! The parts of a run of many, such as the fits of a batch, in its journal: their states, and the files that they wrote.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -22,7 +22,7 @@ pub struct PartStatus {
     /// Its final score.
     #[serde(rename = "cssim")]
     pub score: Option<f64>,
-    /// From its start to its end.
+    /// The time from its start to its end.
     pub seconds: Option<f64>,
     /// Why it failed.
     pub error: Option<String>,
@@ -35,27 +35,27 @@ pub struct PartRow {
     pub number: u32,
     /// Its state.
     pub status: PartStatus,
-    /// The files that it has written, each with the BLAKE3 of its bytes; empty until all are there.
+    /// The files that it wrote, each with the BLAKE3 of its bytes; empty until all are written.
     pub outputs: Vec<(String, String)>,
 }
 
-/// What is to be written to the journal about parts. Filled from any thread, and written with the next transaction: the files of a part
-/// are in the journal before the outputs of its nodes leave it. Clones share one ledger.
+/// Rows about parts that are to be written to the journal. Any thread may add rows; they are written with the next transaction,
+/// so the files of a part are in the journal before the outputs of its nodes are dropped from it. Clones share one ledger.
 #[derive(Clone, Debug, Default)]
 pub struct PartLedger(Arc<Mutex<BTreeMap<String, PartRow>>>);
 
 impl PartLedger {
-    /// The state of a part now.
+    /// Set the row of a part.
     pub fn tell(&self, row: PartRow) {
         self.lock().insert(row.status.name.clone(), row);
     }
 
-    /// What was told and is not written yet.
+    /// Take the rows that are not written yet.
     pub(super) fn take(&self) -> Vec<PartRow> {
         std::mem::take(&mut *self.lock()).into_values().collect()
     }
 
-    /// Keep rows that could not be written for the next transaction, unless there are newer ones.
+    /// Return rows that could not be written, so that the next transaction writes them. Newer rows take precedence.
     pub(super) fn put_back(&self, rows: Vec<PartRow>) {
         let mut told = self.lock();
         for row in rows {
@@ -64,12 +64,12 @@ impl PartLedger {
     }
 
     fn lock(&self) -> MutexGuard<'_, BTreeMap<String, PartRow>> {
-        // A row is told in one piece.
+        // A row is inserted as a whole, so a panic leaves the map consistent.
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
-/// What an earlier process of a run of many has left.
+/// The parts that earlier processes of a run wrote.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct WrittenParts {
     /// Whether every part was written.
@@ -78,7 +78,7 @@ pub struct WrittenParts {
     pub outputs: BTreeMap<String, Vec<(String, String)>>,
 }
 
-/// The files that the run of a journal has written, after a check that it has these inputs and settings.
+/// The files that a journal's run wrote. Checks first that it has these inputs and settings.
 pub fn written(path: &Path, identity: &RunIdentity) -> Result<WrittenParts, JournalError> {
     let connection = schema::open(path)?;
     past::check_identity(path, &connection, identity)?;
@@ -94,7 +94,7 @@ pub fn written(path: &Path, identity: &RunIdentity) -> Result<WrittenParts, Jour
     read().map_err(|source| JournalError::reading(path, source))
 }
 
-/// Writes rows, in place of those of the same names.
+/// Write rows, replacing those with the same names.
 pub(super) fn write(connection: &Connection, rows: &[PartRow]) -> rusqlite::Result<()> {
     for PartRow { number, status, outputs } in rows {
         let PartStatus { name, state, score, seconds, error } = status;
@@ -120,13 +120,13 @@ pub(super) fn read(connection: &Connection) -> rusqlite::Result<Vec<PartStatus>>
     rows.collect()
 }
 
-/// Files with their hashes as an object.
+/// Files with their hashes as a JSON object.
 pub(super) fn files_json(files: &[(String, String)]) -> String {
     let files = files.iter().map(|(name, hash)| (name.clone(), Value::from(hash.as_str())));
     Value::Object(files.collect::<Map<_, _>>()).to_string()
 }
 
-/// The files with their hashes that an object names; `None` for anything else.
+/// Parse an object of files with their hashes; `None` for anything else.
 pub(super) fn files_of(text: &str) -> Option<Vec<(String, String)>> {
     let Ok(Value::Object(files)) = serde_json::from_str(text) else { return None };
     files.into_iter().map(|(name, hash)| Some((name, hash.as_str()?.to_owned()))).collect()

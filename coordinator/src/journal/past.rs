@@ -1,4 +1,4 @@
-//! The begin of an epoch: a new journal, or one of earlier epochs.
+//! The start of an epoch: creates a journal, or loads one of earlier epochs.
 
 use std::collections::HashMap;
 use std::net::SocketAddr;
@@ -15,18 +15,18 @@ use super::schema;
 use super::time::unix_ms;
 use crate::state::Deaths;
 
-/// What earlier epochs have left.
+/// The data of earlier epochs.
 #[derive(Debug, Default)]
 pub(crate) struct Past {
-    /// The workers that died while they executed a node, where any did.
+    /// Deaths of workers that executed a node, for nodes with at least one.
     pub(crate) deaths: HashMap<NodeKey, Deaths>,
-    /// Where the last one listened.
+    /// The address on which the last coordinator listened.
     pub(crate) listen: Option<SocketAddr>,
     /// How many nodes have a result.
     pub(crate) results: usize,
 }
 
-/// What a journal says when it is opened.
+/// The content of a journal when it is opened.
 pub(super) struct Loaded {
     pub(super) run: RunName,
     pub(super) epoch: u64,
@@ -34,7 +34,7 @@ pub(super) struct Loaded {
     pub(super) past: Past,
 }
 
-/// Begin a new journal.
+/// Create a journal.
 pub(super) fn begin(path: &Path, identity: &RunIdentity, run: RunName) -> Result<(Connection, Loaded), JournalError> {
     let connection = schema::create(path, |connection| {
         connection.execute(
@@ -46,7 +46,7 @@ pub(super) fn begin(path: &Path, identity: &RunIdentity, run: RunName) -> Result
     Ok((connection, Loaded { run, epoch: 1, results: HashMap::new(), past: Past::default() }))
 }
 
-/// Resume the run of a journal.
+/// Load a journal, to resume its run.
 pub(super) fn load(path: &Path, identity: &RunIdentity) -> Result<(Connection, Loaded), JournalError> {
     let connection = schema::open(path)?;
     check_identity(path, &connection, identity)?;
@@ -57,13 +57,13 @@ pub(super) fn load(path: &Path, identity: &RunIdentity) -> Result<(Connection, L
     let past = past(&connection, results.len()).map_err(reading)?;
     let epoch = last + 1;
     add_epoch(&connection, epoch).map_err(|source| JournalError::writing(path, source))?;
-    // The run is not finished any more.
+    // A resumed run is no longer finished.
     let reopened = connection.execute("UPDATE run SET finished_ms = NULL, outputs = NULL", []);
     reopened.map_err(|source| JournalError::writing(path, source))?;
     Ok((connection, Loaded { run, epoch, results, past }))
 }
 
-/// That the run of a journal is one of these inputs and settings.
+/// Check that a journal's run has these inputs and settings.
 pub(super) fn check_identity(path: &Path, connection: &Connection, here: &RunIdentity) -> Result<(), JournalError> {
     let text = connection.query_row("SELECT identity FROM run", [], |row| row.get::<_, String>(0)).optional();
     let text = text.map_err(|source| JournalError::reading(path, source))?;
@@ -99,7 +99,7 @@ fn past(connection: &Connection, results: usize) -> rusqlite::Result<Past> {
     while let Some(row) = rows.next()? {
         let key = NodeKey(row.get(0)?);
         let deaths = Deaths { in_company: row.get(1)?, alone: row.get(2)?, not_counted: row.get(3)? };
-        // Each epoch begins with the counts of the one before.
+        // Each epoch starts with the counts of the previous one.
         if deaths.total() > past.deaths.get(&key).map_or(0, |most| most.total()) {
             past.deaths.insert(key, deaths);
         }

@@ -1,5 +1,5 @@
-//! On what kind of file system a journal lies. Over a network SQLite cannot share memory between processes, and its locks
-//! cannot be relied upon to be seen by all: there the coordinator keeps the journal to itself.
+//! The kind of file system that a journal lies on. On a network file system, SQLite cannot share memory between processes, and
+//! its locks may not be seen by all machines; there the coordinator locks the journal for itself.
 
 use std::path::Path;
 
@@ -9,13 +9,13 @@ pub(super) fn is_shared(folder: &Path) -> bool {
     nix::sys::statfs::statfs(folder).is_ok_and(|system| is_network(i128::from(system.filesystem_type().0)))
 }
 
-/// Whether a folder lies on a file system that other machines may write to: not known here.
+/// Whether a folder lies on a file system that other machines may write to: unknown on this system.
 #[cfg(not(target_os = "linux"))]
 pub(super) fn is_shared(_folder: &Path) -> bool {
     false
 }
 
-/// The magic numbers of network file systems, as statfs(2) and the kernel's headers have them.
+/// The magic numbers of network file systems, from statfs(2) and the kernel's headers.
 #[cfg(target_os = "linux")]
 const NETWORK: [(&str, u32); 14] = [
     ("9p", 0x0102_1997),
@@ -24,7 +24,7 @@ const NETWORK: [(&str, u32); 14] = [
     ("ceph", 0x00C3_6400),
     ("cifs", 0xFF53_4D42),
     ("coda", 0x7375_7245),
-    // sshfs, gluster, s3fs and many more; a local one only loses the live look of other processes.
+    // sshfs, gluster, s3fs and many more. On a local one, other processes only lose the direct view of the journal.
     ("fuse", 0x6573_5546),
     ("gpfs", 0x4750_4653),
     ("lustre", 0x0BD0_0BD0),
@@ -37,7 +37,7 @@ const NETWORK: [(&str, u32); 14] = [
 
 #[cfg(target_os = "linux")]
 fn is_network(kind: i128) -> bool {
-    // The kernel's type is signed on some machines: only the low 32 bits count.
+    // The kernel's type is signed on some machines, so only the low 32 bits are compared.
     NETWORK.iter().any(|(_, magic)| kind & 0xFFFF_FFFF == i128::from(*magic))
 }
 

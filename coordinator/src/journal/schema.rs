@@ -1,4 +1,4 @@
-//! The tables, and how a journal is opened.
+//! The tables, and opening a journal.
 
 use std::fs::OpenOptions;
 use std::io;
@@ -11,13 +11,13 @@ use super::error::JournalError;
 use super::place;
 use crate::atomic;
 
-/// The format of the tables: `PRAGMA user_version`. A change of any kind is a new number.
+/// The format of the tables: `PRAGMA user_version`. Any change needs a new number.
 pub(super) const FORMAT: i64 = 3;
 
 /// Marks the file as a journal of this program: `PRAGMA application_id`, the letters `Look`.
 pub(super) const APPLICATION: i64 = 0x4c6f_6f6b;
 
-/// docs/journal.md explains them. What is written for every node is appended, or found by a number: no index besides.
+/// docs/journal.md explains them. Rows about nodes are appended or found by number, so there are no further indices.
 const TABLES: &str = "
 CREATE TABLE run (
     id          INTEGER PRIMARY KEY CHECK (id = 1),
@@ -100,21 +100,21 @@ CREATE VIEW attempt_list AS
     FROM attempts;
 ";
 
-/// How much of the journal is copied from its log at a time: 32 MiB. Each copy waits for the disk.
+/// How many pages are copied from the log to the journal at a time: 32 MiB. Each copy waits for the disk.
 const PAGES_PER_CHECKPOINT: i64 = 8192;
 
 /// The cache of the connection, in KiB.
 const CACHE_KIB: i64 = 16 << 10;
 
-/// How long to wait for a reader that is in the way; there should be none.
+/// How long to wait for a reader that holds a lock, which should not happen.
 const BUSY_TIME: Duration = Duration::from_secs(5);
 
-/// The number of a node among those of all epochs; the first node of an epoch comes after the last one of the one before.
+/// The number of a node among the nodes of all epochs. Those of an epoch follow those of the previous one.
 pub(super) fn node_id(epoch: u64, node: u64) -> u64 {
     (epoch << 32) + node
 }
 
-/// The files of a journal: itself, its log, their index, and the log of the older kind.
+/// The files of a journal: itself, its log, the log's index, and the rollback journal.
 pub(crate) fn files(path: &Path) -> [PathBuf; 4] {
     ["", "-wal", "-shm", "-journal"].map(|suffix| beside(path, suffix))
 }
@@ -125,10 +125,10 @@ fn beside(path: &Path, suffix: &str) -> PathBuf {
     name.into()
 }
 
-/// Remove a journal, if there is one. Itself last: a log without its journal is worth nothing, and harmless.
+/// Remove a journal, if there is one. The journal itself goes last, because a log without its journal is useless and harmless.
 ///
 /// # Errors
-/// When the system does not let us.
+/// When a file cannot be removed.
 pub fn remove(path: &Path) -> io::Result<()> {
     for file in files(path).iter().rev() {
         match std::fs::remove_file(file) {
@@ -139,19 +139,19 @@ pub fn remove(path: &Path) -> io::Result<()> {
     Ok(())
 }
 
-/// Create a journal, readable by its owner alone, and open it. It appears with all its tables and what `begin` writes, or not at all,
-/// whatever ends the process or fills the disk meanwhile.
+/// Create a journal that only its owner can read, and open it. It appears with all its tables and the rows that `begin` writes,
+/// or not at all, even if the process is killed or the disk is full.
 pub(super) fn create(
     path: &Path,
     begin: impl FnOnce(&Connection) -> rusqlite::Result<()>,
 ) -> Result<Connection, JournalError> {
     let creating = |source| JournalError::Create { path: path.to_owned(), source };
     let unfinished = beside(path, ".new");
-    // What an earlier attempt has left.
+    // Remove what a failed attempt left.
     remove(&unfinished).map_err(creating)?;
     let made = make(&unfinished, begin).map_err(|error| error.about(path));
     if made.is_err() {
-        // The next attempt would do it.
+        // If this fails, the next attempt removes it.
         let _ = remove(&unfinished);
     }
     made?;
@@ -197,7 +197,7 @@ fn is_shared(path: &Path) -> bool {
     path.parent().is_some_and(place::is_shared)
 }
 
-/// That a file is a journal of this format.
+/// Check that a file is a journal of this format.
 pub(super) fn check_format(path: &Path, connection: &Connection) -> Result<(), JournalError> {
     let pragma = |name: &str| -> Result<i64, JournalError> {
         let value = connection.pragma_query_value(None, name, |row| row.get(0));
@@ -212,14 +212,14 @@ pub(super) fn check_format(path: &Path, connection: &Connection) -> Result<(), J
     }
 }
 
-/// Connect to a journal, alone if other machines may write to its file system.
+/// Connect to a journal. If other machines may write to its file system, lock it exclusively.
 pub(super) fn connect(path: &Path, is_shared: bool) -> Result<Connection, JournalError> {
     let connect = || {
         let connection = Connection::open_with_flags(path, OpenFlags::SQLITE_OPEN_READ_WRITE)?;
         connection.busy_timeout(BUSY_TIME)?;
         connection.set_prepared_statement_cache_capacity(32);
         if is_shared {
-            // Before the first use of the log: then it needs no shared memory.
+            // Set this before the log is first used; then the log needs no shared memory.
             connection.pragma_update(None, "locking_mode", "EXCLUSIVE")?;
         }
         connection.pragma_update(None, "journal_mode", "WAL")?;

@@ -18,7 +18,7 @@ use super::schema::node_id;
 use super::{place, schema};
 use crate::atomic;
 
-/// The status of a run beside its journal, for where the journal cannot be read by others.
+/// The status file beside the journal, for cases in which other processes cannot read the journal.
 pub const STATUS_FILE: &str = "status.json";
 
 /// The schema of the JSON.
@@ -27,14 +27,14 @@ const SCHEMA: &str = "lookalike.status/1";
 /// The most failures that are listed.
 const MOST_FAILURES: usize = 100;
 
-/// How long to wait for a writer that is in the way.
+/// How long to wait for a writer that holds a lock.
 const BUSY_TIME: Duration = Duration::from_secs(1);
 
-/// Whether a run goes on.
+/// The state of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum RunState {
-    /// A coordinator is at work.
+    /// A coordinator is running.
     Running,
     /// No coordinator is running, and the run is not finished: `--resume` continues it.
     Stopped,
@@ -44,14 +44,14 @@ pub enum RunState {
     Finished,
 }
 
-/// The state of a run.
+/// The status of a run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Status {
     /// Always `lookalike.status/1`.
     pub schema: String,
-    /// Whether the run goes on.
+    /// The state of the run.
     pub state: RunState,
-    /// Why it does not, if it should.
+    /// Why it stopped or ended before it was finished.
     pub error: Option<String>,
     /// The name of the run, 32 hexadecimal digits.
     pub run: String,
@@ -63,11 +63,11 @@ pub struct Status {
     pub host: String,
     /// When the run began.
     pub started_at: String,
-    /// When the last coordinator was last seen to write.
+    /// When a coordinator last wrote to the journal.
     pub updated_at: String,
     /// When the results were written, or the last part ended.
     pub finished_at: Option<String>,
-    /// The seconds that its coordinators were at work, together.
+    /// The total time for which its coordinators ran, in seconds.
     pub elapsed_s: f64,
     /// Nodes of all kinds.
     pub nodes: Counts,
@@ -75,11 +75,11 @@ pub struct Status {
     pub kinds: Vec<KindCounts>,
     /// The workers that are connected, by number.
     pub workers: Vec<WorkerStatus>,
-    /// How many leases all epochs have given out, and how often nodes ran in a coordinator.
+    /// How many leases all epochs gave out, plus how often nodes ran in a coordinator.
     pub attempts: u64,
     /// How many attempts were lost with their workers.
     pub requeued: u64,
-    /// The best score so far. Programs read it under the name that it has always had.
+    /// The best score so far. In JSON it keeps its original name, which programs read.
     #[serde(rename = "best_cssim")]
     pub best_score: Option<f64>,
     /// The nodes that failed, at most 100.
@@ -89,22 +89,22 @@ pub struct Status {
     pub parts: Vec<PartStatus>,
 }
 
-/// How many nodes are where.
+/// The number of nodes in each state.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Counts {
     /// All.
     pub total: u64,
-    /// Their inputs are not there yet.
+    /// Nodes whose inputs are not complete.
     pub waiting: u64,
-    /// They may run.
+    /// Nodes that may run.
     pub ready: u64,
-    /// They run.
+    /// Nodes that are running.
     pub running: u64,
-    /// They have an output, whoever made it.
+    /// Nodes that have an output, from any epoch.
     pub completed: u64,
-    /// Those of them whose output an earlier epoch made.
+    /// Completed nodes whose output is from an earlier epoch.
     pub recalled: u64,
-    /// They failed.
+    /// Nodes that failed.
     pub failed: u64,
 }
 
@@ -127,9 +127,9 @@ pub struct WorkerStatus {
     pub process: u32,
     /// How many nodes it executes at a time.
     pub threads: u64,
-    /// How many it was given and has not answered.
+    /// How many leases it holds.
     pub leases: u64,
-    /// How many it has finished.
+    /// How many nodes it has finished.
     pub finished: u64,
 }
 
@@ -140,11 +140,11 @@ pub struct NodeError {
     pub kind: String,
     /// Its label.
     pub label: String,
-    /// Why.
+    /// The error.
     pub error: String,
 }
 
-/// There is no status.
+/// There is no status to show.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum StatusError {
@@ -162,21 +162,21 @@ pub enum StatusError {
     File {
         /// The file.
         path: String,
-        /// What the system says.
+        /// The error of the system.
         source: io::Error,
     },
-    /// The status file is not one of ours.
+    /// The status file was not written by this program.
     #[error("{path} is not a status of a run")]
     Content {
         /// The file.
         path: String,
-        /// What is wrong with it.
+        /// The error.
         source: serde_json::Error,
     },
 }
 
 impl Status {
-    /// The status of the run in a folder, from its journal, or from its status file where the journal is not for others to read.
+    /// Read the status of the run in a folder, from its journal or, where other processes cannot read that, from its status file.
     ///
     /// # Errors
     /// When there is no run, or its files cannot be read.
@@ -190,7 +190,7 @@ impl Status {
             read_file(&file)?
         } else {
             match read_journal(&journal) {
-                // Locked, or in a folder that cannot be written to.
+                // The journal is locked, or the folder cannot be written to.
                 Err(JournalError::Busy { .. } | JournalError::Open { .. }) if file.exists() => read_file(&file)?,
                 read => read?,
             }
@@ -199,12 +199,12 @@ impl Status {
         Ok(status)
     }
 
-    /// Correct what the writer of the status cannot know: whether it still runs.
+    /// Correct the state: the writer of a status cannot know whether it is still running when the status is read.
     fn settle(&mut self, is_running: Option<bool>) {
         if matches!(self.state, RunState::Finished | RunState::Ended) {
             return;
         }
-        // If the lock cannot be read, the state stays as written.
+        // If the lock cannot be tested, the state stays as written.
         match is_running {
             Some(true) => {
                 self.state = RunState::Running;
@@ -238,7 +238,7 @@ fn read_journal(path: &Path) -> Result<Status, JournalError> {
     let connection = Connection::open_with_flags(path, OpenFlags::SQLITE_OPEN_READ_ONLY).map_err(reading)?;
     connection.busy_timeout(BUSY_TIME).map_err(reading)?;
     schema::check_format(path, &connection)?;
-    // One moment for all tables.
+    // One transaction, so that all tables are read at the same moment.
     let read = || -> rusqlite::Result<Status> {
         let transaction = connection.unchecked_transaction()?;
         read(&transaction)
@@ -246,14 +246,14 @@ fn read_journal(path: &Path) -> Result<Status, JournalError> {
     read().map_err(reading)
 }
 
-/// Write the status file of a journal, so that whoever reads it sees all of it.
+/// Write the status file of a journal, atomically.
 pub(super) fn write(connection: &Connection, journal: &Path) -> anyhow::Result<()> {
     let mut text = serde_json::to_string_pretty(&read(connection)?)?;
     text.push('\n');
     Ok(atomic::write_unsynced(&journal.with_file_name(STATUS_FILE), text.as_bytes())?)
 }
 
-/// The status that a journal tells.
+/// Read the status from a journal.
 fn read(connection: &Connection) -> rusqlite::Result<Status> {
     let sql = "SELECT lower(hex(name)), started_ms, finished_ms, outputs IS NOT NULL FROM run";
     let (run, started, finished, is_whole): (String, i64, Option<i64>, bool) =
@@ -300,7 +300,8 @@ fn read(connection: &Connection) -> rusqlite::Result<Status> {
     })
 }
 
-/// Nodes by kind and state. That a node is completed is written a little later than its result, so results count.
+/// Count nodes by kind and state. Results are counted too, because the state of a completed node is written a little later than
+/// its result.
 fn kinds(connection: &Connection, epoch: u64) -> rusqlite::Result<Vec<KindCounts>> {
     let sql = "SELECT kind, iif(state IN (1, 2) AND done.key IS NOT NULL, 3, state) AS now, count(*), min(id)
                FROM nodes LEFT JOIN (SELECT DISTINCT key FROM results WHERE epoch = ?1) AS done ON done.key = nodes.key
@@ -346,7 +347,7 @@ fn failures(connection: &Connection, epoch: u64) -> rusqlite::Result<Vec<NodeErr
 }
 
 impl Counts {
-    /// So many nodes in the state of this number in the table.
+    /// This count in the state with this number in the table.
     fn of(state: u8, count: u64) -> Self {
         let mut counts = Self { total: count, ..Self::default() };
         match state {
@@ -371,11 +372,11 @@ impl Counts {
     }
 }
 
-/// The last millisecond of the year 9999, since 1970.
+/// The last millisecond of the year 9999, counted from 1970.
 const LAST_MS: u64 = 253_402_300_799_999;
 
 fn rfc3339(unix_ms: i64) -> String {
-    // A damaged journal may name any time; beyond the year 9999 there is no name for it.
+    // A damaged journal may hold any time, but years after 9999 cannot be formatted.
     let since = Duration::from_millis(u64::try_from(unix_ms).unwrap_or(0).min(LAST_MS));
     humantime::format_rfc3339_millis(SystemTime::UNIX_EPOCH + since).to_string()
 }

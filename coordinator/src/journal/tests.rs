@@ -1,4 +1,4 @@
-//! What is written is there again, whatever happened to the process or to the file in between.
+//! What was written can be read again, whatever happened to the process or the file in between.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -34,7 +34,7 @@ fn output(byte: u8) -> Blob {
     Blob::new(vec![byte; 1000])
 }
 
-/// A node that is completed, with its output.
+/// A completed node with its output.
 fn completed(node: u8) -> Batch {
     let mut batch = Batch::default();
     let added = Some(("search".to_owned(), format!("search {node}")));
@@ -51,7 +51,7 @@ fn completed(node: u8) -> Batch {
     batch
 }
 
-/// Write batches and wait until they are.
+/// Write batches and wait until they are written.
 fn write(journal: &mut Journal, batches: impl IntoIterator<Item = Batch>) {
     let runtime = tokio::runtime::Builder::new_current_thread().build().unwrap();
     for batch in batches {
@@ -78,7 +78,7 @@ fn next_epoch_finds_results_deaths_and_the_address() {
     batch.nodes.insert(2, suspect);
     batch.listens("127.0.0.1:4100".into());
     write(&mut journal, [batch]);
-    // Killed: nothing is closed. (A process that is killed writes nothing more; a thread cannot be.)
+    // As after a kill: nothing is closed. (A killed process writes nothing more, but a thread cannot be killed.)
     let copy = copied(&folder);
     drop(journal);
     let again = Journal::open(&options(&copy), RunName([8; 16]), None).unwrap();
@@ -90,7 +90,7 @@ fn next_epoch_finds_results_deaths_and_the_address() {
     assert_eq!(past.of(key(3)), Memory::default());
 }
 
-/// The files of the journal as they are at this moment, in a folder of their own.
+/// A copy of the journal's present files, in another folder.
 fn copied(folder: &TempDir) -> TempDir {
     let copy = tempfile::tempdir().unwrap();
     for name in ["run.sqlite", "run.sqlite-wal"] {
@@ -182,7 +182,7 @@ fn output_that_is_computed_again_after_its_release_is_written_again() {
         batch.released.insert(key(byte));
         batch
     };
-    // Released, and asked for again: by a later group, and by the same one.
+    // Released, and added again: by a later group, and by the same one.
     write(&mut journal, [completed(1), released(1)]);
     let mut again = Batch::default();
     again.keep(key(1), output(1));
@@ -203,7 +203,7 @@ fn journal_is_there_as_a_whole_or_not_at_all() {
     let error = schema::create(&path, full).unwrap_err().to_string();
     assert!(error.contains("run.sqlite;"), "{error}");
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
-    // Killed in the middle of it: what is left is no run, to go on with or to be spared.
+    // Killed while it created the journal: the rest is not a run that could be resumed or that has to be kept.
     fs::write(folder.path().join("run.sqlite.new"), "half of a journal").unwrap();
     fs::write(folder.path().join("run.sqlite.new-journal"), "more of it").unwrap();
     let fresh = JournalOptions { resume: false, ..options(&folder) };
@@ -261,7 +261,7 @@ fn finished_run_knows_its_files_and_needs_no_outputs_any_more() {
     assert!(fs::metadata(&path).unwrap().len() < 100_000);
     let others = schema::files(&path)[1..].iter().filter(|file| file.exists()).count();
     assert_eq!(others, 0, "a finished journal is one file");
-    // Somebody asks for more: it is a run again.
+    // A resumed run is no longer finished.
     let again = begun(&folder);
     assert_eq!((again.epoch, again.past.results), (2, 0));
     again.close(None).unwrap();
@@ -291,7 +291,7 @@ fn status_tells_counts_workers_and_whether_somebody_is_at_work() {
     journal.close(Some("the disk is full".into())).unwrap();
     let stopped = Status::of(folder.path()).unwrap();
     assert_eq!((stopped.state, stopped.error.as_deref()), (RunState::Stopped, Some("the disk is full")));
-    // Where the journal itself cannot be read, its status file is.
+    // If the journal cannot be read, the status file is.
     let file: Status = serde_json::from_slice(&fs::read(folder.path().join("status.json")).unwrap()).unwrap();
     assert_eq!((file.run, file.nodes), (stopped.run, stopped.nodes));
     finish(&folder.path().join(JOURNAL_FILE), &Finished { outputs: Vec::new() }).unwrap();

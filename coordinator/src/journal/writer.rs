@@ -1,4 +1,4 @@
-//! The thread that writes: one transaction per batch, in the order in which they come.
+//! The thread that writes the journal: one transaction per batch, in order of arrival.
 
 use std::collections::HashMap;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender};
@@ -19,29 +19,29 @@ use super::status;
 use super::time::unix_ms;
 use crate::state::Deaths;
 
-/// How often `status.json` is written at most.
+/// The shortest time between two versions of `status.json`.
 const STATUS_INTERVAL: Duration = Duration::from_secs(1);
 
-/// How often it is written when nothing happens.
+/// The time between two versions of `status.json` when nothing happens.
 const QUIET_INTERVAL: Duration = Duration::from_secs(20);
 
-/// Looking at all nodes may take at most one part in so many of the thread's time.
+/// Counting all nodes may take at most one part in this many of the thread's time.
 const STATUS_SHARE: u32 = 20;
 
-/// What the thread is asked to do.
+/// Commands for the thread.
 #[derive(Debug)]
 pub(super) enum Command {
-    /// Write a batch, then say so.
+    /// Write a batch, then report that it is written.
     Commit(Box<Batch>),
     /// Write a batch that can wait.
     Note(Box<Batch>),
     /// Read the output of a node.
     Read(NodeKey, SyncSender<Option<Blob>>),
-    /// Say that all that was asked for before is done.
+    /// Answer once all earlier commands are executed.
     Wait(SyncSender<()>),
-    /// Write how this coordinator's part ended, and end.
+    /// Write how this epoch ended, and end the thread.
     Close(Option<String>),
-    /// End at once, as a killed process does.
+    /// End at once, as if the process were killed.
     Die,
 }
 
@@ -56,12 +56,12 @@ pub(super) struct Writer {
     pub(super) deferred: Deferred,
     /// When `status.json` may be written next.
     pub(super) next_status: Instant,
-    /// Whether something has happened since it was written.
+    /// Whether anything has changed since it was written.
     pub(super) is_news: bool,
 }
 
 impl Writer {
-    /// Process commands until the end, or until the sender is gone.
+    /// Process commands until one ends the thread, or until the sender is dropped.
     pub(super) fn run(mut self) -> Result<(), JournalError> {
         loop {
             let soon = self.next_status.saturating_duration_since(Instant::now());
@@ -116,22 +116,22 @@ impl Writer {
             return Err(JournalError::writing(&self.options.path, source));
         }
         self.results.extend(new);
-        // A node that is added again after its output was released runs again, and its output has to be written again.
+        // If a node is added again after its output was released, it runs again, and its output must be written again.
         for key in batch.forgotten.iter().chain(&batch.released) {
             self.results.remove(key);
         }
         Ok(())
     }
 
-    /// Wait until everything written is on the disk. Once per epoch, before its first lease: a power loss may cost the end of the log, but
-    /// not the number of an epoch. Otherwise the next epoch could have the same number, and a worker of the lost one would take the next
-    /// coordinator for its own and answer for other nodes of the same numbers.
+    /// Wait until everything written so far is on the disk. Called once per epoch, before its first lease. Otherwise a power loss
+    /// could remove the epoch's number from the end of the log, and the next epoch would reuse it. A worker of the lost epoch
+    /// would then mistake the next coordinator for its own, and answer for other nodes with the same numbers.
     fn reach_the_disk(&self) -> rusqlite::Result<()> {
-        // What readers still need stays in the log as well, and is synchronised with it.
+        // Pages that readers still need also stay in the log, which is synchronised first.
         self.connection.query_row("PRAGMA wal_checkpoint(PASSIVE)", [], |_| Ok(()))
     }
 
-    /// The output of a node. A damaged one is dropped, and the node runs again.
+    /// Read the output of a node. A damaged one is dropped, and the node runs again.
     fn read(&mut self, key: NodeKey) -> Option<Blob> {
         let id = *self.results.get(&key)?;
         let read = || -> rusqlite::Result<(BlobHash, Option<Vec<u8>>)> {
@@ -148,7 +148,7 @@ impl Writer {
         };
         warn!(journal = %self.options.path.display(), ?key, fault, "a result in the journal is damaged: its node runs again");
         self.results.remove(&key);
-        // If it cannot be removed it will be found damaged again.
+        // If the row cannot be removed, it will be found damaged again.
         let _ = self.connection.execute("DELETE FROM results WHERE id = ?1", [id]);
         None
     }
@@ -164,12 +164,12 @@ impl Writer {
         };
         let written = write().map_err(|source| JournalError::writing(&self.options.path, source));
         self.tell_status();
-        // As one file, which can be read from anywhere; a reader that is in the way right now does no harm.
+        // Leave a single file, which can be read from anywhere. If a reader prevents this now, no harm is done.
         let _ = self.connection.pragma_update(None, "journal_mode", "DELETE");
         written
     }
 
-    /// Write what could wait.
+    /// Write the deferred rows.
     fn write_deferred(&mut self) {
         let parts = self.options.parts.take();
         let outcome = self.connection.transaction().and_then(|transaction| {
@@ -182,12 +182,12 @@ impl Writer {
             Ok(rows) => self.deferred.written(rows),
             Err(error) => {
                 self.options.parts.put_back(parts);
-                warn!(%error, "cannot note in the journal what is under way");
+                warn!(%error, "cannot write attempts and states to the journal");
             }
         }
     }
 
-    /// Write `status.json`. A disk that is full will stop the run elsewhere.
+    /// Write `status.json`. Errors are only logged: if the disk is full, a commit will stop the run.
     fn tell_status(&mut self) {
         let began = Instant::now();
         self.write_deferred();
@@ -197,7 +197,7 @@ impl Writer {
             params![self.epoch, unix_ms(), best],
         );
         if let Err(error) = seen {
-            warn!(%error, "cannot note the time in the journal");
+            warn!(%error, "cannot write the time to the journal");
         }
         if let Err(error) = status::write(&self.connection, &self.options.path) {
             warn!(%error, "cannot write the status of the run");
@@ -207,7 +207,7 @@ impl Writer {
     }
 }
 
-/// Write the rows of a batch. The new results, with their rows.
+/// Write the rows of a batch. Returns the keys of new results, with their rows.
 fn write(
     transaction: &Transaction<'_>,
     epoch: u64,

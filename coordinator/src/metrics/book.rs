@@ -1,11 +1,11 @@
-//! The numbers, as the events of a run change them.
+//! The values of the metrics, updated by the events of a run.
 
 use super::histogram::Histogram;
 use crate::events::{RunEvent, Site};
 use lookalike::graph::{NodeId, WorkerId};
 use std::{collections::BTreeMap, time::Instant};
 
-/// Where a node is on its way.
+/// The state of a node.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum State {
     Waiting,
@@ -21,7 +21,7 @@ impl State {
     pub(super) const ALL: [Self; 7] =
         [Self::Waiting, Self::Ready, Self::Leased, Self::Running, Self::Completed, Self::Failed, Self::Cancelled];
 
-    /// As the label says it.
+    /// The value of its label.
     pub(super) fn name(self) -> &'static str {
         match self {
             Self::Waiting => "waiting",
@@ -40,18 +40,18 @@ impl State {
 struct Open {
     kind: String,
     state: State,
-    /// Since when it waits for a place to run.
+    /// When it became ready, while it waits for a worker.
     ready_since: Option<Instant>,
 }
 
-/// The numbers of one kind of nodes.
+/// The values for one kind of node.
 #[derive(Debug, Default)]
 pub(super) struct OfKind {
     pub(super) nodes: BTreeMap<State, usize>,
     pub(super) seconds: Histogram,
 }
 
-/// All numbers.
+/// All values.
 #[derive(Debug)]
 pub(super) struct Book {
     pub(super) began: Instant,
@@ -104,7 +104,7 @@ impl Book {
         self.workers.values().sum()
     }
 
-    /// Nodes that workers hold.
+    /// The number of nodes that workers hold.
     pub(super) fn leases(&self) -> usize {
         self.open.values().filter(|open| open.state == State::Leased || open.state == State::Running).count()
     }
@@ -113,7 +113,7 @@ impl Book {
         self.fits = fits.to_vec();
     }
 
-    /// Takes note of what happened at a time.
+    /// Process an event.
     pub(super) fn note(&mut self, event: &RunEvent, now: Instant) {
         match event {
             RunEvent::WorkerJoined { worker, threads, .. } => {
@@ -145,7 +145,7 @@ impl Book {
             RunEvent::NodeReady { node } => self.wait(*node, now),
             RunEvent::NodeAssigned { node, .. } => {
                 self.attempts += 1;
-                // One that runs goes on when a second worker gets it too.
+                // A running node stays so when a second worker also gets it.
                 if self.open.get(node).is_some_and(|open| open.state < State::Leased) {
                     self.change(*node, State::Leased);
                 }

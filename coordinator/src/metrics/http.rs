@@ -1,5 +1,5 @@
-//! As much of HTTP/1.1 as a scraper or a probe needs: one GET or HEAD per connection. Bounded in time, size and number, for anybody
-//! who can connect may ask.
+//! The part of HTTP/1.1 that a scraper or a probe needs: one GET or HEAD per connection. Time, size and number of requests are
+//! bounded, because anyone may connect.
 
 use super::text::MEDIA_TYPE;
 use std::{io, sync::Arc, time::Duration};
@@ -11,28 +11,28 @@ use tokio::{
 };
 use tracing::debug;
 
-/// Requests that are answered at a time; more wait in the system's queue.
+/// The most requests that are answered at a time; others wait in the system's queue.
 const AT_A_TIME: usize = 8;
 /// How long a request and its answer may take.
 const PATIENCE: Duration = Duration::from_secs(5);
 /// The longest head of a request.
 const MOST_HEAD_BYTES: usize = 8 << 10;
-/// The pause after the system refuses to accept a connection, such as for want of file descriptors.
+/// The pause after the system fails to accept a connection, for example when file descriptors run out.
 const ACCEPT_PAUSE: Duration = Duration::from_millis(100);
 
-/// What is served.
+/// The pages that are served.
 pub(super) trait Pages: Send + Sync + 'static {
     /// The metrics as of now.
     fn page(&self) -> String;
 
-    /// What is wrong with the run itself, so far as that can be seen from outside.
+    /// The health of the run.
     ///
     /// # Errors
-    /// In words.
+    /// A description of the problem.
     fn health(&self) -> Result<(), String>;
 }
 
-/// Answers requests with what the pages says at their time.
+/// Answer requests with the current pages.
 pub(super) async fn serve(listener: TcpListener, pages: impl Pages) {
     let (places, pages) = (Arc::new(Semaphore::new(AT_A_TIME)), Arc::new(pages));
     loop {
@@ -41,7 +41,7 @@ pub(super) async fn serve(listener: TcpListener, pages: impl Pages) {
             Ok((stream, _)) => {
                 let pages = Arc::clone(&pages);
                 tokio::spawn(async move {
-                    // How it ended matters to the scraper alone.
+                    // Errors are ignored, because only the scraper is affected.
                     let _ = timeout(PATIENCE, answer(stream, &*pages)).await;
                     drop(place);
                 });
@@ -60,7 +60,7 @@ async fn answer(mut stream: TcpStream, pages: &impl Pages) -> io::Result<()> {
     stream.shutdown().await
 }
 
-/// Everything before the empty line, or what came within the bound.
+/// Read up to the empty line, or up to the bound.
 async fn read_head(stream: &mut TcpStream) -> io::Result<Vec<u8>> {
     let mut head = Vec::new();
     while !head.windows(4).any(|four| four == b"\r\n\r\n") && head.len() < MOST_HEAD_BYTES {
@@ -94,12 +94,9 @@ pub(super) fn response(head: &[u8], pages: &impl Pages) -> Vec<u8> {
             Ok(()) => message("200 OK", "", "ok\n", with_body),
             Err(what) => message("503 Service Unavailable", "", &format!("{what}\n"), with_body),
         },
-        _ => message(
-            "404 Not Found",
-            "",
-            "the metrics are at /metrics, and whether the run goes on at /healthz\n",
-            with_body,
-        ),
+        _ => {
+            message("404 Not Found", "", "the metrics are at /metrics, the health of the run at /healthz\n", with_body)
+        }
     }
 }
 

@@ -1,7 +1,7 @@
 //! `--metrics`: the counters of a run for Prometheus, over HTTP in its text format.
 //!
-//! The counts come from the events of the run and from the states of the fits, so that no other module knows of metrics. They are for
-//! people: none of them reaches a result. docs/batch.md lists their names, which are a contract.
+//! The metrics are derived from the run's events and the states of the fits, so no other module depends on metrics, and no result
+//! does. docs/batch.md lists their names, which are a contract.
 
 mod book;
 mod histogram;
@@ -17,7 +17,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-/// The metrics of a run, and where they are served. Clones are the same metrics.
+/// The metrics of a run, and the socket on which they are served. Clones share them.
 #[derive(Debug, Clone)]
 pub struct Metrics {
     book: Arc<Mutex<Book>>,
@@ -26,14 +26,14 @@ pub struct Metrics {
     pulse: Arc<Pulse>,
 }
 
-/// A loop that has not turned for this long hangs: the longest single step reads one photo and its light.
+/// A loop that has not completed a round for this long counts as hanging. The longest single step reads one photo and its light.
 const LONGEST_ROUND: Duration = Duration::from_secs(30);
 
 impl Metrics {
-    /// Takes the address; requests wait until [`Metrics::serve`] answers them.
+    /// Bind the address. Requests wait until [`Metrics::serve`] answers them.
     ///
     /// # Errors
-    /// If it cannot be listened on.
+    /// If the address cannot be bound.
     pub fn listen(address: SocketAddr) -> io::Result<Self> {
         let listener = TcpListener::bind(address)?;
         listener.set_nonblocking(true)?;
@@ -45,37 +45,37 @@ impl Metrics {
         })
     }
 
-    /// What to type into a browser.
+    /// The address for a browser.
     pub fn url(&self) -> String {
         format!("http://{}/metrics", self.address)
     }
 
-    /// Takes note of what happened.
+    /// Process an event.
     pub fn note(&self, event: &RunEvent) {
         self.with_book(|book| book.note(event, Instant::now()));
     }
 
-    /// What the loop of the run has to show its rounds to.
+    /// The pulse that the loop of the run must update.
     pub fn pulse(&self) -> Arc<Pulse> {
         Arc::clone(&self.pulse)
     }
 
-    /// How many fits there are in each state.
+    /// Set the number of fits in each state.
     pub fn set_fits(&self, fits: &[(&'static str, usize)]) {
         self.with_book(|book| book.set_fits(fits));
     }
 
-    /// Answers requests for as long as it is polled. To be called inside a tokio runtime.
+    /// Answer requests while the future is polled. Must be called inside a tokio runtime.
     ///
     /// # Errors
-    /// If the runtime refuses the socket.
+    /// If the runtime cannot use the socket.
     pub fn serve(&self) -> io::Result<impl Future<Output = ()> + Send + use<>> {
         let listener = self.listener.try_clone().and_then(tokio::net::TcpListener::from_std)?;
         Ok(http::serve(listener, self.clone()))
     }
 
     fn with_book<T>(&self, use_it: impl FnOnce(&mut Book) -> T) -> T {
-        // A panic cannot leave the numbers half changed in a way that matters.
+        // After a panic, at worst one value is slightly wrong.
         use_it(&mut self.book.lock().unwrap_or_else(PoisonError::into_inner))
     }
 }
@@ -90,7 +90,7 @@ impl http::Pages for Metrics {
     }
 }
 
-/// Whether a loop is well that went round so long ago, if it has begun.
+/// Whether the loop is healthy, given the time since its last round; `None` if it has not started.
 fn health(age: Option<Duration>) -> Result<(), String> {
     match age.filter(|age| *age > LONGEST_ROUND) {
         None => Ok(()),

@@ -1,4 +1,4 @@
-//! What the page says after some events, and what the server says to whom.
+//! The page after some events, and the server's answers.
 
 use super::{
     book::Book,
@@ -14,7 +14,7 @@ fn name(node: u64, kind: &str) -> NodeName {
     NodeName { node: NodeId(node), kind: kind.to_owned(), label: format!("{kind} {node}") }
 }
 
-/// The value of a sample; it must be there once.
+/// The value of a sample, which must occur once.
 #[track_caller]
 fn value(page: &str, sample: &str) -> f64 {
     let found: Vec<&str> = page.lines().filter_map(|line| line.strip_prefix(sample)?.strip_prefix(' ')).collect();
@@ -116,7 +116,7 @@ fn every_sample_belongs_to_a_family_that_was_announced_and_names_follow_the_conv
     assert_eq!(escaped("a\\b\"c\nd"), "a\\\\b\\\"c\\nd");
 }
 
-/// A run whose loop went round so many seconds ago.
+/// A run whose loop completed its last round this many seconds ago.
 struct Round(Option<u64>);
 
 impl Pages for Round {

@@ -1,7 +1,7 @@
 //! The page: the text exposition format of Prometheus, version 0.0.4.
 //!
-//! Of every family a line of help and a line of type, then its samples; labels in quotes, with `\`, `"` and line feeds escaped;
-//! a histogram as cumulative buckets with a sum and a count.
+//! Each family has a line of help, a line of type, and its samples. Label values are quoted, with `\`, `"` and line feeds
+//! escaped. A histogram has cumulative buckets, a sum and a count.
 
 use super::{
     book::{Book, State},
@@ -12,7 +12,7 @@ use std::{fmt::Write as _, time::Instant};
 /// The media type of the page.
 pub(super) const MEDIA_TYPE: &str = "text/plain; version=0.0.4; charset=utf-8";
 
-/// The page as of a time.
+/// The page at a given time.
 pub(super) fn page(book: &Book, now: Instant) -> String {
     let mut page = Page::default();
     page.family("lookalike_build_info", "gauge", "The version that runs; always 1.");
@@ -112,12 +112,12 @@ struct Page {
 }
 
 impl Page {
-    /// Begins a family; its samples follow.
+    /// Begin a family; its samples must follow.
     fn family(&mut self, name: &str, kind: &str, help: &str) {
         let _ = writeln!(self.text, "# HELP {name} {help}\n# TYPE {name} {kind}");
     }
 
-    /// A family of one sample without labels.
+    /// Write a family with one sample and no labels.
     fn single(&mut self, name: &str, kind: &str, help: &str, value: f64) {
         self.family(name, kind, help);
         self.sample(name, &[], value);
@@ -142,7 +142,7 @@ impl Page {
     }
 }
 
-/// The text of a label between its quotes.
+/// Escape a label value.
 pub(super) fn escaped(text: &str) -> String {
     text.replace('\\', "\\\\").replace('"', "\\\"").replace('\n', "\\n")
 }

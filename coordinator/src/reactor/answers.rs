@@ -1,4 +1,4 @@
-//! Answers of workers: which one counts, and what happens to the others.
+//! Answers of workers: which one is accepted, and what happens to the others.
 
 use std::time::Duration;
 
@@ -11,7 +11,7 @@ use crate::actions::{Action, Outbox};
 use crate::events::{Departure, Site};
 use crate::state::{Candidate, Core};
 
-/// An answer: (where from, for which node, for which attempt).
+/// The site, the node and the attempt of an answer.
 pub(super) type Answer = (Site, NodeId, u32);
 
 pub(super) fn finished(
@@ -38,7 +38,7 @@ fn process_of(core: &Core, site: Site) -> Option<ProcessName> {
     core.members.get(worker).map(|member| member.process.name)
 }
 
-/// Take an output, or keep it until a second one has come.
+/// Accept an output, or keep it until the second one arrives.
 fn take(core: &mut Core, node: NodeId, result: Candidate, now: Duration, outbox: &mut Outbox) -> Result<(), Stop> {
     let is_open = core.graph.state(node) == Some(&NodeState::Ready);
     if is_open && core.look(node).is_some_and(|record| record.is_verified) {
@@ -60,7 +60,7 @@ pub(super) fn failed(
     }
     if !core.graph.is_open(node) {
         let has_output = matches!(core.graph.state(node), Some(NodeState::Completed(_)));
-        // A cancelled execution says nothing about the node.
+        // A cancelled execution does not contradict the output.
         if has_output && failure != NodeFailure::Cancelled {
             results::tell_difference(core, node, second_site, failure.to_string(), outbox);
         }
@@ -77,7 +77,7 @@ pub(super) fn failed(
     Ok(())
 }
 
-/// An answer has come: its lease ends. Returns since when the node has run under it, as far as known; `None` if the attempt was never
+/// Process the end of a lease by an answer. Returns since when the node ran under it (if known); `None` if the attempt was never
 /// given out. A worker that answers for such an attempt is dropped.
 fn answered(core: &mut Core, answer: Answer, now: Duration, outbox: &mut Outbox) -> Option<Option<Duration>> {
     let (site, node, attempt) = answer;
@@ -106,7 +106,7 @@ fn answered(core: &mut Core, answer: Answer, now: Duration, outbox: &mut Outbox)
     was_asked.then_some(since)
 }
 
-/// An output of a node that is verified by a second computation: keep the first output, compare the second.
+/// Process an output of a node that is verified by a second computation: keep the first output, compare the second.
 fn verify(core: &mut Core, node: NodeId, result: Candidate, now: Duration, outbox: &mut Outbox) -> Result<(), Stop> {
     // A suspect node's first result is accepted without a second computation.
     let is_suspect = core.is_suspect(node);
@@ -121,7 +121,7 @@ fn verify(core: &mut Core, node: NodeId, result: Candidate, now: Duration, outbo
             core.summary.verified_nodes += 1;
             return results::accept(core, node, *first, now, outbox);
         }
-        // A duplicate: the worker never received our acknowledgement.
+        // A duplicate: the worker never received the acknowledgement.
         Some(first) => *first,
     };
     record.candidate = Some(Box::new(first));
@@ -131,14 +131,14 @@ fn verify(core: &mut Core, node: NodeId, result: Candidate, now: Duration, outbo
     Ok(())
 }
 
-/// Whether an output was computed a second time. A process that has lost its connection may send one output under two leases, but
-/// not under a lease whose execution it has announced.
+/// Whether an output was computed a second time. A process that reconnects may send one output under two leases, but if it has
+/// reported the start of the second one, it has computed the output again.
 fn is_second_computation(first: &Candidate, second: &Candidate) -> bool {
     let is_another = first.process.is_some() && second.process.is_some() && first.process != second.process;
     first.attempt != second.attempt && (is_another || second.took.is_some())
 }
 
-/// Whether this node is among the share that is verified: the same nodes in every run.
+/// Whether this node is in the share to be verified, which is the same in every run.
 pub(super) fn is_chosen(core: &Core, spec: &NodeSpec, node: NodeId) -> bool {
     let fraction = core.policy.verify_fraction;
     if fraction <= 0.0 {

@@ -24,7 +24,7 @@ pub enum Stop {
         /// How long there was work but no worker.
         waited: Duration,
     },
-    /// The local workers die whenever they are started.
+    /// Every time a local worker is started, it dies.
     #[error("the local worker processes keep dying, the last one with {last_status}; see their lines on stderr")]
     LocalWorkersKeepDying {
         /// How the last one ended.
@@ -46,7 +46,7 @@ pub enum Stop {
         /// The second result.
         second: NodeAnswer,
     },
-    /// A result is not what its node or its recomputation gives.
+    /// A result is wrong, as a check of its node or a recomputation shows.
     #[error(
         "the result of {name} from {site} is wrong: {error}; use the same build everywhere, check the memory of that machine, and report this"
     )]
@@ -55,20 +55,20 @@ pub enum Stop {
         name: Box<NodeName>,
         /// Where the result came from.
         site: Site,
-        /// What is wrong with it.
+        /// The fault.
         error: PlanError,
     },
-    /// The planner cannot go on, by default because a node failed.
+    /// The planner cannot continue, by default because a node failed.
     #[error(transparent)]
     Plan(#[from] PlanError),
 }
 
 impl Stop {
-    /// The exit code of the program: 2 when a node's own error is about the user's input, else 3.
+    /// The exit code of the program: 2 if a node failed because of the user's input, otherwise 3.
     #[must_use]
     pub fn exit_code(&self) -> u8 {
         match self {
-            // A panic or an unknown kind is an error of this program.
+            // A panic or an unknown kind is a bug of this program.
             Self::Plan(PlanError::NodeFailed {
                 reason: FailureReason::Node(NodeFailure::Application { .. }), ..
             }) => 2,
@@ -77,10 +77,10 @@ impl Stop {
     }
 }
 
-/// What a computation of a node came to.
+/// The answer of a computation.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum NodeAnswer {
-    /// An output of this name.
+    /// The hash of an output.
     Output(BlobHash),
     /// An error.
     Failure(Box<NodeFailure>),

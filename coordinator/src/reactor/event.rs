@@ -1,30 +1,30 @@
-//! What the reactor is told.
+//! The reactor's events.
 
 use lookalike::graph::{Blob, BlobHash, NodeFailure, NodeId, WorkerId};
 
 use crate::actions::WorkerProcess;
 use crate::events::{Departure, Site};
 
-/// Something that happened.
+/// An event.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Event {
-    /// A worker has said hello and was welcomed.
+    /// A worker has said hello and was accepted.
     WorkerJoined {
-        /// Its number, never used before.
+        /// Its number, which is never reused.
         worker: WorkerId,
         /// How many nodes it executes at a time.
         threads: usize,
-        /// Its process, which may have been here before under another number.
+        /// Its process, which may have been connected before under another number.
         process: WorkerProcess,
     },
-    /// A worker's connection is gone.
+    /// A worker's connection has ended.
     WorkerLeft {
         /// The worker.
         worker: WorkerId,
         /// Why.
         departure: Departure,
     },
-    /// A worker drains: it finishes what it executes and begins nothing more.
+    /// A worker drains: it finishes the nodes that it executes and begins no others.
     WorkerDrains {
         /// The worker.
         worker: WorkerId,
@@ -56,7 +56,7 @@ pub enum Event {
         /// The output.
         output: Blob,
     },
-    /// A node has no output and never will: its own error.
+    /// A node has failed with an error of its own.
     Failed {
         /// Where it ran.
         site: Site,
@@ -67,11 +67,11 @@ pub enum Event {
         /// The error.
         failure: NodeFailure,
     },
-    /// A worker wants a blob.
+    /// A worker requests a blob.
     BlobRequested {
         /// The worker.
         worker: WorkerId,
-        /// The name of the blob.
+        /// The hash of the blob.
         hash: BlobHash,
     },
     /// The last local worker will not be restarted, and no other worker can join.
@@ -79,9 +79,9 @@ pub enum Event {
         /// How the last one ended.
         last_status: String,
     },
-    /// The time of [`Core::next_deadline`] has come.
+    /// The time [`Core::next_deadline`] has been reached.
     DeadlinePassed,
-    /// The planner may have more to add, though no node has ended.
+    /// The planner may have nodes to add although no node has ended.
     LookAgain,
 }
 
@@ -92,6 +92,6 @@ pub struct Executing {
     pub node: NodeId,
     /// The attempt under which it was assigned, perhaps on an earlier connection.
     pub attempt: u32,
-    /// How much of it is done, in thousandths.
+    /// The completed share, in thousandths.
     pub permille: u16,
 }

@@ -1,4 +1,4 @@
-//! Leases: given out, begun, taken back; and which worker may have one.
+//! Gives out leases, marks them as started, takes them back.
 
 use std::time::Duration;
 
@@ -8,7 +8,7 @@ use crate::actions::{Action, Lease, Outbox};
 use crate::events::{RunEvent, Site};
 use crate::state::{Core, Place};
 
-/// Let a node wait for a worker from now on.
+/// Put a node into the place where it waits for a worker.
 pub(super) fn await_now(core: &mut Core, node: NodeId, now: Duration) {
     let has_candidate = core.look(node).is_some_and(|record| record.candidate.is_some());
     let place = match (core.is_suspect(node), has_candidate) {
@@ -32,7 +32,7 @@ pub(super) fn assign(core: &mut Core, worker: WorkerId, node: NodeId, now: Durat
     outbox.tell(RunEvent::NodeAssigned { node, worker });
 }
 
-/// End a lease and tell its worker.
+/// End a lease and tell its worker to cancel.
 pub(super) fn take_back(core: &mut Core, worker: WorkerId, node: NodeId, now: Duration, outbox: &mut Outbox) {
     let epoch = core.epoch;
     if let Some(held) = core.end_lease(worker, node, now) {
@@ -40,7 +40,7 @@ pub(super) fn take_back(core: &mut Core, worker: WorkerId, node: NodeId, now: Du
     }
 }
 
-/// A worker has begun to execute a node.
+/// A worker starts to execute a node.
 pub(super) fn started(
     core: &mut Core,
     worker: WorkerId,
@@ -49,19 +49,19 @@ pub(super) fn started(
     outbox: &mut Outbox,
 ) {
     renew(core, worker, now);
-    // Otherwise the lease has ended or changed while this message was on its way.
+    // Otherwise the lease ended or changed before this message arrived.
     if core.members.change(worker, |member| member.begin(node, attempt, (arrived, now))) == Some(true) {
         core.watch(node);
         outbox.tell(RunEvent::NodeStarted { name: core.name(node), site: Site::Worker(worker) });
     }
 }
 
-/// A worker has sent something: its leases are renewed.
+/// Renew the leases of a worker, which has sent something.
 pub(super) fn renew(core: &mut Core, worker: WorkerId, now: Duration) {
     core.members.renew(worker, now + core.policy.lost_after);
 }
 
-/// Whether the output to be verified came from this worker's process, on this connection or an earlier one.
+/// Whether this worker's process computed the output to be verified, on this or an earlier connection.
 pub(super) fn is_origin(core: &Core, node: NodeId, worker: WorkerId) -> bool {
     let candidate = core.look(node).and_then(|record| record.candidate.as_ref());
     let process = core.members.get(worker).map(|member| member.process.name);

@@ -1,4 +1,4 @@
-//! Membership: workers join, send signs of life, drain, leave.
+//! Membership: workers join, report, drain and leave.
 
 use std::time::Duration;
 
@@ -9,7 +9,7 @@ use crate::actions::{Action, Lease, Outbox, WorkerProcess};
 use crate::events::{Departure, RunEvent};
 use crate::state::{Core, Lost, Place};
 
-/// The pause after a node in execution has lost its worker for the second time; each further one is twice as long.
+/// The pause after a node has lost its worker for the second time. It doubles with each further loss.
 const FIRST_DELAY: Duration = Duration::from_millis(100);
 
 /// The longest of these pauses.
@@ -35,7 +35,7 @@ pub(super) fn join(
     }
 }
 
-/// A worker reports a node that it executes under a lease from before its connection broke: it gets a new lease and continues, or is
+/// A worker reports a node that it executes under a lease from an earlier connection. It gets a new lease and continues, or is
 /// told to cancel.
 pub(super) fn found(
     core: &mut Core,
@@ -45,7 +45,7 @@ pub(super) fn found(
     outbox: &mut Outbox,
 ) {
     let earlier = core.members.get(worker).and_then(|member| member.earlier.get(&node));
-    // For leases taken back on this connection the cancellation has been sent already.
+    // For leases that were taken back on this connection, the cancellation has been sent already.
     if earlier != Some(&attempt) {
         return;
     }
@@ -57,7 +57,7 @@ pub(super) fn found(
     }
 }
 
-/// Whether a worker may continue a node: the node is open, not a suspect, and at most one other worker executes it.
+/// Whether a worker may continue a node: the node is open and not a suspect, and at most one other worker executes it.
 fn may_go_on(core: &Core, worker: WorkerId, node: NodeId) -> bool {
     let (Some(member), Some(record)) = (core.members.get(worker), core.look(node)) else { return false };
     let is_begun =
@@ -68,8 +68,8 @@ fn may_go_on(core: &Core, worker: WorkerId, node: NodeId) -> bool {
     is_free && is_wanted && is_other && record.holders.iter().filter(is_begun).count() < 2
 }
 
-/// Give a worker the lease of a node that it executes. Workers that hold the node without having begun it lose that lease, and this
-/// worker loses the leases that are too many for it now.
+/// Give a worker the lease of a node that it executes already. Workers that hold the node without having begun it lose that
+/// lease, and this worker loses leases that it now has in excess.
 fn adopt(core: &mut Core, worker: WorkerId, node: NodeId, now: Duration, outbox: &mut Outbox) {
     for holder in core.look(node).map(|record| record.holders.clone()).unwrap_or_default() {
         if core.members.get(holder).is_some_and(|holder| holder.waiting.contains(&node)) {
@@ -88,13 +88,13 @@ fn adopt(core: &mut Core, worker: WorkerId, node: NodeId, now: Duration, outbox:
     }
 }
 
-/// Take back the leases of a worker. Its death counts against the nodes that it executed if they may have caused it.
+/// Remove a worker and take back its leases. If the nodes that it executed may have killed it, its death is counted against them.
 pub(super) fn leave(core: &mut Core, worker: WorkerId, departure: &Departure, now: Duration, outbox: &mut Outbox) {
     let Some(member) = core.members.remove(worker) else { return };
     core.clearing = core.clearing.filter(|clearing| *clearing != worker);
     core.summary.workers_left += 1;
     outbox.tell(RunEvent::WorkerLeft { worker, departure: departure.clone() });
-    // A draining worker may be killed when its time limit ends: no node is to blame.
+    // A draining worker may be killed at its time limit, which is not the fault of a node.
     let was_asked = member.is_draining || *departure == Departure::Goodbye;
     let counts = departure.is_suspicious() && !was_asked;
     let deaths = if counts { quarantine::count_death(core, &member, now, outbox) } else { Vec::new() };
@@ -129,7 +129,7 @@ pub(super) fn drain(core: &mut Core, worker: WorkerId, now: Duration, outbox: &m
     }
 }
 
-/// Re-queue a node that was taken from this worker, unless another worker holds it or it waits already.
+/// Re-queue a node that was taken from this worker, unless another worker holds it or it is queued already.
 fn requeue(core: &mut Core, node: NodeId, worker: WorkerId, now: Duration, outbox: &mut Outbox) {
     let Some(record) = core.look(node) else { return };
     let is_cared_for = !record.holders.is_empty() || record.place != Place::Nowhere;
@@ -149,7 +149,7 @@ fn requeue(core: &mut Core, node: NodeId, worker: WorkerId, now: Duration, outbo
     outbox.tell(RunEvent::NodeRequeued { name: core.name(node), worker, crashes: deaths.total() });
 }
 
-/// Queue a node. After the second loss of its worker it waits, each time longer, so that a node that always fails does not spin.
+/// Queue a node, from the second loss of its worker on after a pause that grows, to limit how often a failing node runs.
 fn await_worker(core: &mut Core, node: NodeId, now: Duration) {
     let losses = core.look(node).map_or(0, |record| record.losses);
     let doublings = losses.saturating_sub(2).min(16);
@@ -183,7 +183,7 @@ pub(super) fn send_blob(core: &mut Core, worker: WorkerId, hash: BlobHash, now: 
         drop_worker(core, worker, &Departure::Violation(what), now, outbox);
         return;
     }
-    // The node may have been taken back and completed meanwhile, and its inputs dropped: then the blob is not needed.
+    // If the node was completed meanwhile, its inputs may have been dropped, and the worker does not need the blob.
     let Some(blob) = core.graph.blob(hash).cloned() else {
         outbox.push(Action::ForgoBlob { worker });
         return;

@@ -1,9 +1,9 @@
 //! The state machine: plain functions from state and event to state and actions. No sockets, no clock, no waiting: time is an
 //! argument, and every action goes out through the [`Outbox`].
 //!
-//! Scheduling reacts to events: when a node is ready and a worker has a place, the lease is given out at once. A lease may end without a
-//! result (its worker left), or another attempt's result may come first. The result of any attempt counts, because nodes are pure
-//! functions; results that differ end the run.
+//! Scheduling reacts to events: when a node is ready and a worker has a place, the lease is given out at once. A lease may end
+//! without a result (its worker left), or the result of another attempt may arrive first. The result of any attempt is accepted,
+//! because nodes are pure functions; results that differ end the run.
 //!
 //! No event scans all nodes or all workers: [`state`](crate::state) has indices.
 
@@ -27,19 +27,19 @@ use crate::actions::{Action, Outbox};
 use crate::events::{Departure, RunEvent, Site};
 use crate::state::{Core, Record, Starving};
 
-/// Begin a run: let the planner add the first nodes and act upon them.
+/// Start a run: let the planner add the first nodes, and process them.
 ///
 /// # Errors
-/// Those of the planner.
+/// Errors of the planner.
 pub fn start(core: &mut Core, planner: &mut impl Planner, now: Duration, outbox: &mut Outbox) -> Result<(), Stop> {
     planner.start(&mut GraphEdit::new(&mut core.graph))?;
     settle(core, planner, now, outbox)
 }
 
-/// Act upon an event that has just come. `now` is the time since the run began and never goes back.
+/// Process an event that has just arrived. `now` is the time since the start of the run and never decreases.
 ///
 /// # Errors
-/// As [`handle_arrived`].
+/// See [`handle_arrived`].
 pub fn handle(
     core: &mut Core,
     planner: &mut impl Planner,
@@ -50,12 +50,12 @@ pub fn handle(
     handle_arrived(core, planner, event, (now, now), outbox)
 }
 
-/// Act upon an event that arrived earlier, at `arrived`, which is not after `now`. `arrived` measures how long nodes took; deadlines use
-/// `now`, so a late coordinator makes no worker late.
+/// Process an event that arrived at `arrived`, not later than `now`. `arrived` is used to measure how long nodes took. Deadlines
+/// use `now`, so that a slow coordinator does not make workers miss theirs.
 ///
 /// # Errors
-/// What ends the run: an error of the planner, which by default is any failed node; results that differ; no worker for
-/// too long.
+/// The reason for ending the run: an error of the planner, which by default is any failed node; results that differ; no worker
+/// for too long.
 pub fn handle_arrived(
     core: &mut Core,
     planner: &mut impl Planner,
@@ -100,7 +100,7 @@ pub fn handle_arrived(
     settle(core, planner, now, outbox)
 }
 
-/// Process the consequences: tell the planner, queue the nodes that became ready, give out leases.
+/// Process the consequences: inform the planner, queue the nodes that became ready, give out leases.
 fn settle(core: &mut Core, planner: &mut impl Planner, now: Duration, outbox: &mut Outbox) -> Result<(), Stop> {
     while let Some(change) = core.graph.next_change() {
         match change {
@@ -122,7 +122,7 @@ fn settle(core: &mut Core, planner: &mut impl Planner, now: Duration, outbox: &m
                 if let Some(NodeState::Failed(reason)) = core.graph.state(node).cloned() {
                     outbox.tell(RunEvent::NodeFailed { name: core.name(node), reason: reason.clone() });
                     if reason.is_cancellation() {
-                        // The planner has asked for it.
+                        // The planner requested it.
                         core.summary.cancelled_nodes += 1;
                         continue;
                     }
@@ -136,7 +136,7 @@ fn settle(core: &mut Core, planner: &mut impl Planner, now: Duration, outbox: &m
     watch_starvation(core, now, outbox)
 }
 
-/// The planner's error about an output; where the output is wrong, with the worker that it came from.
+/// Convert the planner's error about an output. If the output is wrong, the result names the worker that computed it.
 fn refused(core: &Core, node: NodeId, error: PlanError) -> Stop {
     if !matches!(error, PlanError::NotVerified { .. } | PlanError::WrongOutput { .. }) {
         return Stop::Plan(error);
@@ -145,7 +145,7 @@ fn refused(core: &Core, node: NodeId, error: PlanError) -> Stop {
     Stop::WrongResult { name: Box::new(core.name(node)), site, error }
 }
 
-/// Complete a node from the output of an earlier coordinator of this run. Returns whether there was one.
+/// Complete a node with the output of an earlier coordinator of this run. Returns whether there was one.
 fn complete_from_past(core: &mut Core, node: NodeId, outbox: &mut Outbox) -> bool {
     let Some(key) = core.graph.key(node) else { return false };
     let Some(memory) = core.past_outputs.as_mut().map(|past| past.of(key)) else { return false };
@@ -164,7 +164,7 @@ fn complete_from_past(core: &mut Core, node: NodeId, outbox: &mut Outbox) -> boo
 }
 
 fn make_ready(core: &mut Core, planner: &impl Planner, node: NodeId, now: Duration, outbox: &mut Outbox) {
-    // It may have been given up meanwhile.
+    // It may have been cancelled meanwhile.
     if !core.graph.is_open(node) {
         return;
     }
@@ -191,7 +191,7 @@ fn make_ready(core: &mut Core, planner: &impl Planner, node: NodeId, now: Durati
     }
 }
 
-/// Work but no worker: remind the user, and end the run after the limit.
+/// If there is work but no worker, remind the user, and end the run at the limit.
 fn watch_starvation(core: &mut Core, now: Duration, outbox: &mut Outbox) -> Result<(), Stop> {
     if core.waiting.is_empty() || !core.members.is_empty() {
         core.starving = None;
@@ -201,7 +201,7 @@ fn watch_starvation(core: &mut Core, now: Duration, outbox: &mut Outbox) -> Resu
         return Err(Stop::LocalWorkersKeepDying { last_status });
     }
     let limit = core.starvation_limit();
-    // Never zero: the next deadline has to lie ahead.
+    // Never zero, because the next deadline must lie ahead.
     let remind_every = core.policy.remind_every.max(Duration::from_millis(1));
     let starving = core.starving.get_or_insert(Starving { since: now, next_reminder: now + remind_every });
     let waited = now.saturating_sub(starving.since);

@@ -33,7 +33,8 @@ fn key_of(spec: NodeSpec) -> NodeKey {
     graph.key(node).unwrap()
 }
 
-/// A run of two leaves on workers, one here, and the join of them all, with what is remembered of some.
+/// A run with two leaves on workers, one leaf here, and a node that joins them. Earlier coordinators left outputs or deaths of
+/// some.
 struct Bench {
     core: Core,
     planner: Script,

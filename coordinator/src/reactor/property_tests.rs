@@ -1,5 +1,5 @@
-//! Whatever workers do, in whatever order: every node is completed or fails by name, its planner is told once, nothing is lost,
-//! nobody holds more than it may, and no index of the state is stale.
+//! For any behaviour of workers in any order: every node is completed or fails, its planner is informed once, no node is lost, no
+//! worker holds more than it may, and all indices of the state are up to date.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
@@ -15,7 +15,7 @@ use crate::policy::Speculation;
 use crate::state::{Core, Policy};
 use lookalike::graph::FailureReason;
 
-/// One thing that the outside world does. Numbers choose among what is there, modulo.
+/// An event from outside. A number selects one of the present objects (modulo their count).
 #[derive(Clone, Debug)]
 enum Step {
     Join {
@@ -43,12 +43,12 @@ enum Step {
     Drain {
         worker: usize,
     },
-    /// Time passes; who is not heard of is lost.
+    /// Time passes. Workers that sent nothing are lost.
     PassTime {
         microseconds: u64,
         heard: u8,
     },
-    /// A process whose connection broke is back, still at what it executed, as far as this says.
+    /// A process whose connection broke reconnects. It still executes the nodes that this selects.
     Return {
         which: usize,
         is_at_it: bool,
@@ -67,14 +67,14 @@ fn step() -> impl Strategy<Value = Step> {
         1 => (0..9_usize).prop_map(|worker| Step::Fetch { worker }),
         1 => (0..9_usize).prop_map(|worker| Step::Drain { worker }),
         1 => (0..4_000_000_u64, any::<u8>()).prop_map(|(microseconds, heard)| Step::PassTime { microseconds, heard }),
-        // So little that nodes are short.
+        // So little time that nodes count as short.
         3 => (0..400_u64, any::<u8>()).prop_map(|(microseconds, heard)| Step::PassTime { microseconds, heard }),
         2 => (0..9_usize, any::<bool>()).prop_map(|(which, is_at_it)| Step::Return { which, is_at_it }),
         2 => Just(Step::RunHere),
     ]
 }
 
-/// The world outside the state machine: who is connected, and what each was told to do.
+/// The world outside the state machine: the connected workers, and what each was told to do.
 struct World {
     core: Core,
     planner: Script,
@@ -82,24 +82,24 @@ struct World {
     now: Duration,
     connected: BTreeMap<WorkerId, BTreeMap<NodeId, u32>>,
     executing: BTreeSet<(WorkerId, NodeId)>,
-    /// How often an innocent node was hit by a death from outside.
+    /// How often a harmless node was executed by a worker that was killed from outside.
     hits: BTreeMap<NodeId, u32>,
-    /// Every lease ever given out.
+    /// All leases that were given out.
     ever: Vec<(NodeId, u32)>,
     here: BTreeSet<(NodeId, u32)>,
     next_worker: u64,
-    /// The process that each connected worker is.
+    /// The process of each connected worker.
     processes: BTreeMap<WorkerId, u64>,
-    /// Processes that live but have lost their connection, with what they execute.
+    /// Running processes that have lost their connection, with the nodes that they execute.
     cut_off: Vec<(u64, BTreeMap<NodeId, u32>)>,
-    /// Who is just telling what it executes, and what.
+    /// The worker that is reporting what it executes, with these nodes.
     telling: Option<(WorkerId, BTreeMap<NodeId, u32>)>,
 }
 
 /// Nodes whose number is divisible by this have an application error instead of an output.
 const FAILS_EVERY: u64 = 7;
 
-/// Nodes whose number is divisible by this kill whoever executes them.
+/// Nodes whose number is divisible by this kill the worker that executes them.
 const KILLS_EVERY: u64 = 5;
 
 fn kills(node: NodeId) -> bool {
@@ -119,7 +119,7 @@ impl World {
         let follow_up = Some(node("follow-up", vec![Input::OutputOf(NodeId(0))], Placement::Worker));
         let nodes = nodes.collect();
         let planner = Script { nodes, blob, follow_up, tolerates_failures: true, ..Script::default() };
-        // Time passes, but not so much that the run gives up for want of workers.
+        // The limits are so long that the run does not end because there is no worker.
         let patient = Duration::from_secs(1_000_000);
         let speculation = Speculation { factor: Some(1.0), after: Duration::from_secs(1) };
         let policy = Policy {
@@ -184,13 +184,14 @@ impl World {
         }
     }
 
-    /// The attempt under which a worker has just told that it executes a node.
+    /// The attempt under which a worker has just reported that it executes a node.
     fn has_told(&self, worker: WorkerId, node: NodeId) -> Option<u32> {
         let (telling, executing) = self.telling.as_ref()?;
         executing.get(&node).copied().filter(|_| *telling == worker)
     }
 
-    /// Each ready node for workers waits in one place or is held by one or two connected workers, and we agree with the core who.
+    /// Check that each ready node for workers waits in one place or is held by one or two connected workers, the same as in this
+    /// model.
     fn check(&self) {
         let graph = self.core.graph();
         for index in 0..graph.len() as u64 {
@@ -231,7 +232,7 @@ impl World {
         self.executing.retain(|(other, _)| *other != worker);
     }
 
-    /// A worker dies of what it executes, or is killed.
+    /// A worker dies of a node that it executes, or is killed.
     fn lose(&mut self, worker: WorkerId, departure: Departure) {
         if departure.is_suspicious() {
             let hit = self.executing.iter().filter(|(other, node)| *other == worker && !kills(*node));
@@ -292,7 +293,7 @@ impl World {
         worker
     }
 
-    /// A process is back, and tells what it executes.
+    /// A process reconnects and reports what it executes.
     fn come_back(&mut self, (name, executing): (u64, BTreeMap<NodeId, u32>)) {
         let worker = self.join_as(name, executing.len().max(1));
         let told = |(node, attempt): (&NodeId, &u32)| Executing { node: *node, attempt: *attempt, permille: 0 };
@@ -332,7 +333,7 @@ impl World {
                 }
             }
             Step::LateAnswer { lease } => {
-                // From a worker that is gone, or from whoever is there now.
+                // From a worker that has left, or from one that is connected.
                 let site = Site::Worker(self.chosen(lease).unwrap_or(WorkerId(999)));
                 let lease = self.ever.get(lease % self.ever.len().max(1)).copied();
                 lease.into_iter().for_each(|lease| self.answer(site, lease));
@@ -369,7 +370,7 @@ impl World {
         }
     }
 
-    /// These workers are heard of, and then the time is looked at.
+    /// These workers send a heartbeat; then deadlines are checked.
     fn pass(&mut self, heard: Vec<WorkerId>) {
         for worker in heard {
             self.tell(Event::Heartbeat { worker, executing: Vec::new() });
@@ -381,7 +382,7 @@ impl World {
         }
     }
 
-    /// From now on two loyal workers, and as many new ones as it takes, execute everything in order, and time passes when there
+    /// From now on, two reliable workers, and as many new ones as necessary, execute everything in order. Time passes when there
     /// is nothing to do.
     fn finish(&mut self) {
         for worker in self.connected.keys().copied().collect::<Vec<_>>() {
@@ -416,7 +417,7 @@ impl World {
     }
 }
 
-/// How many cases are tried.
+/// The number of cases.
 const CASES: u32 = if cfg!(feature = "slow") { 2000 } else { 256 };
 
 proptest! {

@@ -1,14 +1,14 @@
-//! Nodes that may kill their workers: which node to suspect of a death, and when to count it.
+//! Quarantine of nodes that may kill their workers: which nodes a death is counted against.
 //!
-//! Only what a worker was executing can have killed it. After a few deaths in which a node took part
-//! ([`Policy::suspect_after`](crate::state::Policy::suspect_after)) it is a *suspect*: it runs alone, on a worker that has
-//! executed nothing before or at least nothing else at the same time. Only deaths there count against it, and so many of
-//! them ([`Policy::node_crashes`](crate::state::Policy::node_crashes)) fail it by name.
+//! Only a node that a worker was executing can have killed it. After
+//! [`Policy::suspect_after`](crate::state::Policy::suspect_after) deaths in which a node took part, it is a *suspect*: it runs
+//! alone, on a worker that has executed nothing before or at least executes nothing else at the same time. Only deaths there are
+//! counted against it, and [`Policy::node_crashes`](crate::state::Policy::node_crashes) of them make it fail.
 //!
-//! A kill from outside may also hit the worker of a suspect. Other deaths tell the two apart: as long as workers die whose deaths no
-//! suspect explains, a suspect's deaths are not counted, up to a limit.
+//! A suspect's worker may also be killed from outside. Other deaths are the evidence: while workers die whose deaths no suspect
+//! explains, the deaths of a suspect's workers are not counted, up to a limit.
 //!
-//! A broken connection looks like a death. When its process comes back, the count is taken back.
+//! A broken connection looks like a death. If its process reconnects, the death is subtracted again.
 
 use std::time::Duration;
 
@@ -20,14 +20,14 @@ use crate::actions::Outbox;
 use crate::events::RunEvent;
 use crate::state::{Core, Death, Deaths, Member, Place, Unexplained};
 
-/// How many deaths of a suspect's workers are not counted for one that would count: where a machine fails all the time, a node that
-/// kills its workers still fails after a bounded number.
+/// For each death that counts, at most this many deaths of a suspect's workers are not counted. So a node that kills its workers
+/// fails after a bounded number of deaths, even if workers keep dying for other reasons.
 const NOT_COUNTED_PER_CRASH: u32 = 10;
 
 /// How many unexplained deaths are remembered.
 const REMEMBERED: usize = 8;
 
-/// A worker seems to have died: count it against the nodes that it executed. Returns what was counted.
+/// A worker appears to have died: count its death against the nodes that it executed. Returns what was counted.
 pub(super) fn count_death(
     core: &mut Core,
     member: &Member,
@@ -62,13 +62,13 @@ fn count(core: &mut Core, nodes: &[NodeId], death: Death, outbox: &mut Outbox) -
             core.summary.suspected_nodes += 1;
             outbox.tell(RunEvent::NodeSuspected { name: core.name(*node), deaths });
         }
-        // A second worker may run it too, but not a third.
+        // This changes whether a second worker may run it.
         core.watch(*node);
     }
     nodes.iter().map(|node| (*node, death)).collect()
 }
 
-/// A process that seemed to have died is back: take back the deaths that were counted for it.
+/// A process that appeared to have died has reconnected: subtract the deaths that were counted for it.
 pub(super) fn take_back_death(
     core: &mut Core,
     process: ProcessName,
@@ -98,7 +98,7 @@ fn of(deaths: &mut Deaths, death: Death) -> &mut u32 {
     }
 }
 
-/// How the death of a suspect's worker counts; the suspect ran there alone since `since`.
+/// How to count the death of a suspect's worker, on which the suspect had run alone since `since`.
 fn judge_death_alone(core: &Core, suspect: NodeId, since: Duration) -> Death {
     let lately = since.saturating_sub(core.policy.lost_after);
     let is_other = |death: &Unexplained| death.when >= lately && !death.executed.contains(&suspect);

@@ -1,4 +1,4 @@
-//! Accepted outputs: the node is completed, its other leases end, a different answer is reported.
+//! Accepts outputs: completes the node, ends its other leases, reports an answer that differs.
 
 use std::time::Duration;
 
@@ -10,10 +10,10 @@ use crate::actions::{Action, Outbox};
 use crate::events::{RunEvent, Site};
 use crate::state::{Candidate, Core, Place};
 
-/// Take the output of a node that is waiting for its verification as it is; `false` if there is none.
+/// Accept the output of a node that waits for its verification without verifying it; `false` if there is none.
 pub(super) fn accept_candidate(core: &mut Core, node: NodeId, now: Duration, outbox: &mut Outbox) -> bool {
     let candidate = core.record(node).and_then(|record| record.candidate.take());
-    // The node is open, so nothing can differ.
+    // The node is open, so there is no other output that could differ.
     candidate.is_some_and(|candidate| accept(core, node, *candidate, now, outbox).is_ok())
 }
 
@@ -40,7 +40,7 @@ pub(super) fn accept(
             core.summary.duplicate_results += 1;
             outbox.tell(RunEvent::DuplicateResult { node, site });
         }
-        // The node has failed before, and the planner has acted upon it.
+        // The node failed before, and the planner has processed that.
         Completion::Refused => {
             if let Some(NodeState::Failed(FailureReason::Node(failure))) = core.graph.state(node) {
                 let error = failure.to_string();
@@ -78,7 +78,7 @@ pub(super) fn retract(core: &mut Core, node: NodeId, now: Duration, outbox: &mut
     }
 }
 
-/// A node has an output and an error. The first answer stays, because the planner has acted upon it.
+/// Report that a node has both an output and an error. The first answer stays, because the planner has processed it.
 pub(super) fn tell_difference(core: &Core, node: NodeId, second: Site, error: String, outbox: &mut Outbox) {
     let first = core.look(node).and_then(|record| record.finished_by).unwrap_or(Site::Coordinator);
     outbox.tell(RunEvent::AnswersDiffer { name: core.name(node), first, second, error });

@@ -1,5 +1,5 @@
-//! The order of leases: suspects first, then second computations for verification, then the queue; when it is empty, waiting leases move
-//! to idle workers.
+//! The order of leases: suspects first, then second computations for verification, then the queue. If it is empty, unbegun leases
+//! are moved to idle workers.
 
 use std::time::Duration;
 
@@ -10,11 +10,11 @@ use super::speculation;
 use crate::actions::Outbox;
 use crate::state::Core;
 
-/// How many nodes are tried to find one that a worker may verify. The rest are most likely outputs of the same worker, which another
-/// worker will verify.
+/// How many nodes are tried to find one that a worker may verify. Further ones most likely have the same origin, and another
+/// worker will verify them.
 const CHECKS_LOOKED_AT: usize = 8;
 
-/// Give out leases as long as there are both nodes and places.
+/// Give out leases while there are both nodes and places.
 pub(super) fn schedule(core: &mut Core, now: Duration, outbox: &mut Outbox) {
     while let Some(node) = core.waiting.rested(now) {
         await_now(core, node, now);
@@ -29,8 +29,8 @@ pub(super) fn schedule(core: &mut Core, now: Duration, outbox: &mut Outbox) {
     speculation::speculate(core, now, outbox);
 }
 
-/// Give every suspect a worker of its own: a fresh one, or after a while any that holds no lease. If there is none, clear one worker
-/// after the other: it gets no more leases until it holds none.
+/// Give every suspect a worker without other nodes: one that has executed nothing or, after a while, any that holds no lease. If
+/// there is none, free one worker at a time: it gets no more leases until it holds none.
 fn isolate_suspects(core: &mut Core, now: Duration, outbox: &mut Outbox) {
     core.next_patience = None;
     while let Some((since, node)) = core.waiting.suspect() {
@@ -46,18 +46,18 @@ fn isolate_suspects(core: &mut Core, now: Duration, outbox: &mut Outbox) {
             return;
         }
     }
-    // No suspect waits for it any more.
+    // No suspect waits for this worker any more.
     if let Some(worker) = core.clearing.take() {
         core.members.change(worker, |member| member.is_clearing = false);
     }
 }
 
-/// The worker that was cleared, once it holds nothing.
+/// The worker that is being freed, once it holds no lease.
 fn cleared(core: &Core) -> Option<WorkerId> {
     core.clearing.filter(|worker| core.members.get(*worker).is_some_and(|member| member.leases.is_empty()))
 }
 
-/// Begin to clear a worker; `false` if there is none.
+/// Begin to free a worker; `false` if there is none.
 fn clear_one(core: &mut Core, now: Duration, outbox: &mut Outbox) -> bool {
     let Some(worker) = core.members.least_busy() else { return false };
     core.clearing = Some(worker);
@@ -83,7 +83,7 @@ fn isolate(core: &mut Core, worker: WorkerId, node: NodeId, now: Duration, outbo
     assign(core, worker, node, now, outbox);
 }
 
-/// Give nodes to be verified to another worker than the one that the first output came from, if there is one.
+/// Give nodes to be verified to a worker other than the origin of the first output, if there is one.
 fn give_checks(core: &mut Core, now: Duration, outbox: &mut Outbox) {
     loop {
         let is_only_one = core.members.accepting() == 1;
@@ -97,7 +97,7 @@ fn give_checks(core: &mut Core, now: Duration, outbox: &mut Outbox) {
     }
 }
 
-/// Move nodes that merely wait on one worker to a worker with an idle thread.
+/// Move nodes that are waiting on one worker to a worker with an idle thread.
 fn balance(core: &mut Core, now: Duration, outbox: &mut Outbox) {
     core.next_move = None;
     loop {

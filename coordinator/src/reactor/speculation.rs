@@ -1,4 +1,4 @@
-//! Slow nodes: when a worker has nothing else to do, it runs the slowest of them too, and the first answer counts.
+//! Runs slow nodes on a second worker that would otherwise be idle. The first answer is accepted.
 
 use std::time::Duration;
 
@@ -9,10 +9,10 @@ use crate::actions::Outbox;
 use crate::events::RunEvent;
 use crate::state::Core;
 
-/// How many stalled workers are tried at a time. More are not needed: the nodes of theirs that a second worker runs end soon.
+/// How many stalled workers are tried at a time. This is enough, because their nodes soon end on a second worker.
 const STALLED_LOOKED_AT: usize = 8;
 
-/// Give slow nodes to workers that have a thread without a lease, and note when the next node will be slow.
+/// Give slow nodes to workers that have a thread without a lease, and set the time when the next node becomes slow.
 pub(super) fn speculate(core: &mut Core, now: Duration, outbox: &mut Outbox) {
     core.next_slow = None;
     let policy = core.policy.speculation;
@@ -33,7 +33,7 @@ pub(super) fn speculate(core: &mut Core, now: Duration, outbox: &mut Outbox) {
     }
 }
 
-/// A node that its only holder has not begun, though it has had a free thread since `since`.
+/// A node that its only holder has not begun although it has had a free thread since `since`.
 fn unbegun(core: &Core, idle: &Idle, since: Duration) -> Option<NodeId> {
     let is_wanted = |node: &&NodeId| {
         let is_held_once = core.look(**node).is_some_and(|record| record.holders.len() == 1);
@@ -43,7 +43,8 @@ fn unbegun(core: &Core, idle: &Idle, since: Duration) -> Option<NodeId> {
     stalled.filter_map(|(_, member)| member.waiting.iter().find(is_wanted)).next().copied()
 }
 
-/// Two workers with a thread without a lease: at least one of them does not hold a given node with one holder.
+/// Up to two workers that have a thread without a lease. If there are two, at least one of them does not hold a given node with
+/// one holder.
 struct Idle {
     first: WorkerId,
     second: Option<WorkerId>,
@@ -55,7 +56,7 @@ impl Idle {
         Some(Self { first: workers.next()?, second: workers.next() })
     }
 
-    /// The one that may run this node.
+    /// The worker of the two that may run this node.
     fn for_node(&self, core: &Core, node: NodeId) -> Option<WorkerId> {
         let holders = &core.look(node)?.holders;
         let is_able = |worker: &WorkerId| !holders.contains(worker) && !is_origin(core, node, *worker);

@@ -1,4 +1,4 @@
-//! Clusters in which workers die all the time, and large ones: simulated, with a clock that jumps.
+//! Clusters in which workers keep dying, and large ones. Time is simulated.
 
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap};
@@ -12,17 +12,17 @@ use crate::actions::{Action, Outbox};
 use crate::events::{Departure, Site};
 use crate::state::{Core, Policy};
 
-/// What happens at its time.
+/// A scheduled event.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum Happening {
     Joins,
-    /// The node that this lease is of ends, in an answer or in a death.
+    /// The node of this lease ends, with an answer or with the death of its worker.
     Ends {
         worker: WorkerId,
         node: NodeId,
         attempt: u32,
     },
-    /// Somebody kills a worker.
+    /// A worker is killed from outside.
     Strikes,
 }
 
@@ -65,7 +65,7 @@ impl Storm {
         storm
     }
 
-    /// A number from 0 to `below`, the same in every run.
+    /// A pseudorandom number below `below`, the same in every run.
     fn random(&mut self, below: u64) -> u64 {
         self.chance = self.chance.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (self.chance >> 33) % below
@@ -162,7 +162,7 @@ impl Storm {
         }
     }
 
-    /// To the end of the run, every worker heard of whenever something happens.
+    /// Run to the end. Every worker sends something at every event.
     fn run(&mut self) {
         while !self.core.is_finished() {
             let next = self.future.peek().map(|Reverse((time, ..))| *time);
@@ -186,7 +186,7 @@ impl Storm {
 fn workers_killed_from_outside_at_random_bring_no_innocent_node_to_failure() {
     let mut kills = 0;
     for seed in 0..200 {
-        // A node takes 300 ms in the middle, and somewhere among four workers one is killed every 150 ms.
+        // A node takes 300 ms on average, and one of four workers is killed every 150 ms.
         let mut storm = Storm::new(40, 4, seed);
         storm.later(Duration::ZERO, Happening::Strikes);
         storm.run();
@@ -214,7 +214,7 @@ fn killer_among_innocent_nodes_fails_by_name_and_all_others_complete_in_calm_and
     }
 }
 
-/// The time that so many nodes of a run take on so many workers, all its events together.
+/// The time that all events of a run with this many nodes and workers take together.
 fn time_of_run(nodes: usize, workers: usize) -> Duration {
     let began = Instant::now();
     let mut storm = Storm::new(nodes, workers, 1);
@@ -224,13 +224,14 @@ fn time_of_run(nodes: usize, workers: usize) -> Duration {
     began.elapsed()
 }
 
-/// How much more an event may cost with many nodes or workers than with few: 1.1 and 2.4 times as much were measured, because large
-/// trees do not fit into a processor's caches. A look at all workers would cost some thirty times as much, one at all nodes more.
+/// How much more an event may cost with many nodes or workers than with few. Measured: 1.1 and 2.4 times as much, because large
+/// trees do not fit into a processor's caches. Scanning all workers would cost about thirty times as much, and scanning all nodes
+/// more.
 const DEARER: u32 = 8;
 
 #[test]
 fn event_costs_about_the_same_with_many_nodes_and_workers_as_with_few() {
-    // The shortest of three, for the smallest is what another test may disturb most.
+    // The shortest of three, because other tests disturb the shortest measurement most.
     let few = (0..3).map(|_| time_of_run(10_000, 10)).min().unwrap_or_default();
     let (many_nodes, many_workers) = (time_of_run(100_000, 10), time_of_run(100_000, 4000));
     assert!(many_nodes < 10 * DEARER * few, "{many_nodes:?} for ten times as many nodes as in {few:?}");

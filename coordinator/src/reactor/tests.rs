@@ -1,4 +1,4 @@
-//! Scenarios: events in, recorded actions out. No sockets, no waiting, no time but the one we set.
+//! Scenarios: events in, recorded actions out. No sockets and no waiting; the tests set the time.
 
 use std::time::Duration;
 
@@ -26,14 +26,14 @@ const A: WorkerId = WorkerId(1);
 const B: WorkerId = WorkerId(2);
 const C: WorkerId = WorkerId(3);
 
-/// A plan that is known beforehand, and what its planner was told.
+/// A fixed plan, and the calls that its planner received.
 #[derive(Default)]
 pub(super) struct Script {
     pub(super) nodes: Vec<NodeSpec>,
     pub(super) blob: Vec<u8>,
     /// Added once node 0 is complete.
     pub(super) follow_up: Option<NodeSpec>,
-    /// Added when it is told to look again.
+    /// Added when the planner is asked to look again.
     pub(super) late: Option<NodeSpec>,
     /// Released once node 0 is complete.
     pub(super) released: Vec<NodeId>,
@@ -41,7 +41,7 @@ pub(super) struct Script {
     pub(super) tolerates_failures: bool,
     /// Refuses every output with this error.
     pub(super) not_verified: bool,
-    /// Wants no second runs.
+    /// Does not ask for second computations.
     pub(super) checks_itself: bool,
     pub(super) completed: Vec<NodeId>,
     pub(super) failed: Vec<(NodeId, FailureReason)>,
@@ -87,7 +87,7 @@ pub(super) fn node(label: &str, inputs: Vec<Input>, placement: Placement) -> Nod
     NodeSpec { kind: "test".into(), label: label.into(), parameters: vec![], inputs, placement, priority: 0 }
 }
 
-/// A process that has this number in its name. As in containers, its process id tells nothing.
+/// A process with this number in its name. The process id is always the same, as in containers.
 pub(super) fn process(number: u64) -> WorkerProcess {
     WorkerProcess { id: 1, name: ProcessName(u128::from(number).to_le_bytes()), is_local: false }
 }
@@ -97,7 +97,7 @@ fn independent(count: usize) -> Script {
     Script { nodes, ..Script::default() }
 }
 
-/// The state under test, with a clock that stands still unless moved.
+/// The state under test, with a clock that only tests advance.
 struct Bench {
     core: Core,
     planner: Script,
@@ -133,7 +133,7 @@ impl Bench {
         self.join_as(worker, threads, process(1000 + self.processes))
     }
 
-    /// A process joins that may have been here before.
+    /// A process joins, which may have been connected before.
     fn join_as(&mut self, worker: WorkerId, threads: usize, process: WorkerProcess) -> Vec<String> {
         self.handle(Event::WorkerJoined { worker, threads, process })
     }
@@ -155,7 +155,7 @@ impl Bench {
         self.try_handle(Event::DeadlinePassed)
     }
 
-    /// Time passes, and these workers live.
+    /// Time passes while these workers send heartbeats.
     fn live(&mut self, milliseconds: u64, workers: &[WorkerId]) -> Vec<String> {
         self.now += Duration::from_millis(milliseconds);
         let heard =
@@ -172,7 +172,7 @@ fn finished(site: Site, node: u64, attempt: u32, byte: u8) -> Event {
     Event::Finished { site, node: NodeId(node), attempt, output: Blob::new(vec![byte]) }
 }
 
-/// What matters of an action, in a few words: leases as `node.attempt`.
+/// The essential part of an action, in a few words. A lease is `node.attempt`.
 fn line(action: &Action) -> Option<String> {
     Some(match action {
         Action::Assign { worker, lease } => format!("{worker} gets {}.{}", lease.node.0, lease.attempt),
@@ -212,7 +212,7 @@ fn node_that_merely_waits_moves_to_an_idle_worker() {
     bench.join(A, 1);
     bench.start(A, 0, 1);
     assert_eq!(bench.join(B, 1), ["worker 1 drops 2.1", "worker 2 gets 2.2"]);
-    // Worker 1 was faster than the message: its result counts, and worker 2 gets the other node that waits.
+    // Worker 1 finished before the message reached it: its result is accepted, and worker 2 gets the other waiting node.
     let late = bench.finish(A, 2, 1, 2);
     let expected = ["worker 1 is thanked for 2.1", "worker 2 drops 2.2", "worker 1 drops 1.1", "worker 2 gets 1.2"];
     assert_eq!(late, expected);
@@ -222,9 +222,9 @@ fn node_that_merely_waits_moves_to_an_idle_worker() {
 fn worker_is_not_given_more_bytes_than_it_may_leave_unread() {
     let large = NodeSpec { parameters: vec![0; 1 << 20], ..node("n", vec![], Placement::Worker) };
     let mut bench = Bench::new(Script { nodes: vec![large; 40], ..Script::default() });
-    // It has threads for all of them, but eight are 8 MiB.
+    // It has threads for all of them, but eight of them take 8 MiB.
     assert_eq!(bench.join(A, 64).len(), 8);
-    // What it begins with it has read.
+    // A node that it has begun has left its queue.
     assert_eq!(bench.start(A, 0, 1), ["worker 1 gets 8.1"]);
     assert_eq!(bench.finish(A, 1, 1, 0), ["worker 1 is thanked for 1.1", "worker 1 gets 9.1"]);
     assert_eq!(bench.core.members.get(A).unwrap().waiting.len(), 8);
@@ -274,7 +274,7 @@ fn second_result_is_dropped_when_equal_and_an_error_when_different() {
     bench.lose(A, Departure::Lost);
     bench.join(B, 2);
     bench.finish(B, 0, 2, 7);
-    // Worker 1 is back under another number and sends what it had.
+    // Worker 1 reconnects under another number and sends its result.
     bench.join(C, 2);
     assert_eq!(bench.finish(C, 0, 1, 7), ["worker 3 is thanked for 0.1"]);
     assert_eq!(bench.core.summary().duplicate_results, 1);
@@ -342,7 +342,7 @@ fn blob_goes_to_workers_whose_nodes_read_it_and_to_nobody_else() {
     let nodes = vec![node("n", vec![], Placement::Worker), node("n", vec![Input::Blob(hash)], Placement::Worker)];
     let mut bench = Bench::new(Script { nodes, blob, ..Script::default() });
     bench.join(A, 1);
-    // Node 1 moves from A to B; A may have asked before it knew.
+    // Node 1 moves from A to B. A may have requested its input before it received the cancellation.
     bench.join(B, 1);
     bench.join(C, 1);
     for worker in [A, B] {
@@ -393,7 +393,7 @@ fn application_error_is_not_retried_and_fails_what_depends_on_it() {
     bench.finish(A, 1, 1, 1);
     assert!(bench.core.is_finished());
     assert_eq!((bench.core.summary().completed_nodes, bench.core.summary().failed_nodes), (1, 2));
-    // An output that was under way is too late, but somebody should know.
+    // A late output is reported.
     let late = bench.finish(A, 0, 1, 9);
     assert_eq!(late[1], "n0 differs between worker 1 and worker 1: the table is empty");
 }
@@ -487,7 +487,7 @@ fn nodes_of_lower_priority_numbers_go_first_whenever_they_came() {
     assert_eq!(bench.join(A, 1), ["worker 1 gets 3.1", "worker 1 gets 1.1", "worker 1 gets 2.1"]);
     assert_eq!(bench.finish(A, 3, 1, 3), ["worker 1 is thanked for 3.1", "worker 1 gets 0.1"]);
     bench.finish(A, 0, 1, 0);
-    // A requeued node goes back to its place.
+    // A re-queued node keeps its place in the order.
     bench.lose(A, Departure::Goodbye);
     assert_eq!(bench.join(B, 1), ["worker 2 gets 1.2", "worker 2 gets 2.2", "worker 2 gets 4.2"]);
 }

@@ -1,4 +1,4 @@
-//! What a connection needs before and after its handshake.
+//! The state that connections need before and after their handshake.
 
 use lookalike::protocol::{Hello, RunName, Secret};
 use lookalike_worker::tls::Transport;
@@ -11,7 +11,7 @@ use super::inbound::Inbound;
 use crate::limits::Limits;
 use crate::policy::Policy;
 
-/// What every connection of a run needs.
+/// The state that all connections of a run share.
 pub(crate) struct Gate<W> {
     pub(crate) world: W,
     pub(crate) tls: TlsAcceptor,
@@ -25,7 +25,7 @@ pub(crate) struct Gate<W> {
 
 pub(super) type Connection<S> = TlsStream<Transport<S>>;
 
-/// A stranger that has become a worker.
+/// A connection after its handshake.
 pub(super) struct Greeted<S> {
     pub(super) incoming: Incoming<ReadHalf<Connection<S>>>,
     pub(super) writer: WriteHalf<Connection<S>>,

@@ -1,4 +1,4 @@
-//! What comes from the sockets.
+//! Messages from the sockets to the reactor.
 
 use lookalike::graph::WorkerId;
 use lookalike::protocol::{Hello, LeaseName};
@@ -9,17 +9,17 @@ use super::mailbox::Mailbox;
 use crate::events::RunEvent;
 use crate::reactor::Event;
 
-/// What comes from the sockets.
+/// Messages from the sockets to the reactor.
 #[derive(Debug)]
 pub(crate) enum Inbound {
-    /// A worker has said hello. What is put into the mailbox goes to it.
+    /// A worker has said hello. Its outgoing messages go into the mailbox.
     Joined { worker: WorkerId, hello: Hello, mailbox: Mailbox },
-    /// A worker announces an output for this lease: may it come? A lease that was never given out is answered with `false`.
+    /// A worker announces an output for this lease. The answer `false` rejects it, because the lease was never given out.
     Ask { lease: LeaseName, answer: oneshot::Sender<bool> },
-    /// Something happened.
+    /// An event for the reactor.
     Event(Event),
-    /// Something happened at this time, which matters, though it may be looked at later.
+    /// An event with its time of arrival, which is used even if the event is processed later.
     Timed { arrived: Instant, event: Event },
-    /// Something to tell the user that the reactor does not care about.
+    /// An event for the user only, which the reactor ignores.
     Tell(RunEvent),
 }

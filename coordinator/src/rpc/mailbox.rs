@@ -1,4 +1,4 @@
-//! What waits to be written to one worker: bounded, whatever the worker does.
+//! Queues for messages to one worker, bounded in size even if the worker reads nothing.
 
 use std::io;
 use std::pin::Pin;
@@ -15,24 +15,24 @@ use tokio_util::sync::CancellationToken;
 
 use super::outgoing::Outgoing;
 
-/// What a message takes in a queue beside what it points to.
+/// The size of a queued message without the data that it points to.
 const MESSAGE_BYTES: usize = 128;
 
-/// How much of a queue is written at a time.
+/// How many messages are written at a time.
 const WRITTEN_TOGETHER: usize = 256;
 
-/// Where messages for a worker are put. Dropped, it lets what is in it be written and the connection end in order.
+/// The sending end of the queue. After it is dropped, the remaining messages are written, and the connection ends in order.
 #[derive(Debug)]
 pub(crate) struct Mailbox {
     queue: UnboundedSender<Outgoing>,
     state: Arc<State>,
 }
 
-/// Where they are taken from.
+/// The receiving end of the queue.
 #[derive(Debug)]
 pub(super) struct Postman {
     queue: UnboundedReceiver<Outgoing>,
-    /// What was taken last and may not be written yet.
+    /// The size of the messages that were taken last and may not be written yet.
     taken_bytes: usize,
     state: Arc<State>,
 }
@@ -45,7 +45,7 @@ struct State {
     closed: CancellationToken,
 }
 
-/// A mailbox that takes so many bytes. Blobs count as references: their bytes are in memory once, whoever waits for them.
+/// Create a queue of at most this many bytes. Blobs count as references, because all queues share their bytes.
 pub(super) fn mailbox(bound_bytes: usize) -> (Mailbox, Postman) {
     let (sender, receiver) = unbounded_channel();
     let (overflowing, closed) = (CancellationToken::new(), CancellationToken::new());
@@ -54,26 +54,26 @@ pub(super) fn mailbox(bound_bytes: usize) -> (Mailbox, Postman) {
 }
 
 impl Mailbox {
-    /// Put something in. When it does not fit, the worker is too slow, and its connection ends.
+    /// Queue a message. If it does not fit, the worker is too slow, and its connection ends.
     pub(crate) fn send(&self, outgoing: Outgoing) {
         let bytes = weight(&outgoing);
         if self.state.waiting_bytes.fetch_add(bytes, Ordering::Relaxed) + bytes > self.state.bound_bytes {
             self.state.overflowing.cancel();
             return;
         }
-        // A connection that has ended takes nothing any more.
+        // If the connection has ended, the message is dropped.
         let _ = self.queue.send(outgoing);
     }
 
-    /// End the connection at once, whatever is still to be written.
+    /// End the connection at once, without writing what is queued.
     pub(crate) fn close(&self) {
         self.state.closed.cancel();
     }
 }
 
 impl Postman {
-    /// Take what there is to write; `false` once the mailbox is dropped and empty. What was taken the time before is written by
-    /// now: it counts until then.
+    /// Take the next messages; `false` once the mailbox is dropped and empty. A call means that the messages of the previous one
+    /// are written; until then they count.
     pub(super) async fn take(&mut self, together: &mut Vec<Outgoing>) -> bool {
         self.state.waiting_bytes.fetch_sub(std::mem::take(&mut self.taken_bytes), Ordering::Relaxed);
         let count = self.queue.recv_many(together, WRITTEN_TOGETHER).await;
@@ -81,12 +81,12 @@ impl Postman {
         count > 0
     }
 
-    /// Wait until more was sent than fits.
+    /// Wait until a message did not fit.
     pub(super) fn overflowing(&self) -> impl Future<Output = ()> + use<> {
         self.state.overflowing.clone().cancelled_owned()
     }
 
-    /// Wait until the connection shall end at once.
+    /// Wait until [`Mailbox::close`] is called.
     pub(super) fn closed(&self) -> impl Future<Output = ()> + use<> {
         self.state.closed.clone().cancelled_owned()
     }
@@ -103,13 +103,13 @@ fn weight(outgoing: &Outgoing) -> usize {
         }
 }
 
-/// A stream that fails with [`io::ErrorKind::TimedOut`] when the other side takes nothing for too long. What it takes, be it
-/// little, is a sign that it reads; heartbeats only tell that it writes.
+/// A stream that fails with [`io::ErrorKind::TimedOut`] if the other side accepts no bytes for too long. Any accepted byte shows
+/// that it is reading; a heartbeat only shows that it is writing.
 #[derive(Debug)]
 pub(super) struct Patient<W> {
     stream: W,
     patience: Duration,
-    /// Runs while the stream takes nothing.
+    /// Runs while the other side accepts nothing.
     running_out: Option<Pin<Box<Sleep>>>,
 }
 
@@ -126,7 +126,7 @@ impl<W> Patient<W> {
         let patience = self.patience;
         let running_out = self.running_out.get_or_insert_with(|| Box::pin(sleep(patience)));
         ready!(running_out.as_mut().poll(context));
-        // A poll after this error starts a new wait.
+        // Another poll after this error starts a new wait.
         running_out.as_mut().reset(Instant::now() + patience);
         Poll::Ready(Err(io::Error::new(io::ErrorKind::TimedOut, "the worker does not read")))
     }

@@ -1,4 +1,4 @@
-//! A worker's connection, from its hello to its end.
+//! The connection of a worker, from its hello to its end.
 
 use std::io;
 use std::net::SocketAddr;
@@ -25,10 +25,10 @@ use super::outgoing::Outgoing;
 use crate::events::{Departure, Site};
 use crate::reactor::{Event, Executing};
 
-/// How many bytes of small outputs a worker may send before it is asked for how many the reactor has taken (8 MiB).
+/// How many bytes of small outputs a worker may send before the connection waits until the reactor has processed them (8 MiB).
 const UNASKED_BYTES: u64 = 8 << 20;
 
-/// Serve a worker to its end.
+/// Serve a worker until its connection ends.
 pub(super) async fn serve<W: World>(greeted: Greeted<W::Stream>, worker: WorkerId, peer: SocketAddr, gate: &Gate<W>) {
     let Greeted { incoming, writer, hello } = greeted;
     info!(%worker, %peer, process = hello.process, build = bounded_text(&hello.build), "joined");
@@ -58,12 +58,13 @@ pub(super) async fn serve<W: World>(greeted: Greeted<W::Stream>, worker: WorkerI
     let writer = Patient::new(writer, gate.policy.lost_after);
     let departure = tokio::select! {
         biased;
-        // Closed by the reactor, which knows why.
+        // Closed by the reactor, which has recorded the reason.
         () = closed => return,
         () = overflowing => Departure::TooSlow,
         departure = &mut reading => departure,
         written = write(writer, postman, gate.policy.heartbeat, &pending_blobs) => match written {
-            // All is sent: wait for the worker to close, because closing over unread bytes would destroy our last message.
+            // All messages are sent. Wait for the worker to close: closing with unread bytes would destroy the last message to
+            // it.
             Ok(()) => timeout(gate.limits.farewell_time, reading).await.unwrap_or(Departure::Lost),
             Err(WireError::Stream(error)) if error.kind() == io::ErrorKind::TimedOut => Departure::TooSlow,
             Err(error) => departure_of(&error),
@@ -82,7 +83,7 @@ async fn write(
     pending_blobs: &AtomicUsize,
 ) -> Result<(), WireError> {
     let (mut together, mut parcel) = (Vec::new(), Parcel::default());
-    // So that a worker notices a dead coordinator, whatever it waits for.
+    // Heartbeats let the worker notice a dead coordinator whatever it is waiting for.
     let mut heart = interval_at(Instant::now() + heartbeat, heartbeat);
     heart.set_missed_tick_behavior(MissedTickBehavior::Delay);
     loop {
@@ -122,20 +123,20 @@ fn departure_of(error: &WireError) -> Departure {
     if error.is_violation() { Departure::Violation(error.to_string()) } else { Departure::Lost }
 }
 
-/// The reading end of one worker's connection.
+/// The reading half of a worker's connection.
 struct Reader<R> {
     worker: WorkerId,
-    /// That of this coordinator, and of every lease that it gives out.
+    /// The epoch of this coordinator, and of every lease that it gives out.
     epoch: u64,
     incoming: Incoming<R>,
     /// The output that is being received.
     output: Option<(LeaseName, IncomingBlob)>,
-    /// The announced lengths of outputs since the last question.
+    /// The announced lengths of outputs since the reactor was last asked.
     unasked_bytes: u64,
     pending_blobs: Arc<AtomicUsize>,
     max_pending_blobs: usize,
     heartbeat: Duration,
-    /// When the reactor was last told of a sign of life.
+    /// When the reactor last received a sign of life.
     told: Instant,
     inbound: Sender<Inbound>,
 }
@@ -150,20 +151,20 @@ impl<R: AsyncRead + Unpin> Reader<R> {
                 Err(error) => Err(error),
             };
             match event {
-                // An error means that the run is over. Then still read until the worker has closed its end:
-                // closing over unread bytes would destroy our last message to it.
+                // An error means that the run is over. Then keep reading until the worker has closed its end: closing with unread
+                // bytes would destroy the last message to it.
                 Ok(Some(event)) => {
                     self.told = self.incoming.heard();
                     _ = self.inbound.send(event).await;
                 }
-                // Its first part follows.
+                // The first part of the output follows.
                 Ok(None) => {}
                 Err(error) => return departure_of(&error),
             }
         }
     }
 
-    /// The next message or part. While a long one comes slowly, its bytes are signs of life.
+    /// Read the next message or part. While a long one arrives slowly, its bytes count as signs of life.
     async fn next(&mut self) -> Result<Option<Received<ToCoordinator>>, WireError> {
         loop {
             if let Some(received) = self.incoming.complete()? {
@@ -227,7 +228,7 @@ impl<R: AsyncRead + Unpin> Reader<R> {
         })))
     }
 
-    /// That this coordinator gave out a lease: a worker drops those of earlier ones when it joins.
+    /// Check that this coordinator gave out a lease. (Workers drop the leases of earlier epochs when they join.)
     fn check_epoch(&self, lease: LeaseName) -> Result<(), WireError> {
         if lease.epoch == self.epoch {
             return Ok(());
@@ -248,8 +249,9 @@ impl<R: AsyncRead + Unpin> Reader<R> {
         Event::Heartbeat { worker: self.worker, executing: Vec::new() }
     }
 
-    /// Before a large output is received, ask the reactor whether its lease was given out. The answer also says that the outputs before it
-    /// were processed, so at most one large output of a worker waits in memory. An output of one frame is here already.
+    /// Before receiving a large output, ask the reactor whether its lease was given out. The answer also implies that earlier
+    /// outputs were processed, so at most one large output per worker waits in memory. An output of one frame has arrived
+    /// already.
     async fn ask_before(&mut self, lease: LeaseName, length: u64) -> Result<(), WireError> {
         self.unasked_bytes = self.unasked_bytes.saturating_add(length);
         if length <= PART_BYTES as u64 && self.unasked_bytes <= UNASKED_BYTES {
@@ -268,7 +270,7 @@ impl<R: AsyncRead + Unpin> Reader<R> {
         }
     }
 
-    /// The output, once it is complete.
+    /// Take the output, if it is complete.
     fn output(&mut self) -> Result<Option<Inbound>, WireError> {
         let Some((lease, output)) = self.output.take_if(|(_, output)| output.is_complete()) else {
             return Ok(None);

@@ -1,8 +1,8 @@
-//! The sockets: connections are accepted, workers that know the secret are admitted, their messages become events.
+//! The sockets: accepts connections, admits workers that know the secret, and turns their messages into events.
 //!
-//! A stranger gets little: a place that the next one may need, a short time, a TLS handshake, fixed lengths, no decoder. A worker
-//! gets two tasks, one that reads and one that writes, so that a large blob in one direction never blocks the other. What either
-//! may cost is in [`Limits`](crate::limits::Limits).
+//! A connection that has not proved the secret (a stranger) gets few resources: a place that a newer one may take, a short time,
+//! a TLS handshake, fixed lengths, no decoder. A worker gets two tasks, one that reads and one that writes, so that a large blob
+//! in one direction never blocks the other. [`Limits`](crate::limits::Limits) holds the bounds for both.
 
 mod gate;
 mod inbound;
@@ -36,10 +36,10 @@ pub(crate) use self::outgoing::Outgoing;
 use self::strangers::{Place, Strangers};
 use crate::tls::accept;
 
-/// The pause after the system refuses to accept a connection, such as for want of file descriptors.
+/// The pause after the system fails to accept a connection, for example when file descriptors run out.
 const ACCEPT_PAUSE: Duration = Duration::from_millis(100);
 
-/// Accept workers until `stop`, then give the connected ones a moment to close.
+/// Accept workers until `stop`, then give the connected ones some time to close.
 pub(crate) async fn serve_forever<W: World>(listener: W::Listener, gate: Gate<W>, stop: CancellationToken) {
     let limits = gate.limits;
     let gate = Arc::new(gate);
@@ -77,13 +77,14 @@ pub(crate) async fn serve_forever<W: World>(listener: W::Listener, gate: Gate<W>
         });
     }
     drop(listener);
-    // Each connection ends by itself once its mailbox is dropped and the worker has closed its end.
+    // Each connection ends once its mailbox is dropped and the worker has closed its end.
     let all_gone = async { while connections.join_next().await.is_some() {} };
     let _ = timeout(limits.farewell_time, all_gone).await;
     connections.shutdown().await;
 }
 
-/// A wrong secret or version comes from a Lookalike and is a warning to the user. Anything else is noise of the network.
+/// Report a failed handshake. A wrong secret or version comes from a Lookalike worker, so the user is warned. Anything else is
+/// logged as noise.
 fn report_stranger(peer: SocketAddr, error: &WireError) {
     if means_us(error) {
         warn!(%peer, "refused: {error}");
@@ -92,12 +93,12 @@ fn report_stranger(peer: SocketAddr, error: &WireError) {
     }
 }
 
-/// Whether a connection that failed was a Lookalike's. Port scanners and browsers do not know the greeting.
+/// Whether a connection that failed came from a Lookalike worker. Port scanners and browsers do not send the greeting.
 fn means_us(error: &WireError) -> bool {
     matches!(error, WireError::Handshake(why) if *why != HandshakeError::Magic)
 }
 
-/// Do the handshake with a stranger, within its time and as long as no newer stranger needs its place.
+/// Perform the handshake with a stranger, within its time and while no newer stranger takes its place.
 async fn greet<W: World>(stream: W::Stream, place: Place, gate: &Gate<W>) -> Result<Greeted<W::Stream>, WireError> {
     tokio::select! {
         biased;

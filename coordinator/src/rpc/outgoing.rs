@@ -1,13 +1,13 @@
-//! What goes to a worker.
+//! Messages to a worker.
 
 use lookalike::graph::Blob;
 use lookalike::protocol::ToWorker;
 
-/// What goes to a worker.
+/// A message to a worker.
 #[derive(Debug)]
 pub(crate) enum Outgoing {
     Message(ToWorker),
     Blob(Blob),
-    /// Nothing, for a blob that was asked for.
+    /// The requested blob does not exist.
     NoBlob,
 }

@@ -1,18 +1,18 @@
-//! The places for strangers: there is always one for the next.
+//! Places for connections that have not proved the secret (strangers). A new one always gets a place.
 
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use tokio_util::sync::CancellationToken;
 
-/// Who is here without having proved the secret, in order of arrival.
+/// The connections that have not proved the secret yet, in order of arrival.
 #[derive(Clone, Debug)]
 pub(super) struct Strangers {
     places: usize,
     present: Arc<Mutex<VecDeque<Arc<CancellationToken>>>>,
 }
 
-/// A stranger's place. It is free again when this is dropped.
+/// A stranger's place. Dropping this frees it.
 #[derive(Debug)]
 pub(super) struct Place {
     strangers: Strangers,
@@ -20,12 +20,12 @@ pub(super) struct Place {
 }
 
 impl Strangers {
-    /// So many places; at least one.
+    /// This many places; at least one.
     pub(super) fn new(places: usize) -> Self {
         Self { places: places.max(1), present: Arc::default() }
     }
 
-    /// Take a place; if there is none, that of the stranger who has been here longest.
+    /// Take a place. If none is free, the oldest stranger loses its place.
     pub(super) fn enter(&self) -> Place {
         let token = Arc::new(CancellationToken::new());
         let mut present = self.present();
@@ -43,7 +43,7 @@ impl Strangers {
 }
 
 impl Place {
-    /// Wait until another one needs the place.
+    /// Wait until a newer stranger takes the place.
     pub(super) async fn is_needed(&self) {
         self.token.cancelled().await;
     }

@@ -1,4 +1,4 @@
-//! The cluster of a run: listener, connections, local worker processes. Started together, stopped together.
+//! The cluster of a run: listener, connections and local worker processes. They are started and stopped together.
 
 use std::collections::BTreeMap;
 use std::io;
@@ -22,12 +22,12 @@ use crate::rpc::{Gate, Inbound, Mailbox, Outgoing, serve_forever};
 use crate::spawn::{LocalWorkers, SpawnError, Worked, WorkerCommand, threads_per_worker};
 use crate::tls::server_config;
 
-/// Everything of a run that has to end with it.
+/// Everything that must end with the run.
 #[derive(Debug)]
 pub(crate) struct Cluster {
-    /// What the access file tells workers to connect to.
+    /// The address in the access file, to which workers connect.
     pub(crate) address: String,
-    /// Where the coordinator listens.
+    /// The address on which the coordinator listens.
     pub(crate) bound: SocketAddr,
     /// The processes and mailboxes of the members.
     members: BTreeMap<WorkerId, (WorkerProcess, Mailbox)>,
@@ -37,17 +37,17 @@ pub(crate) struct Cluster {
     local_workers: JoinSet<()>,
 }
 
-/// What the journal of a resumed run says of its earlier coordinators.
+/// The records of earlier coordinators in the journal of a resumed run.
 #[derive(Debug)]
 pub(crate) struct Resumed {
-    /// Where the last one listened.
+    /// The address on which the last one listened.
     pub(crate) listen: Option<SocketAddr>,
-    /// How many nodes have their results already.
+    /// How many nodes have results.
     pub(crate) results: usize,
 }
 
 impl Cluster {
-    /// Listen, write the access file or reuse the one that is there, start the local workers.
+    /// Listen, write the access file or reuse the existing one, start the local workers.
     pub(crate) async fn start<W: World>(
         world: W,
         options: &RunnerOptions,
@@ -61,7 +61,7 @@ impl Cluster {
         let stop = CancellationToken::new();
         let workers = local_workers(options, RunnerOptions::local_address(bound))?;
         let worked = workers.worked.clone();
-        // From here on the drop guard inside `Self` ends what was started.
+        // From here on, dropping `Self` ends what was started.
         let gate = Gate {
             world,
             tls: TlsAcceptor::from(Arc::new(tls)),
@@ -78,33 +78,33 @@ impl Cluster {
         Ok(Self { address, bound, members, worked, stop, serving, local_workers })
     }
 
-    /// Messages can be sent to a worker from now on.
+    /// Register a worker, so that messages can be sent to it.
     pub(crate) fn admit(&mut self, worker: WorkerId, process: WorkerProcess, mailbox: Mailbox) {
         self.members.insert(worker, (process, mailbox));
     }
 
-    /// A worker executes a node.
+    /// Record that a worker executes a node.
     pub(crate) fn note_work(&self, worker: WorkerId) {
         if let Some((process, _)) = self.members.get(&worker).filter(|(process, _)| process.is_local) {
             self.worked.note(process.id);
         }
     }
 
-    /// Send to a worker. One that has left meanwhile gets nothing: the reactor will hear of it.
+    /// Send a message to a worker. If it has left meanwhile, the message is dropped, and the reactor will get an event.
     pub(crate) fn send(&self, worker: WorkerId, outgoing: Outgoing) {
         if let Some((_, member)) = self.members.get(&worker) {
             member.send(outgoing);
         }
     }
 
-    /// Send nothing more to a worker and close its connection, whether or not it has read what was sent before.
+    /// Remove a worker and close its connection, without sending the messages that are still queued.
     pub(crate) fn dismiss(&mut self, worker: WorkerId) {
         if let Some((_, member)) = self.members.remove(&worker) {
             member.close();
         }
     }
 
-    /// Tell all workers that the run is over, and wait until connections and local processes are gone.
+    /// Tell all workers that the run is over, and wait until connections and local processes have ended.
     pub(crate) async fn stop(mut self, reason: &str) {
         for (_, member) in std::mem::take(&mut self.members).into_values() {
             member.send(Outgoing::Message(ToWorker::Stop { reason: reason.to_owned() }));
@@ -115,8 +115,8 @@ impl Cluster {
     }
 }
 
-/// Dropped without [`Cluster::stop`], when the run's future is dropped: nothing can be waited for, but everything ends.
-/// Dropping the keepers kills their processes.
+/// Dropping without [`Cluster::stop`], when the run's future is dropped, ends everything without waiting for it. Dropping the
+/// keepers kills their processes.
 impl Drop for Cluster {
     fn drop(&mut self) {
         self.stop.cancel();
@@ -124,7 +124,7 @@ impl Drop for Cluster {
     }
 }
 
-/// Listen, and have the credentials for it: those made beforehand, those of the earlier coordinator of this run, or new ones.
+/// Listen with credentials: those made beforehand, those of an earlier coordinator of this run, or new ones.
 async fn listen<W: World>(
     world: &W,
     options: &RunnerOptions,
@@ -154,7 +154,7 @@ async fn listen<W: World>(
     Ok((listener, (bound, credentials)))
 }
 
-/// The credentials that the earlier coordinator of this run made; `None` if they were removed.
+/// The credentials that an earlier coordinator of this run made; `None` if their files were removed.
 fn earlier_credentials(options: &RunnerOptions, now: SystemTime) -> Result<Option<Credentials>, RunError> {
     match Credentials::read(&options.access_file, now) {
         Err(CredentialsError::ReadAccess { source, .. } | CredentialsError::ReadKey { source, .. })
@@ -166,7 +166,7 @@ fn earlier_credentials(options: &RunnerOptions, now: SystemTime) -> Result<Optio
     }
 }
 
-/// Credentials that tell workers the present address. As long as it is the same, so is the file, to the byte.
+/// Update credentials to the present address. If it is unchanged, the file is not rewritten.
 fn at_address(mut earlier: Credentials, options: &RunnerOptions, bound: SocketAddr) -> Result<Credentials, RunError> {
     let address = options.advertised(bound);
     if earlier.access.address != address {
@@ -176,7 +176,7 @@ fn at_address(mut earlier: Credentials, options: &RunnerOptions, bound: SocketAd
     Ok(earlier)
 }
 
-/// Make credentials for a listener that got this address, and write the access file.
+/// Make credentials for the address that the listener got, and write the access file.
 fn new_credentials(options: &RunnerOptions, bound: SocketAddr, now: SystemTime) -> Result<Credentials, RunError> {
     let credentials = Credentials::new(options.advertised(bound), now)?;
     credentials.write(&options.access_file)?;

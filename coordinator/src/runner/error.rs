@@ -1,4 +1,4 @@
-//! Why a run ended without its result.
+//! Reasons why a run ended without its result.
 
 use std::io;
 use std::net::SocketAddr;
@@ -11,20 +11,20 @@ use crate::policy::PolicyError;
 use crate::reactor::Stop;
 use crate::spawn::SpawnError;
 
-/// Why a run ended without its result.
+/// Reasons why a run ended without its result.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum RunError {
-    /// The policy makes no sense.
+    /// The policy is invalid.
     #[error(transparent)]
     Policy(#[from] PolicyError),
-    /// Neither local workers nor an address where others could join.
+    /// There are neither local workers nor an address on which others could join.
     #[error(
-        "no worker can ever join: expected at least one local worker, or an address to listen on for others, found neither; use --workers N or --listen ADDR"
+        "no worker can join: expected at least one local worker, or an address to listen on for others, found neither; use --workers N or --listen ADDR"
     )]
     NoWorkersPossible,
-    /// The address to listen on is every address of the machine, so workers cannot be told which one to connect to.
-    #[error("listening on {listen} tells workers no host name to connect to; add --advertise HOST[:PORT]")]
+    /// The coordinator listens on every address of the machine, so it cannot tell workers which one to connect to.
+    #[error("listening on {listen} gives workers no host name to connect to; add --advertise HOST[:PORT]")]
     NothingToAdvertise {
         /// The address to listen on.
         listen: SocketAddr,
@@ -34,17 +34,17 @@ pub enum RunError {
     Listen {
         /// The address.
         listen: SocketAddr,
-        /// What the system says.
+        /// The error of the system.
         source: io::Error,
     },
-    /// The coordinator cannot listen where the workers of its run look for it.
+    /// The coordinator cannot listen at the address to which the run's workers connect.
     #[error(
         "cannot listen on {listen}, where the workers of this run look for their coordinator; end the process that has the port, or name another one with --listen IP:PORT, which workers elsewhere have to be told"
     )]
     PortTaken {
         /// The address.
         listen: SocketAddr,
-        /// What the system says.
+        /// The error of the system.
         source: io::Error,
     },
     /// The journal cannot be written, or the run in it cannot be resumed.
@@ -53,27 +53,27 @@ pub enum RunError {
     /// There is no usable access file, or none can be written.
     #[error(transparent)]
     Credentials(#[from] CredentialsError),
-    /// The coordinator's key is not that of its certificate.
+    /// The coordinator's key does not match its certificate.
     #[error("the coordinator's key file is not usable: {0}; make a new access file with `lookalike access new`")]
     Tls(#[source] rustls::Error),
-    /// The access file made beforehand has an address of another machine, so `--listen` has to say where to listen.
+    /// The access file made beforehand names an address of another machine, so `--listen` must be given.
     #[error(
-        "workers with this access file connect to {address}; say on which address of this machine they arrive with --listen IP:PORT"
+        "workers with this access file connect to {address}; give the address of this machine to listen on with --listen IP:PORT"
     )]
     ListenWhere {
-        /// What the access file says.
+        /// The address in the access file.
         address: String,
     },
-    /// The operating system gives no random bytes.
-    #[error("the system gives no random bytes for the name of the run: {0}")]
+    /// The operating system provides no random bytes.
+    #[error("the system provides no random bytes for the name of the run: {0}")]
     Randomness(io::Error),
-    /// The system does not let us handle signals.
+    /// Signal handlers cannot be installed.
     #[error("cannot listen for Ctrl-C and SIGTERM")]
     Signals(#[source] io::Error),
     /// A local worker process cannot be started at all.
     #[error(transparent)]
     Spawn(#[from] SpawnError),
-    /// The run itself cannot continue.
+    /// The run cannot continue.
     #[error(transparent)]
     Stop(#[from] Stop),
     /// The user interrupted the run.
@@ -82,8 +82,8 @@ pub enum RunError {
 }
 
 impl RunError {
-    /// The exit code of the program (design section 10): 2 for bad input or usage, 130 when interrupted, else 3: the run
-    /// failed.
+    /// The exit code of the program (design section 10): 2 for bad input or usage, 130 if the user interrupted it, otherwise 3
+    /// for a failed run.
     #[must_use]
     pub fn exit_code(&self) -> u8 {
         match self {

@@ -1,4 +1,4 @@
-//! The nodes that run in the coordinator's own process.
+//! Runs nodes in the coordinator's own process.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -10,23 +10,23 @@ use tokio::sync::mpsc::UnboundedSender;
 use crate::events::{RunEvent, Site};
 use crate::reactor::Event;
 
-/// How many encoded bytes of inputs are kept decoded for them (128 MiB).
+/// How many encoded bytes of inputs are kept decoded (128 MiB).
 const DECODED_BOUND_BYTES: usize = 128 << 20;
 
-/// What nodes need that run in this process.
+/// The nodes that run in this process, and what they need.
 pub(super) struct Here<P> {
-    /// Not blocking threads of tokio: parallel iterators run on a pool anyway, and a runtime waits for blocking threads before it
-    /// ends, but an interrupted run shall not wait for a node.
+    /// Not tokio's blocking threads: parallel iterators use a pool anyway, and a runtime waits for its blocking threads before it
+    /// ends, while an interrupted run should not wait for a node.
     pool: P,
     registry: Arc<Registry>,
     decoded: Arc<DecodedCache>,
-    /// Of every node that runs here, with the progress that was told last: to watch it, and to cancel it when the run ends.
+    /// The context of each running node, for its progress and its cancellation, with the progress that was reported last.
     contexts: BTreeMap<NodeId, (RunContext, u16)>,
     results: UnboundedSender<Event>,
 }
 
 impl<P: Pool> Here<P> {
-    /// A place for nodes whose outputs go to `results`.
+    /// Create the state for nodes whose outputs are sent to `results`.
     pub(super) fn new(pool: P, registry: Arc<Registry>, results: UnboundedSender<Event>) -> Self {
         let decoded = Arc::new(DecodedCache::new(DECODED_BOUND_BYTES));
         Self { pool, registry, decoded, contexts: BTreeMap::new(), results }
@@ -48,12 +48,12 @@ impl<P: Pool> Here<P> {
         });
     }
 
-    /// Whether none runs.
+    /// Whether no node is running.
     pub(super) fn is_idle(&self) -> bool {
         self.contexts.is_empty()
     }
 
-    /// How far the nodes are, where that has changed. Those of workers come with their heartbeats.
+    /// Report the progress of nodes where it has changed. (That of nodes on workers arrives with heartbeats.)
     pub(super) fn tell_progress(&mut self, mut observer: impl FnMut(&RunEvent)) {
         for (node, (context, told)) in &mut self.contexts {
             let permille = u16::try_from(context.progress_permille()).unwrap_or(1000);
@@ -63,19 +63,19 @@ impl<P: Pool> Here<P> {
         }
     }
 
-    /// Let the context of a node go that has ended.
+    /// Drop the context of a node that has ended.
     pub(super) fn forget(&mut self, ended: &Event) {
         if let Event::Finished { node, .. } | Event::Failed { node, .. } = ended {
             self.contexts.remove(node);
         }
     }
 
-    /// Ask a node to stop. It answers all the same.
+    /// Ask a node to stop. It still sends an answer.
     pub(super) fn cancel_one(&self, node: NodeId) {
         self.contexts.get(&node).into_iter().for_each(|(context, _)| context.cancel());
     }
 
-    /// Ask all nodes to stop.
+    /// Ask all nodes to stop. They still send answers.
     pub(super) fn cancel(&self) {
         self.contexts.values().for_each(|(context, _)| context.cancel());
     }

@@ -1,6 +1,6 @@
-//! Ctrl-C and SIGTERM. While a run goes on they stop it in order; a second one, or one while there is no run, ends the
-//! process at once, as by default. (A process cannot stop handling a signal once it has begun, so this has to be implemented also
-//! for the time after the run.)
+//! Ctrl-C and SIGTERM. During a run, the first signal stops the run in order. A second signal, or one outside a run, ends the
+//! process at once, which is the default behaviour. (It must be implemented here, because a process cannot stop handling a signal
+//! once it has started to.)
 
 use std::io;
 use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError, mpsc};
@@ -14,17 +14,17 @@ const INTERRUPTED: i32 = 130;
 /// The runs to stop at the next signal.
 static RUNS: Mutex<Vec<CancellationToken>> = Mutex::new(Vec::new());
 
-/// Whether somebody listens, or why not.
+/// Whether signals are being handled, or why not.
 static LISTENING: OnceLock<Result<(), String>> = OnceLock::new();
 
-/// A run's wish to be told of a signal; ends when dropped.
+/// The registration of a run for signals. Dropping it ends the registration.
 #[derive(Debug)]
 pub(crate) struct Interrupt {
     token: CancellationToken,
 }
 
 impl Interrupt {
-    /// From now on the next signal cancels [`token`](Self::token).
+    /// Register: the next signal cancels [`token`](Self::token).
     pub(crate) fn watch() -> io::Result<Self> {
         LISTENING.get_or_init(|| listen().map_err(|error| error.to_string())).clone().map_err(io::Error::other)?;
         let token = CancellationToken::new();
@@ -32,7 +32,7 @@ impl Interrupt {
         Ok(Self { token })
     }
 
-    /// Cancelled by a signal.
+    /// The token that a signal cancels.
     pub(crate) fn token(&self) -> CancellationToken {
         self.token.clone()
     }
@@ -49,7 +49,7 @@ fn runs() -> MutexGuard<'static, Vec<CancellationToken>> {
     RUNS.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Listen in a thread with a runtime of its own: it outlives the runtime of any run.
+/// Handle signals in a thread with its own runtime, which outlives the runtime of any run.
 fn listen() -> io::Result<()> {
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
     let (told, listening) = mpsc::channel();
@@ -59,7 +59,7 @@ fn listen() -> io::Result<()> {
                 Ok(signals) => signals,
                 Err(error) => return told.send(Err(error)).unwrap_or(()),
             };
-            // The other end waits for this.
+            // The receiver waits for this message, so sending cannot fail.
             let _ = told.send(Ok(()));
             loop {
                 signals.next().await;

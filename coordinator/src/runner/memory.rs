@@ -1,4 +1,4 @@
-//! The journal as the driver uses it: groups of actions that wait for their transaction.
+//! The journal, as the driver uses it: groups of actions wait for their transactions.
 
 use std::collections::VecDeque;
 
@@ -6,15 +6,15 @@ use super::RunError;
 use crate::actions::Action;
 use crate::journal::{Batch, Journal};
 
-/// How many groups may wait for their transactions. With one, what comes while it is written becomes the next: a transaction costs
-/// as much as many events, and a node that begins and ends within one is written once.
+/// How many groups may wait for their transactions. With one, the events that arrive while it is written form the next group.
+/// This saves time: a transaction costs as much as many events, and a node that starts and ends within one is written once.
 const WAITING_GROUPS: usize = 1;
 
-/// The actions of a group of events: performed once it is committed.
+/// The actions of a group of events, which are performed once it is committed.
 #[derive(Debug, Default)]
 pub(super) struct Group {
     pub(super) actions: Vec<Action>,
-    /// What the journal is told of it.
+    /// The rows of the group for the journal.
     pub(super) batch: Batch,
 }
 
@@ -26,27 +26,28 @@ pub(super) struct Memory {
 }
 
 impl Memory {
-    /// The memory of a run with a journal, or without.
+    /// The memory of a run, with or without a journal.
     pub(super) fn new(journal: Option<Journal>) -> Self {
         Self { journal, waiting: VecDeque::new() }
     }
 
-    /// Whether there is a journal to tell.
+    /// Whether there is a journal.
     pub(super) fn is_kept(&self) -> bool {
         self.journal.is_some()
     }
 
-    /// Whether another group may be made now.
+    /// Whether another group may be submitted now.
     pub(super) fn has_room(&self) -> bool {
         self.waiting.len() < WAITING_GROUPS
     }
 
-    /// Whether nothing waits to be written.
+    /// Whether all groups are written.
     pub(super) fn is_written(&self) -> bool {
         self.waiting.is_empty()
     }
 
-    /// Commit a group; it comes back from [`Self::written`]. One that needs no commit comes back at once, if it is its turn.
+    /// Commit a group, which [`Self::written`] then returns. A group that needs no commit is returned at once if no other group
+    /// waits.
     pub(super) fn submit(&mut self, mut group: Group) -> Option<Group> {
         let Some(journal) = &mut self.journal else { return Some(group) };
         let batch = std::mem::take(&mut group.batch);
@@ -61,7 +62,7 @@ impl Memory {
         None
     }
 
-    /// The next committed group. Waits for ever if none is on its way.
+    /// Wait for the next committed group; for ever if there is none.
     pub(super) async fn written(&mut self) -> Result<Group, RunError> {
         let (Some(journal), false) = (&mut self.journal, self.waiting.is_empty()) else {
             return std::future::pending().await;
@@ -70,12 +71,12 @@ impl Memory {
         Ok(self.waiting.pop_front().unwrap_or_default())
     }
 
-    /// The run is over.
+    /// Close the journal at the end of the run.
     pub(super) fn close(&mut self, ended: Option<String>) -> Result<(), RunError> {
         Ok(self.journal.take().map_or(Ok(()), |journal| journal.close(ended))?)
     }
 
-    /// The run could not begin.
+    /// Remove the journal of a run that could not begin.
     pub(super) fn discard(&mut self) {
         self.journal.take().into_iter().for_each(Journal::discard);
     }

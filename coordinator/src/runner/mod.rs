@@ -8,8 +8,8 @@
 //! Events that arrive together form a group. With a journal, a group is committed as one transaction before its actions are performed;
 //! events that arrive meanwhile form the next group.
 //!
-//! One task owns the state; everything else talks to it through channels. Stopping is a message to every worker and then
-//! waiting for what was started: when [`run`] returns, there is no process and no connection left.
+//! One task owns the state; everything else communicates with it through channels. To stop, it sends a message to every worker
+//! and waits for everything that was started: when [`run`] returns, no process and no connection is left.
 
 mod cluster;
 mod error;
@@ -46,26 +46,26 @@ use crate::reactor::{self, Event, Stop};
 use crate::rpc::{Inbound, Outgoing};
 use crate::state::{Core, RunSummary};
 
-/// Counts the coordinator processes of a run; without a journal there is only one.
+/// The number of the first coordinator process of a run. Without a journal it is the only one.
 const FIRST_EPOCH: u64 = 1;
 
-/// How many events may wait for the reactor before the connections have to.
+/// How many events may wait for the reactor before connections must wait.
 const INBOUND_CAPACITY: usize = 1024;
 
-/// How many events are handled, and written down, as one group.
+/// How many events are handled and journalled as one group.
 const EVENTS_PER_GROUP: usize = 1024;
 
-/// Run the planner's graph on workers, and its coordinator nodes on this process's rayon pool. Returns the planner, which
-/// has seen every output, when no node is open any more. `observer` is told what happens, as it happens; it should be
-/// quick, for the run waits for it.
+/// Run the planner's graph on workers, and its coordinator nodes on this process's rayon pool. Returns the planner, which has
+/// received every output, when no node is open any more. `observer` is called with each event as it happens; it should be quick,
+/// because the run waits for it.
 ///
-/// With a [journal](RunnerOptions::journal) everything is committed before it is acknowledged, and an unfinished run is resumed if the
-/// journal's options allow it. When nothing is left to run, the coordinator does not listen and starts no worker.
+/// With a [journal](RunnerOptions::journal), every change is committed before it is acknowledged, and an unfinished run is
+/// resumed if the journal's options allow it. If no node is left to run, the coordinator does not listen and starts no worker.
 ///
-/// Needs a tokio runtime with time and I/O; a multi-threaded one keeps connections alive while the planner is busy.
+/// Needs a tokio runtime with time and I/O. A multi-threaded one keeps connections alive while the planner is busy.
 ///
 /// # Errors
-/// [`RunError`]: in each case every worker is told to end and no process is left.
+/// [`RunError`]. In each case, every worker is told to end and no process is left.
 pub async fn run<P: Planner>(
     options: RunnerOptions,
     planner: P,
@@ -75,10 +75,10 @@ pub async fn run<P: Planner>(
     run_in(Real, options, planner, registry, observer).await
 }
 
-/// The same in any world. Local workers are processes in every world.
+/// Like [`run`], in any world. Local workers are processes in every world.
 ///
 /// # Errors
-/// Those of [`run`].
+/// See [`run`].
 pub async fn run_in<W: World, P: Planner>(
     world: W,
     options: RunnerOptions,
@@ -86,7 +86,7 @@ pub async fn run_in<W: World, P: Planner>(
     registry: Arc<Registry>,
     observer: impl FnMut(&RunEvent),
 ) -> Result<(P, RunSummary), RunError> {
-    // Before anything is started: a signal in between must not leave it behind.
+    // Before anything is started, so that an early signal leaves nothing behind.
     let interrupt = options.handle_signals.then(Interrupt::watch).transpose().map_err(RunError::Signals)?;
     let interrupted = interrupt.as_ref().map_or_else(CancellationToken::new, Interrupt::token);
     options.check()?;
@@ -127,7 +127,7 @@ pub async fn run_in<W: World, P: Planner>(
     outcome.and(closed).map(|()| (driver.planner, driver.core.summary()))
 }
 
-/// What the run begins with.
+/// The parameters of the start of a run.
 struct Begin {
     options: RunnerOptions,
     run: RunName,
@@ -139,7 +139,7 @@ struct Driver<W: World, P, O> {
     core: Core,
     planner: P,
     outbox: Outbox,
-    /// There as soon as there is something to do for workers.
+    /// Started when there is work for workers.
     cluster: Option<Cluster>,
     observer: O,
     here: Here<W::Pool>,
@@ -154,7 +154,7 @@ impl<W: World, P: Planner, O: FnMut(&RunEvent)> Driver<W, P, O> {
         mut results: UnboundedReceiver<Event>,
         interrupted: CancellationToken,
     ) -> Result<(), RunError> {
-        // Dropped when this returns: a connection that waits for room must not wait for ever.
+        // Dropped at the return of this function, so that connections that wait for room do not wait for ever.
         let (sender, mut inbound) = channel(INBOUND_CAPACITY);
         let (wake, pulse) = (begin.options.wake.clone(), begin.options.pulse.clone());
         let mut failure = self.begin(begin, sender).await?;
@@ -172,7 +172,7 @@ impl<W: World, P: Planner, O: FnMut(&RunEvent)> Driver<W, P, O> {
             let may_act = !is_over && self.memory.has_room();
             let deadline = self.core.next_deadline().map(|deadline| self.began + deadline);
             tokio::select! {
-                // Events before deadlines: a late coordinator must not make a worker late.
+                // Process events before deadlines, so that workers do not miss deadlines because the coordinator is slow.
                 biased;
                 () = interrupted.cancelled() => return Err(RunError::Interrupted),
                 written = self.memory.written() => {
@@ -191,7 +191,7 @@ impl<W: World, P: Planner, O: FnMut(&RunEvent)> Driver<W, P, O> {
                 () = sleep_or_wait(deadline), if may_act => {}
             }
             more(&mut inbound, &mut events);
-            // If events never cease, deadlines are checked after each group.
+            // Check deadlines after each group, even if events keep arriving.
             if deadline.is_some_and(|deadline| deadline <= Instant::now()) {
                 events.push(Inbound::Event(Event::DeadlinePassed));
             }
@@ -199,7 +199,7 @@ impl<W: World, P: Planner, O: FnMut(&RunEvent)> Driver<W, P, O> {
         }
     }
 
-    /// Start the planner and complete what the journal has; then, if something is left to do, listen and start workers. An error of the
+    /// Start the planner and complete nodes from the journal. If nodes are left to run, listen and start workers. An error of the
     /// planner is returned as a value, so that the events before it are still reported.
     async fn begin(
         &mut self,
@@ -240,7 +240,7 @@ impl<W: World, P: Planner, O: FnMut(&RunEvent)> Driver<W, P, O> {
         self.began.elapsed()
     }
 
-    /// Act upon events, as one group.
+    /// Process events as one group.
     fn handle_all(&mut self, events: &mut Vec<Inbound>) -> Result<(), Stop> {
         let mut group = Group::default();
         let outcome = events.drain(..).try_for_each(|inbound| {
@@ -268,7 +268,7 @@ impl<W: World, P: Planner, O: FnMut(&RunEvent)> Driver<W, P, O> {
         outcome
     }
 
-    /// Move the reactor's actions into the group, and note them for the journal.
+    /// Move the reactor's actions into the group, and add their rows for the journal.
     fn collect(&mut self, group: &mut Group, now: Duration) {
         let actions = self.outbox.take();
         if self.memory.is_kept() {
@@ -277,7 +277,7 @@ impl<W: World, P: Planner, O: FnMut(&RunEvent)> Driver<W, P, O> {
         group.actions.extend(actions);
     }
 
-    /// A result that is wrong, or one of two that differ, must not be in the journal when the run is resumed.
+    /// Remove a wrong result, or one of two that differ, from the journal, so that a resumed run does not use it.
     fn forget_if_wrong(&self, error: Option<&Stop>, group: &mut Group) {
         if let Some(Stop::WrongResult { name, .. } | Stop::ResultsDiffer { name, .. }) = error {
             let index = usize::try_from(name.node.0).unwrap_or(usize::MAX);
@@ -308,7 +308,7 @@ impl<W: World, P: Planner, O: FnMut(&RunEvent)> Driver<W, P, O> {
                 Some(Event::WorkerJoined { worker, threads, process })
             }
             Inbound::Ask { lease, answer } => {
-                // The connection that asked may be gone.
+                // The connection that asked may have ended.
                 let _ = answer.send(self.core.was_given_out(NodeId(lease.node), lease.attempt));
                 None
             }
@@ -339,7 +339,7 @@ impl<W: World, P: Planner, O: FnMut(&RunEvent)> Driver<W, P, O> {
                 Action::Drop { worker } => self.cluster.iter_mut().for_each(|cluster| cluster.dismiss(worker)),
                 Action::RunHere { node, attempt } => self.run_here(node, attempt),
                 Action::CancelHere { node } => self.here.cancel_one(node),
-                // It is in the journal by now.
+                // The journal has written it already.
                 Action::Keep { .. } => {}
                 Action::Tell(event) => {
                     if let RunEvent::NodeStarted { site: Site::Worker(worker), .. } = &event {
@@ -359,7 +359,7 @@ impl<W: World, P: Planner, O: FnMut(&RunEvent)> Driver<W, P, O> {
 
     fn assign(&self, worker: WorkerId, lease: Lease) {
         let graph = self.core.graph();
-        // A node is given out when it is ready, so both are there.
+        // A node is given out only when it is ready, so it has both.
         let (Some(spec), Some(inputs)) = (graph.spec(lease.node), graph.input_blobs(lease.node)) else { return };
         let assignment = Assignment {
             lease: name_of(lease),
@@ -382,7 +382,7 @@ fn name_of(lease: Lease) -> LeaseName {
     LeaseName { node: lease.node.0, attempt: lease.attempt, epoch: lease.epoch }
 }
 
-/// Add the events that have arrived, as far as the group has room.
+/// Add further events that have arrived, as far as the group has room.
 fn more(inbound: &mut Receiver<Inbound>, events: &mut Vec<Inbound>) {
     while events.len() < EVENTS_PER_GROUP {
         let Ok(event) = inbound.try_recv() else { return };
@@ -390,7 +390,7 @@ fn more(inbound: &mut Receiver<Inbound>, events: &mut Vec<Inbound>) {
     }
 }
 
-/// An error with its causes, in one line.
+/// An error and its causes in one line.
 fn with_causes(error: &RunError) -> String {
     let mut text = error.to_string();
     let mut cause = error.source();
@@ -404,7 +404,7 @@ fn with_causes(error: &RunError) -> String {
 /// How often to read the progress of the nodes that run here.
 const GLANCE: Duration = Duration::from_millis(250);
 
-/// More threads than this on one worker are a mistake or a lie.
+/// The most threads of one worker; a larger number is an error or an attack.
 const MAX_THREADS: usize = 4096;
 
 async fn told(wake: Option<&Notify>) {

@@ -1,4 +1,4 @@
-//! What a run can be told.
+//! The options of a run.
 
 use std::net::{Ipv4Addr, SocketAddr};
 use std::num::NonZeroUsize;
@@ -13,42 +13,42 @@ use crate::limits::Limits;
 use crate::spawn::WorkerCommand;
 use crate::state::Policy;
 
-/// How to run a graph on workers.
+/// The options of a run.
 #[derive(Clone, Debug)]
 pub struct RunnerOptions {
     /// How many local worker processes to start; 0 to 4096.
     pub workers: usize,
-    /// The threads of each local worker; `None` shares the cores among them.
+    /// The threads of each local worker; `None` divides the cores among them.
     pub threads_per_worker: Option<NonZeroUsize>,
-    /// How to start a local worker; `None` starts this very program as `worker`.
+    /// The command that starts a local worker; `None` starts this program as `worker`.
     pub worker_command: Option<WorkerCommand>,
-    /// The log filter of local workers, as `--log` takes it; `None` leaves them their default.
+    /// The log filter of local workers, as `--log` takes it; `None` uses their default.
     pub log: Option<String>,
-    /// Where to listen for workers from elsewhere; `None` listens on the loopback interface, on any free port, for the local
-    /// ones alone.
+    /// The address to listen on for other workers; `None` listens on any free port of the loopback interface, for local workers
+    /// only.
     pub listen: Option<SocketAddr>,
-    /// What the access file tells workers to connect to, as `HOST` or `HOST:PORT`; `None` tells the address listened on.
+    /// The address in the access file, as `HOST` or `HOST:PORT`; `None` uses the address listened on.
     pub advertise: Option<String>,
-    /// Where to write the access file, with the coordinator's key beside it; its folder has to exist.
+    /// Where to write the access file, with the coordinator's key beside it. The folder must exist.
     pub access_file: PathBuf,
-    /// An access file made beforehand, with its key beside it, to use instead of writing one: workers may have it already.
+    /// An access file made beforehand, with its key beside it, to use instead of writing one. Workers may have it already.
     pub access: Option<PathBuf>,
-    /// What connections may cost.
+    /// The bounds on connections.
     pub limits: Limits,
-    /// How workers and nodes are treated.
+    /// The rules for workers and nodes.
     pub policy: Policy,
-    /// Where to keep the journal, so that the run can be resumed; `None` keeps none.
+    /// The journal, from which the run can be resumed; `None` for no journal.
     pub journal: Option<JournalOptions>,
-    /// Notified when the planner is to [look again](lookalike::graph::Planner::look_again); `None`: never.
+    /// Notified when the planner should [look again](lookalike::graph::Planner::look_again); `None` for never.
     pub wake: Option<Arc<Notify>>,
-    /// Where the run shows that it goes round, about once a second.
+    /// Updated about once a second while the loop of the run makes progress.
     pub pulse: Option<Arc<Pulse>>,
     /// Whether Ctrl-C and SIGTERM stop the run in order, with [`RunError::Interrupted`].
     pub handle_signals: bool,
 }
 
 impl RunnerOptions {
-    /// `workers` local workers, the access file, no journal, and for the rest the defaults of design section 8.
+    /// Options with `workers` local workers, the access file, no journal, and otherwise the defaults of design section 8.
     #[must_use]
     pub fn new(workers: usize, access_file: PathBuf) -> Self {
         Self {
@@ -69,8 +69,8 @@ impl RunnerOptions {
         }
     }
 
-    /// The address to listen on, for workers that an access file made beforehand tells to connect to `told`. Without
-    /// [`listen`](Self::listen) it is an address of the loopback interface, never another one.
+    /// The address to listen on. An access file made beforehand tells workers to connect to `told`. Without
+    /// [`listen`](Self::listen), it is always an address of the loopback interface.
     pub(crate) fn listen_address(&self, told: Option<&str>) -> Result<SocketAddr, RunError> {
         match (self.listen, told) {
             (Some(listen), Some(address)) if listen.port() == 0 => {
@@ -86,8 +86,8 @@ impl RunnerOptions {
         }
     }
 
-    /// The address to listen on for a resumed run whose earlier coordinator listened at `before`: the same one, so that its workers find
-    /// it, unless the user names another port.
+    /// The address to listen on for a resumed run whose earlier coordinator listened at `before`: the same, so that its workers
+    /// find it, unless the user names another port.
     pub(crate) fn listen_again(&self, before: Option<SocketAddr>) -> SocketAddr {
         let anywhere = SocketAddr::from((Ipv4Addr::LOCALHOST, 0));
         match (self.listen, before) {
@@ -97,12 +97,12 @@ impl RunnerOptions {
         }
     }
 
-    /// Whether workers may come that this run does not start.
+    /// Whether workers may join that this run does not start.
     pub(crate) fn others_may_come(&self) -> bool {
         self.listen.is_some() || self.access.is_some()
     }
 
-    /// That the policy makes sense, and some worker can join and be told where.
+    /// Check that the policy is valid, and that some worker can join and knows the address.
     pub(crate) fn check(&self) -> Result<(), RunError> {
         self.policy.check()?;
         if self.workers == 0 && !self.others_may_come() {
@@ -116,7 +116,7 @@ impl RunnerOptions {
         }
     }
 
-    /// What the access file says, for a listener that got this address.
+    /// The address for the access file, for a listener that got `bound`.
     pub(crate) fn advertised(&self, bound: SocketAddr) -> String {
         match &self.advertise {
             None => bound.to_string(),
@@ -125,7 +125,7 @@ impl RunnerOptions {
         }
     }
 
-    /// Where local workers connect to, for a listener that got this address.
+    /// The address for local workers, for a listener that got `bound`.
     pub(crate) fn local_address(bound: SocketAddr) -> String {
         let mut local = bound;
         if bound.ip().is_unspecified() {

@@ -1,23 +1,23 @@
-//! Whether the loop of a run still turns, for the health check of the metrics.
+//! The time since the last round of a run's loop, for the health check of the metrics.
 
 use std::sync::Mutex;
 use std::sync::PoisonError;
 use std::time::{Duration, Instant};
 
-/// How often the loop goes round at least, when nothing happens.
+/// The longest time between two rounds of the loop when no event arrives.
 pub(super) const INTERVAL: Duration = Duration::from_secs(1);
 
-/// When the loop of a run went round last.
+/// When the loop of a run last started a round.
 #[derive(Debug, Default)]
 pub struct Pulse(Mutex<Option<Instant>>);
 
 impl Pulse {
-    /// The loop goes round.
+    /// Record a round.
     pub(super) fn beat(&self) {
         *self.0.lock().unwrap_or_else(PoisonError::into_inner) = Some(Instant::now());
     }
 
-    /// How long that was ago; `None` before the first time.
+    /// The time since the last round; `None` before the first one.
     #[must_use]
     pub fn age(&self) -> Option<Duration> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).map(|last| last.elapsed())

@@ -1,8 +1,8 @@
 //! Local worker processes: started with the run, restarted when they die, ended with the run.
 //!
-//! Each one has a leash: a pipe to its stdin. A byte in it means that the run is over; its end without that byte means that the
-//! coordinator was killed. In both cases the worker ends at once. Each one is in a process group of its
-//! own, so that a Ctrl-C at the terminal reaches the coordinator alone, which ends its workers in order.
+//! Each worker has a leash: a pipe to its stdin. A byte in the pipe means that the run is over; its end without a byte means that
+//! the coordinator was killed. In both cases the worker ends at once. Each worker is in its own process group, so that Ctrl-C at
+//! the terminal reaches only the coordinator, which ends its workers in order.
 
 mod worked;
 
@@ -27,25 +27,25 @@ use crate::events::RunEvent;
 use crate::reactor::Event;
 use crate::rpc::Inbound;
 
-/// A death after this long, or of a worker that has executed a node, resets the count of quick deaths: if a node kills workers, that node
-/// fails in the end.
+/// A worker that lived this long, or that has executed a node, resets the count of quick deaths. (If a node kills its workers,
+/// that node eventually fails.)
 const HEALTHY_LIFE: Duration = Duration::from_secs(10);
-/// After this many deaths in a row, each soon after the start, a worker is not started again.
+/// After this many consecutive deaths soon after the start, a worker is not started again.
 const MAX_QUICK_DEATHS: u32 = 8;
-/// The pause after the first of them; each further one is twice as long.
+/// The pause after the first death. It doubles with each further one.
 const FIRST_PAUSE: Duration = Duration::from_millis(100);
 /// The longest pause.
 const LONGEST_PAUSE: Duration = Duration::from_secs(5);
 /// How long a worker may take to end by itself before it is killed.
 const FAREWELL_TIME: Duration = Duration::from_secs(2);
-/// How long a local worker tries to reach its coordinator, as its command line says it.
+/// How long a local worker tries to reconnect to its coordinator, as an option on its command line.
 const RECONNECT_FOR: &str = "60s";
-/// What the leash says before it ends, when the run is over.
+/// Written to the leash when the run is over.
 const RUN_IS_OVER: &[u8] = b".";
-/// The exit code of a worker for which a new attempt would fail too: bad usage, or refused.
+/// The exit code of a worker for which another attempt would also fail: bad usage, or refused.
 const HOPELESS: i32 = 2;
 
-/// How to start a worker process, but for the flags that every worker gets.
+/// The command that starts a worker process, without the flags that every worker gets.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct WorkerCommand {
     /// The program.
@@ -58,7 +58,7 @@ impl WorkerCommand {
     /// This very program as a worker: `lookalike worker`.
     ///
     /// # Errors
-    /// When the system does not tell which program this is.
+    /// When the system does not provide the path of this program.
     pub fn this_program() -> io::Result<Self> {
         Ok(Self { program: std::env::current_exe()?, arguments: vec!["worker".into()] })
     }
@@ -70,11 +70,11 @@ impl WorkerCommand {
 pub struct SpawnError {
     /// The program.
     pub program: PathBuf,
-    /// What the system says.
+    /// The error of the system.
     pub source: io::Error,
 }
 
-/// How many local workers there are, and how they are started.
+/// The number of local workers, and how to start them.
 #[derive(Clone, Debug)]
 pub(crate) struct LocalWorkers {
     pub(crate) count: usize,
@@ -82,22 +82,22 @@ pub(crate) struct LocalWorkers {
     pub(crate) access: PathBuf,
     /// The log filter, as `--log` takes it.
     pub(crate) log: Option<String>,
-    /// Where the coordinator listens, as seen from this machine.
+    /// The coordinator's address as seen from this machine.
     pub(crate) address: String,
     pub(crate) threads: NonZeroUsize,
-    /// Whether other workers may come when all local ones are given up.
+    /// Whether other workers may join if all local ones are given up.
     pub(crate) others_may_come: bool,
     pub(crate) worked: Worked,
 }
 
-/// The threads of each of `workers` workers, so that together they use the cores once.
+/// The threads of each of `workers` workers, so that together they use each core once.
 pub(crate) fn threads_per_worker(workers: usize) -> NonZeroUsize {
     let cores = std::thread::available_parallelism().map_or(1, NonZeroUsize::get);
     NonZeroUsize::new(cores / workers.max(1)).unwrap_or(NonZeroUsize::MIN)
 }
 
 impl LocalWorkers {
-    /// Start the workers. A program that cannot be started at all is an error at once.
+    /// Start the workers. If the program cannot be started at all, this fails at once.
     pub(crate) fn start(&self, inbound: &Sender<Inbound>, stop: &CancellationToken) -> Result<JoinSet<()>, SpawnError> {
         let mut first = Vec::new();
         for _ in 0..self.count {
@@ -116,7 +116,7 @@ impl LocalWorkers {
         Ok(keeping)
     }
 
-    /// Keep one worker alive until `stop`. When it is given up, how it ended last.
+    /// Restart one worker when it dies, until `stop`. Returns how it ended last if it is given up.
     async fn keep_alive(self, first: Process, inbound: Sender<Inbound>, stop: CancellationToken) -> Option<String> {
         let mut quick_deaths = 0;
         let mut next = Ok(first);
@@ -125,7 +125,7 @@ impl LocalWorkers {
             let (process, status, is_hopeless) = match next {
                 Ok(mut process) => {
                     let started = RunEvent::LocalWorkerStarted { process: process.id };
-                    // An error means that the run is over; then `stop` is cancelled.
+                    // An error means that the run is over, and `stop` is cancelled.
                     let _ = inbound.send(Inbound::Tell(started)).await;
                     tokio::select! {
                         ended = process.child.wait() => (process.id, describe(&ended), is_hopeless(&ended)),
@@ -138,7 +138,7 @@ impl LocalWorkers {
                 Err(error) => (0, format!("an error at its start: {error}"), false),
             };
             if !is_hopeless {
-                // Its last messages may still be on their way.
+                // Its last messages may still be in transit.
                 tokio::select! {
                     () = sleep(FIRST_PAUSE) => {}
                     () = stop.cancelled() => return None,
@@ -172,12 +172,12 @@ impl LocalWorkers {
         if let Some(log) = &self.log {
             command.arg("--log").arg(log);
         }
-        // stdout is for results, and a worker has none.
+        // stdout is reserved for results, which a worker does not print.
         command.stdin(Stdio::piped()).stdout(Stdio::null()).stderr(Stdio::inherit()).kill_on_drop(true);
         #[cfg(unix)]
         command.process_group(0);
         let mut child = command.spawn()?;
-        // Taken out of the child: waiting for the child would close it.
+        // Take the leash out of the child, because waiting for the child would close it.
         let leash = child.stdin.take();
         let id = child.id().unwrap_or(0);
         debug!(process = id, "started a local worker");
@@ -185,13 +185,13 @@ impl LocalWorkers {
     }
 }
 
-/// Report once all workers are given up.
+/// Send an event once all workers are given up.
 async fn watch(mut keepers: JoinSet<Option<String>>, inbound: Sender<Inbound>, others_may_come: bool) {
     let mut last_status = None;
     while let Some(ended) = keepers.join_next().await {
         match ended {
             Ok(Some(status)) => last_status = Some(status),
-            // Stopped: the run is over.
+            // The run is over.
             Ok(None) | Err(_) => return drain(keepers).await,
         }
     }
@@ -212,10 +212,10 @@ struct Process {
 }
 
 impl Process {
-    /// Let the worker end by itself, or else kill it; when this returns there is no process.
+    /// Let the worker end by itself, and kill it if it does not. When this returns, the process has ended.
     async fn end(mut self) {
         if let Some(mut leash) = self.leash.take() {
-            // A worker that has ended does not read it.
+            // If the worker has ended already, the write fails, which is fine.
             let _ = leash.write_all(RUN_IS_OVER).await;
         }
         if timeout(FAREWELL_TIME, self.child.wait()).await.is_err() {

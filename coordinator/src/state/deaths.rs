@@ -1,13 +1,13 @@
-//! How often workers have died of a node.
+//! Counts of workers that died while they executed a node.
 
 /// The deaths of workers that executed a node.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Deaths {
-    /// While they executed it, perhaps with others, or before it was a suspect.
+    /// While it ran together with other nodes, or before it was a suspect.
     pub in_company: u32,
-    /// While it had its worker for itself.
+    /// While it was the only node on its worker.
     pub alone: u32,
-    /// While it had its worker for itself, when other workers died of something else.
+    /// While it was the only node on its worker, but other workers were dying for a different reason.
     pub not_counted: u32,
 }
 

@@ -1,21 +1,21 @@
-//! Worker processes that have lost their connection. Many come back, because a connection may break without a death.
+//! Worker processes that have lost their connection. Many reconnect, because a connection may break without a death.
 
 use std::collections::BTreeMap;
 
 use lookalike::graph::NodeId;
 use lookalike::protocol::ProcessName;
 
-/// How many of them are remembered: as many as there may be connections, which one cut wire ends all at once.
+/// How many of them are remembered: as many as there may be connections, because one network failure may break them all at once.
 const REMEMBERED: usize = 4096;
 
-/// What is known of a process that has lost its connection.
+/// A process that has lost its connection.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Lost {
-    /// It had executed nothing.
+    /// It had executed no node.
     pub(crate) was_fresh: bool,
-    /// The attempts that it has not answered: it may continue them.
+    /// The attempts that it has not answered. It may continue them.
     pub(crate) attempts: BTreeMap<NodeId, u32>,
-    /// The deaths that were counted against nodes for its loss.
+    /// The deaths that were counted against nodes when it was lost.
     pub(crate) deaths: Vec<(NodeId, Death)>,
 }
 
@@ -27,17 +27,17 @@ pub(crate) enum Death {
     NotCounted,
 }
 
-/// All of them, as far as they are remembered.
+/// The remembered processes.
 #[derive(Debug, Default)]
 pub(crate) struct Departed {
-    /// Each with its place in the order of departures.
+    /// Each with its number in the order of departures.
     by_process: BTreeMap<ProcessName, (u64, Lost)>,
     order: BTreeMap<u64, ProcessName>,
     next: u64,
 }
 
 impl Departed {
-    /// A process has lost its connection.
+    /// Remember a process that has lost its connection.
     pub(crate) fn insert(&mut self, process: ProcessName, lost: Lost) {
         self.remove(process);
         self.by_process.insert(process, (self.next, lost));
@@ -50,7 +50,7 @@ impl Departed {
         }
     }
 
-    /// It is back.
+    /// Remove a process that has reconnected.
     pub(crate) fn remove(&mut self, process: ProcessName) -> Option<Lost> {
         let (place, lost) = self.by_process.remove(&process)?;
         self.order.remove(&place);

@@ -1,5 +1,5 @@
-//! The workers that have joined, and which of them is next. Every query over all of them has an index, so that no event costs more for a
-//! thousand workers than for ten.
+//! The workers that have joined, and indices for every query over all of them, so that no event costs more for 1000 workers than
+//! for 10.
 
 use std::cmp::Ordering;
 use std::collections::{BTreeMap, BTreeSet};
@@ -11,24 +11,23 @@ use lookalike::protocol::ProcessName;
 use super::departed::Lost;
 use crate::actions::WorkerProcess;
 
-/// How many bytes of assignments a worker may have been given that it has not begun with. What waits in its queue stays as
-/// small as this, and one assignment.
+/// A worker gets no further assignment while those that it has not begun take this many bytes or more. So its queue holds less
+/// than this plus one assignment.
 const UNBEGUN_BYTES: usize = 8 << 20;
 
-/// How long a worker shall have something to do for each of its threads without being heard: more than the journal and the way
-/// there and back take.
+/// Unbegun leases that take this long per thread are enough for a worker. It is longer than the journal and a round trip take.
 const ENOUGH: Duration = Duration::from_millis(10);
 
-/// A worker without progress for this long is stalled; on a busy machine a process may wait for some 10 ms.
+/// A worker without progress for this long is stalled. On a busy machine a process may wait for some 10 ms.
 const STANDSTILL: Duration = Duration::from_millis(50);
 
-/// A node that takes less than this is short: a worker is given many of them at a time.
+/// Nodes that take less than this are short: a worker gets many of them at a time.
 const SHORT: Duration = Duration::from_millis(1);
 
-/// No node is thought to take less.
+/// The least weight of a node.
 const SHORTEST: Duration = Duration::from_micros(20);
 
-/// The weight of a node that is not short, or whose kind has no known duration.
+/// The weight of a node that is not short or whose kind has no known duration.
 const LONG: Duration = Duration::from_hours(1);
 
 /// The weight, in a worker's queue, of a node whose kind usually takes this long.
@@ -42,41 +41,41 @@ pub(crate) struct Member {
     pub(crate) process: WorkerProcess,
     pub(crate) threads: usize,
     pub(crate) leases: BTreeMap<NodeId, Held>,
-    /// The leases that it has not begun with.
+    /// The leases that it has not begun.
     pub(crate) waiting: BTreeSet<NodeId>,
     waiting_bytes: usize,
-    /// How long they will take one after the other.
+    /// The time that they take one after the other.
     waiting_time: Duration,
-    /// The inputs of every node it was ever given: what it may read. (One that was taken back may still be asked about.)
+    /// The inputs of every node that it was given, which it may read. (It may still ask for those of a node that was taken back.)
     pub(crate) readable: BTreeSet<BlobHash>,
-    /// When it is lost, and with it its leases, unless it is heard of before.
+    /// It is lost, with its leases, if it sends nothing before this time.
     pub(crate) deadline: Duration,
-    /// It was asked to end: it finishes what it executes and gets nothing more.
+    /// It was asked to end: it finishes the nodes that it executes and gets no others.
     pub(crate) is_draining: bool,
-    /// It gets nothing more until a suspect has it for itself.
+    /// It gets no nodes until it is free for a suspect.
     pub(crate) is_clearing: bool,
-    /// The suspect that has it for itself.
+    /// The suspect that is the only node on it.
     pub(crate) alone_with: Option<NodeId>,
-    /// The attempts of its process on earlier connections, which it may still execute.
+    /// The attempts of its process from earlier connections, which it may still execute.
     pub(crate) earlier: BTreeMap<NodeId, u32>,
-    /// Its process has executed nothing yet.
+    /// Its process has not executed a node yet.
     is_fresh: bool,
-    /// When it last got, began or ended something.
+    /// When a lease of it last began, started to execute, or ended.
     last_move: Duration,
 }
 
-/// A lease, as its worker's member holds it.
+/// A lease of a worker.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Held {
     pub(crate) attempt: u32,
-    /// Since when the worker executes it.
+    /// When the worker started to execute it.
     pub(crate) started_at: Option<Duration>,
     /// The progress that it reported.
     pub(crate) permille: u16,
     assignment: Size,
 }
 
-/// What an assignment is for the queue that it waits in.
+/// The size of an assignment in the queue of its worker.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Size {
     pub(crate) bytes: usize,
@@ -104,20 +103,20 @@ impl Member {
         }
     }
 
-    /// Its process was here before.
+    /// The worker's process was connected before.
     pub(crate) fn resume(&mut self, lost: Lost) {
         self.is_fresh &= lost.was_fresh;
         self.earlier = lost.attempts;
     }
 
-    /// What is to be known of it should its process come back.
+    /// The state to keep in case its process reconnects.
     pub(crate) fn into_lost(self) -> Lost {
         let mut attempts = self.earlier;
         attempts.extend(self.leases.iter().map(|(node, held)| (*node, held.attempt)));
         Lost { was_fresh: self.is_fresh, attempts, deaths: Vec::new() }
     }
 
-    /// A lease begins.
+    /// Add a lease.
     pub(crate) fn give(&mut self, node: NodeId, attempt: u32, assignment: Size, now: Duration) {
         self.leases.insert(node, Held { attempt, started_at: None, permille: 0, assignment });
         self.waiting.insert(node);
@@ -126,7 +125,7 @@ impl Member {
         self.last_move = now;
     }
 
-    /// The worker begins to execute a node that it has not begun with yet; `false` if there is no such lease.
+    /// Mark a lease as executing; `false` if there is no such lease or the worker executes it already.
     pub(crate) fn begin(&mut self, node: NodeId, attempt: u32, (arrived, now): (Duration, Duration)) -> bool {
         let Some(held) = self.leases.get_mut(&node).filter(|held| held.attempt == attempt) else { return false };
         if !self.waiting.remove(&node) {
@@ -140,7 +139,7 @@ impl Member {
         true
     }
 
-    /// A lease ends.
+    /// Remove a lease.
     pub(crate) fn end(&mut self, node: NodeId, now: Duration) -> Option<Held> {
         let held = self.leases.remove(&node)?;
         if self.waiting.remove(&node) {
@@ -152,37 +151,37 @@ impl Member {
         Some(held)
     }
 
-    /// How many nodes it executes.
+    /// The number of nodes that it executes.
     pub(crate) fn executing(&self) -> usize {
         self.leases.len() - self.waiting.len()
     }
 
-    /// How much may wait for it.
+    /// The total time of waiting leases that is enough for it.
     fn enough(&self) -> Duration {
         ENOUGH * u32::try_from(self.threads).unwrap_or(u32::MAX).min(1024)
     }
 
-    /// When leases that it has not begun may be moved to another worker. Short nodes stay while it makes progress: it would begin them
-    /// before the other worker received them.
+    /// When leases that it has not begun may be moved to another worker. Short nodes stay while it makes progress, because it
+    /// would begin them before another worker received them.
     pub(crate) fn movable_at(&self) -> Duration {
         if self.waiting_time > self.enough() + SHORT { Duration::ZERO } else { self.last_move + STANDSTILL }
     }
 
-    /// The last of the nodes that it has not begun with, if it has enough without that one.
+    /// The last of the nodes that it has not begun, if the others are enough for it.
     pub(crate) fn excess(&self, spare_leases: usize) -> Option<NodeId> {
         let last = *self.waiting.last()?;
         let rest = self.waiting_time - self.leases.get(&last)?.assignment.time;
         (self.leases.len() > self.threads + spare_leases && rest >= self.enough()).then_some(last)
     }
 
-    /// Whether it was given something though it had enough.
+    /// Whether it was given a node although it had enough.
     #[cfg(test)]
     pub(crate) fn has_too_much(&self, spare_leases: usize) -> bool {
         let longest = self.waiting.iter().map(|node| self.leases[node].assignment.time).max().unwrap_or_default();
         self.leases.len() > self.threads + spare_leases && self.waiting_time - longest >= self.enough()
     }
 
-    /// Whether it gets leases like any other.
+    /// Whether it gets leases in the normal order.
     fn accepts(&self) -> bool {
         !self.is_draining && !self.is_clearing && self.alone_with.is_none()
     }
@@ -204,7 +203,7 @@ impl Member {
     }
 }
 
-/// Where a member is in the indices.
+/// A member's keys in the indices.
 #[derive(PartialEq, Eq)]
 struct Keys {
     rank: Option<Rank>,
@@ -213,7 +212,7 @@ struct Keys {
     stalled_since: Option<Duration>,
 }
 
-/// Who is next: first who has a place, then who is least busy for its threads, then who came first.
+/// The order in which members get leases: those with a place first, then the least busy for their threads, then the oldest.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 struct Rank {
     is_full: bool,
@@ -230,7 +229,7 @@ struct Load {
 
 impl Ord for Load {
     fn cmp(&self, other: &Self) -> Ordering {
-        // a / b < c / d without a division.
+        // Compares a / b with c / d without a division.
         (self.leases * other.threads).cmp(&(other.leases * self.threads))
     }
 }
@@ -255,13 +254,13 @@ pub(crate) struct Members {
     spare_leases: usize,
     by_id: BTreeMap<WorkerId, Member>,
     by_process: BTreeMap<ProcessName, WorkerId>,
-    /// Those that get leases like any other.
+    /// Those that get leases in the normal order.
     ranking: BTreeSet<Rank>,
-    /// Those of them that have executed nothing and hold nothing.
+    /// Those of them that have executed nothing and hold no lease.
     fresh: BTreeSet<WorkerId>,
-    /// Those of them that hold leases which another one could begin with at once.
+    /// Those of them that hold leases which another worker could begin at once.
     surplus: BTreeSet<((Duration, usize), WorkerId)>,
-    /// Those that have not begun with a node though they have a thread for it, since then.
+    /// Those with a free thread and leases that they have not begun, by the time of their last progress.
     stalled: BTreeSet<(Duration, WorkerId)>,
     deadlines: BTreeSet<(Duration, WorkerId)>,
 }
@@ -288,7 +287,7 @@ impl Members {
         self.by_id.get(&worker)
     }
 
-    /// The member that is this process.
+    /// The member whose process has this name.
     pub(crate) fn of_process(&self, name: ProcessName) -> Option<WorkerId> {
         self.by_process.get(&name).copied()
     }
@@ -316,7 +315,7 @@ impl Members {
         Some(member)
     }
 
-    /// Change a member; the indices follow.
+    /// Change a member and update the indices.
     pub(crate) fn change<T>(&mut self, worker: WorkerId, change: impl FnOnce(&mut Member) -> T) -> Option<T> {
         let member = self.by_id.get_mut(&worker)?;
         let before = member.keys(worker, self.spare_leases);
@@ -329,7 +328,7 @@ impl Members {
         Some(result)
     }
 
-    /// A worker was heard of: its membership and its leases go on.
+    /// Postpone the deadline of a worker, which has sent something.
     pub(crate) fn renew(&mut self, worker: WorkerId, deadline: Duration) {
         if let Some(member) = self.by_id.get_mut(&worker) {
             self.deadlines.remove(&(member.deadline, worker));
@@ -338,66 +337,67 @@ impl Members {
         }
     }
 
-    /// What a worker said of the progress of a node that it executes: whether that is news; `None` if it has no lease of it.
+    /// Set the reported progress of a node that a worker executes. Returns whether it has changed; `None` if the worker has no
+    /// lease of it.
     pub(crate) fn progress(&mut self, worker: WorkerId, node: NodeId, permille: u16) -> Option<bool> {
         let held = self.by_id.get_mut(&worker).and_then(|member| member.leases.get_mut(&node))?;
         Some(std::mem::replace(&mut held.permille, permille) != permille)
     }
 
-    /// When the first member is lost if nothing is heard.
+    /// When the first member is lost unless it sends something.
     pub(crate) fn next_deadline(&self) -> Option<Duration> {
         self.deadlines.first().map(|(deadline, _)| *deadline)
     }
 
-    /// Some member that is lost by now.
+    /// A member whose deadline has passed.
     pub(crate) fn silent(&self, now: Duration) -> Option<WorkerId> {
         self.deadlines.first().filter(|(deadline, _)| *deadline <= now).map(|(_, worker)| *worker)
     }
 
-    /// How many members get leases like any other.
+    /// The number of members that get leases in the normal order.
     pub(crate) fn accepting(&self) -> usize {
         self.ranking.len()
     }
 
-    /// Those that have a place, the least busy one first.
+    /// Those that have a place, least busy first.
     pub(crate) fn with_place(&self) -> impl Iterator<Item = WorkerId> {
         self.ranking.iter().take_while(|rank| !rank.is_full).map(|rank| rank.worker)
     }
 
-    /// Those that have a thread without a lease, the least busy one first.
+    /// Those that have a thread without a lease, least busy first.
     pub(crate) fn with_thread(&self) -> impl Iterator<Item = WorkerId> {
         let ranks = self.ranking.iter().take_while(|rank| !rank.is_full && rank.load.leases < rank.load.threads);
         ranks.map(|rank| rank.worker)
     }
 
-    /// One that gets leases and has few, perhaps too many for a place.
+    /// The least busy member that gets leases, even if it has no place.
     pub(crate) fn least_busy(&self) -> Option<WorkerId> {
         self.ranking.first().map(|rank| rank.worker)
     }
 
-    /// One that gets leases and holds none.
+    /// A member that gets leases and holds none.
     pub(crate) fn idle(&self) -> Option<WorkerId> {
         self.ranking.first().filter(|rank| rank.load.leases == 0).map(|rank| rank.worker)
     }
 
-    /// One that has executed nothing and holds nothing.
+    /// A member that has executed nothing and holds no lease.
     pub(crate) fn fresh(&self) -> Option<WorkerId> {
         self.fresh.first().copied()
     }
 
-    /// The one with the most to do that another one could begin with at once.
+    /// The member with the most work that another worker could begin at once.
     pub(crate) fn busiest(&self) -> Option<(WorkerId, &Member)> {
         let (_, worker) = self.surplus.last()?;
         Some((*worker, self.get(*worker)?))
     }
 
-    /// Those that have not begun with a node though they have had a thread for it since then or before.
+    /// Those with a free thread and unbegun leases that have made no progress since `since`.
     pub(crate) fn stalled(&self, since: Duration) -> impl Iterator<Item = (WorkerId, &Member)> {
         let stalled = self.stalled.iter().take_while(move |(begin, _)| *begin <= since);
         stalled.filter_map(|(_, worker)| Some((*worker, self.get(*worker)?)))
     }
 
-    /// Since when the first one is stalled of those that are so only since after `since`; of all if there is no such time.
+    /// The earliest last progress after `since` of such members; the earliest of all if `since` is `None`.
     pub(crate) fn next_stalled(&self, since: Option<Duration>) -> Option<Duration> {
         let first = match since {
             Some(since) => self.stalled.range((since, WorkerId(u64::MAX))..).next(),
@@ -406,7 +406,7 @@ impl Members {
         first.map(|(begin, _)| *begin)
     }
 
-    /// That every index says what the members say.
+    /// Check that the indices agree with the members.
     #[cfg(test)]
     pub(crate) fn check(&self) {
         let mut anew = Self::new(self.spare_leases);

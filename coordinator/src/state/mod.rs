@@ -23,7 +23,7 @@ pub(crate) use self::waiting::{Place, Waiting};
 use crate::events::{NodeName, Site};
 pub use crate::policy::Policy;
 
-/// Counts of a run, for people: none of them may reach a result.
+/// Counts of a run, to show to the user. No result may depend on them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct RunSummary {
     /// How many nodes were completed.
@@ -34,19 +34,19 @@ pub struct RunSummary {
     pub failed_nodes: usize,
     /// How many nodes were cancelled because their output was not needed any more.
     pub cancelled_nodes: usize,
-    /// How many leases were given out, and how often a node was run by the coordinator.
+    /// How many leases were given out, plus how often the coordinator ran a node.
     pub attempts: u64,
     /// How many nodes went back to the queue because their worker left.
     pub requeued_nodes: u64,
-    /// How many results came a second time, bit for bit the same, without having been asked for.
+    /// How many results were bit-identical copies that had not been asked for.
     pub duplicate_results: u64,
     /// How many nodes were given to a second worker because the first one was slow.
     pub speculated_nodes: u64,
     /// How many outputs were verified by running their node a second time.
     pub verified_nodes: u64,
-    /// How often a node became a suspect, to be run alone.
+    /// How often a node became a suspect, which runs alone.
     pub suspected_nodes: u64,
-    /// How many workers joined; one that reconnects counts again.
+    /// How many workers joined. One that reconnects is counted again.
     pub workers_joined: u64,
     /// How many workers left before the end.
     pub workers_left: u64,
@@ -58,7 +58,7 @@ pub struct RunSummary {
     pub output_bytes_received: u64,
 }
 
-/// What an assignment takes in memory beside what it points to.
+/// The memory of an assignment without the data that it points to.
 const ASSIGNMENT_BYTES: usize = 128;
 
 /// The coordinator's state.
@@ -72,49 +72,49 @@ pub struct Core {
     pub(crate) waiting: Waiting,
     pub(crate) members: Members,
     pub(crate) pace: Pace,
-    /// When a node will be slow for which a worker has nothing else to do.
+    /// When the next node becomes slow, if a worker has an idle thread for it.
     pub(crate) next_slow: Option<Duration>,
-    /// When a worker that was left its short nodes counts as stalled.
+    /// When the busiest worker counts as stalled, so that its unbegun short nodes may be moved.
     pub(crate) next_move: Option<Duration>,
-    /// When a suspect's patience ends.
+    /// When a waiting suspect stops waiting for a fresh worker.
     pub(crate) next_patience: Option<Duration>,
-    /// The worker that is being cleared for a suspect.
+    /// The worker that is being freed for a suspect.
     pub(crate) clearing: Option<WorkerId>,
     /// The latest deaths of workers that no suspect explains.
     pub(crate) unexplained: VecDeque<Unexplained>,
-    /// The processes that have lost their connection and may come back.
+    /// The processes that have lost their connection and may reconnect.
     pub(crate) departed: Departed,
-    /// Since when there is work but no worker.
+    /// Since when there has been work but no worker.
     pub(crate) starving: Option<Starving>,
-    /// How the last local worker ended, once none will be started again and no other can join.
+    /// How the last local worker ended, if none will be restarted and no other can join.
     pub(crate) given_up: Option<String>,
     pub(crate) summary: RunSummary,
-    /// What earlier coordinators of this run have left.
+    /// The outputs of earlier coordinators of this run.
     pub(crate) past_outputs: Option<Box<dyn PastOutputs>>,
 }
 
-/// What the coordinator knows of a node beside the graph.
+/// The coordinator's data about a node, in addition to the graph.
 #[derive(Debug, Default)]
 pub(crate) struct Record {
     /// How often it was given out.
     pub(crate) attempts: u32,
     pub(crate) place: Place,
-    /// Who has a lease of it: one worker, or two if one was slow.
+    /// The workers that have a lease of it: one, or two if the first was slow.
     pub(crate) holders: Vec<WorkerId>,
-    /// The coordinator runs it, since then.
+    /// Since when the coordinator itself has been running it.
     pub(crate) here_since: Option<Duration>,
-    /// Under which time [`Pace`] watches it.
+    /// The start time under which [`Pace`] watches it.
     pub(crate) watched: Option<Duration>,
-    /// Whether its output has to come twice.
+    /// Whether its output must be computed twice.
     pub(crate) is_verified: bool,
-    /// The first of these two outputs.
+    /// The first of the two outputs.
     pub(crate) candidate: Option<Box<Candidate>>,
-    /// Where its output, or its error, came from.
+    /// The origin of its output or its error.
     pub(crate) finished_by: Option<Site>,
-    /// How often it has lost a worker that executed it, for whatever reason but a drain.
+    /// How often a worker was lost while executing it, except by a drain.
     pub(crate) losses: u32,
     pub(crate) deaths: Deaths,
-    /// What it computes: known once it is ready, where the run is remembered.
+    /// The key of its computation, known once it is ready if the run has a journal.
     pub(crate) key: Option<NodeKey>,
 }
 
@@ -122,15 +122,15 @@ pub(crate) struct Record {
 #[derive(Debug)]
 pub(crate) struct Candidate {
     pub(crate) site: Site,
-    /// The process, as far as it was a member when it answered.
+    /// The process it came from, if it was a member then.
     pub(crate) process: Option<ProcessName>,
     pub(crate) attempt: u32,
     pub(crate) output: Blob,
-    /// How long it ran under this lease; `None` if it is not known to have run under it.
+    /// How long the node ran under this lease; `None` if unknown.
     pub(crate) took: Option<Duration>,
 }
 
-/// A worker's death that no suspect explains.
+/// The death of a worker that no suspect explains.
 #[derive(Debug)]
 pub(crate) struct Unexplained {
     pub(crate) when: Duration,
@@ -145,7 +145,7 @@ pub(crate) struct Starving {
 }
 
 impl Core {
-    /// The state at the begin of a run. `epoch` counts the coordinator processes of the run, from 1.
+    /// The state at the start of a run. `epoch` counts the coordinator processes of the run, from 1.
     #[must_use]
     pub fn new(policy: Policy, epoch: u64) -> Self {
         Self {
@@ -169,7 +169,7 @@ impl Core {
         }
     }
 
-    /// Complete nodes from what earlier coordinators of this run have left, wherever there is something.
+    /// Complete nodes from the outputs of earlier coordinators of this run, where available.
     #[must_use]
     pub fn with_past_outputs(self, past_outputs: Box<dyn PastOutputs>) -> Self {
         Self { past_outputs: Some(past_outputs), ..self }
@@ -181,7 +181,7 @@ impl Core {
         &self.graph
     }
 
-    /// What the run has cost so far.
+    /// The counts of the run so far.
     #[must_use]
     pub fn summary(&self) -> RunSummary {
         self.summary
@@ -208,8 +208,7 @@ impl Core {
         delays.into_iter().flatten().chain(starvation).min()
     }
 
-    /// Whether this attempt was given out. Any worker may answer for it, because a worker that has lost its connection comes back under
-    /// another number.
+    /// Whether this attempt was given out. Any worker may answer for it, because a worker that reconnects has a new number.
     pub(crate) fn was_given_out(&self, node: NodeId, attempt: u32) -> bool {
         self.look(node).is_some_and(|record| (1..=record.attempts).contains(&attempt))
     }
@@ -226,7 +225,7 @@ impl Core {
         NodeName { node, kind, label }
     }
 
-    /// The record of a node; the reactor makes one for each node before anything else happens to it.
+    /// The record of a node. The reactor adds it before any other change of the node.
     pub(crate) fn record(&mut self, node: NodeId) -> Option<&mut Record> {
         self.records.get_mut(usize::try_from(node.0).ok()?)
     }
@@ -236,12 +235,12 @@ impl Core {
         self.records.get(usize::try_from(node.0).ok()?)
     }
 
-    /// Whether a node has to run alone.
+    /// Whether a node must run alone.
     pub(crate) fn is_suspect(&self, node: NodeId) -> bool {
         self.look(node).is_some_and(|record| record.deaths.in_company >= self.policy.suspect_after)
     }
 
-    /// Let a node wait in another place.
+    /// Move a node to another waiting place.
     pub(crate) fn put(&mut self, node: NodeId, place: Place) {
         if let Some(record) = self.record(node) {
             let before = std::mem::replace(&mut record.place, place);
@@ -250,7 +249,7 @@ impl Core {
         }
     }
 
-    /// A worker gets a lease of a node.
+    /// Record a lease of a node for a worker.
     pub(crate) fn give(&mut self, worker: WorkerId, node: NodeId, attempt: u32, now: Duration) {
         let inputs = self.graph.input_blobs(node).unwrap_or_default();
         let spec = self.graph.spec(node);
@@ -268,14 +267,14 @@ impl Core {
         self.watch(node);
     }
 
-    /// A lease ends.
+    /// End a lease.
     pub(crate) fn end_lease(&mut self, worker: WorkerId, node: NodeId, now: Duration) -> Option<Held> {
         let held = self.members.change(worker, |member| member.end(node, now)).flatten()?;
         self.forget_holder(worker, node);
         Some(held)
     }
 
-    /// A worker that held a node does not any more.
+    /// Remove a worker from the holders of a node.
     pub(crate) fn forget_holder(&mut self, worker: WorkerId, node: NodeId) {
         if let Some(record) = self.record(node) {
             record.holders.retain(|holder| *holder != worker);
@@ -283,7 +282,7 @@ impl Core {
         self.watch(node);
     }
 
-    /// Watch the pace of a node that one worker executes and a second one might as well; forget that of any other.
+    /// Watch the pace of a node that one worker executes and a second one could run too; stop watching any other node.
     pub(crate) fn watch(&mut self, node: NodeId) {
         let wanted = match self.look(node).map(|record| record.holders.as_slice()) {
             Some([holder]) if !self.is_suspect(node) => {

@@ -1,4 +1,4 @@
-//! How long the nodes of each kind take, and which of those that run are slow.
+//! How long the nodes of each kind take, and which running nodes are slow.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::time::Duration;
@@ -7,10 +7,10 @@ use lookalike::graph::NodeId;
 
 use crate::policy::Speculation;
 
-/// How many of the latest nodes of a kind say what is usual.
+/// How many of the latest nodes of a kind determine its usual duration.
 const RECENT: usize = 63;
 
-/// A node of a kind without known duration is slow after this many times [`Speculation::after`].
+/// If the duration of its kind is unknown, a node is slow after this many times [`Speculation::after`].
 const UNKNOWN_IS_SLOW_AFTER: u32 = 12;
 
 /// How many nodes of a kind have to end before the duration of the kind is known.
@@ -20,22 +20,22 @@ pub(crate) const ESTABLISHED: usize = 8;
 #[derive(Debug, Default)]
 pub(crate) struct Pace {
     kinds: BTreeMap<String, KindPace>,
-    /// The longest time that any node has taken.
+    /// The longest time that any node took.
     longest: Duration,
 }
 
 #[derive(Debug, Default)]
 struct KindPace {
-    /// In order of their ends.
+    /// In order of completion.
     recent: VecDeque<Duration>,
-    /// The same, in order of length.
+    /// The same, sorted by length.
     sorted: Vec<Duration>,
-    /// Nodes that run on one worker and may be run on a second one, since when.
+    /// Nodes that run on one worker and could run on a second one, with their start times.
     running: BTreeSet<(Duration, NodeId)>,
 }
 
 impl Pace {
-    /// A node has taken so long.
+    /// Add the time that a node took.
     pub(crate) fn note(&mut self, kind: &str, took: Duration) {
         self.longest = self.longest.max(took);
         let pace = self.of(kind);
@@ -50,25 +50,25 @@ impl Pace {
         pace.sorted.insert(place, took);
     }
 
-    /// The recent median duration of a kind, once enough nodes have ended. One would not do: a busy coordinator may read the begin and
-    /// the end of a node at the same time.
+    /// The recent median duration of a kind, once enough nodes have ended. A single one is not enough, because a busy coordinator
+    /// may read the start and the end of a node at the same time.
     pub(crate) fn established(&self, kind: &str) -> Option<Duration> {
         self.kinds.get(kind).filter(|pace| pace.sorted.len() >= ESTABLISHED)?.usual()
     }
 
-    /// A node runs since then, and may be run on a second worker.
+    /// Watch a node that has run since `since` and could run on a second worker.
     pub(crate) fn watch(&mut self, kind: &str, since: Duration, node: NodeId) {
         self.of(kind).running.insert((since, node));
     }
 
-    /// Not any more.
+    /// Stop watching a node.
     pub(crate) fn forget(&mut self, kind: &str, since: Duration, node: NodeId) {
         if let Some(pace) = self.kinds.get_mut(kind) {
             pace.running.remove(&(since, node));
         }
     }
 
-    /// The slow node that has run for longest, of those that `is_wanted`.
+    /// The longest running slow node for which `is_wanted` holds.
     pub(crate) fn slowest(
         &self,
         speculation: Speculation,
@@ -83,11 +83,11 @@ impl Pace {
         self.kinds.values().filter_map(slowest_of).min().map(|(_, node)| node)
     }
 
-    /// When the next node will be slow that is not so yet.
+    /// When the next node becomes slow.
     pub(crate) fn next_slow(&self, speculation: Speculation, now: Duration) -> Option<Duration> {
         let next_of = |pace: &KindPace| {
             let limit = pace.limit(speculation, self.longest)?;
-            // Nodes that began at this time or before are slow already; before the limit has passed no node is.
+            // Nodes that started at or before this time are slow already. Before the limit has passed, no node is.
             let first = match now.checked_sub(limit) {
                 Some(begin) => pace.running.range((begin, NodeId(u64::MAX))..).next(),
                 None => pace.running.first(),
@@ -107,15 +107,15 @@ impl KindPace {
         self.sorted.get(self.sorted.len() / 2).copied()
     }
 
-    /// A node of this kind is slow after this time; `None`: never.
+    /// After how long a node of this kind is slow; `None` for never.
     fn limit(&self, speculation: Speculation, longest: Duration) -> Option<Duration> {
         let factor = speculation.factor?;
         let (known, least) = match self.usual() {
             Some(median) => (median, speculation.after),
-            // A node that is the only one of its kind may hang, too.
+            // The only node of its kind may hang, too.
             None => (longest, speculation.after.saturating_mul(UNKNOWN_IS_SLOW_AFTER)),
         };
-        // A policy's factor is finite; a time beyond all bounds is never reached.
+        // The factor of a policy is finite. A time that overflows is replaced by one that is never reached.
         let slow = Duration::try_from_secs_f64(known.as_secs_f64() * factor).unwrap_or(Duration::MAX / 2);
         Some(slow.max(least).min(Duration::MAX / 2))
     }
@@ -133,7 +133,7 @@ mod tests {
         let mut pace = Pace::default();
         pace.watch("search", 10 * SECOND, NodeId(1));
         let all = |_| true;
-        // Of the first one nobody knows, so it may take longer.
+        // The duration of its kind is unknown, so the limit is longer.
         assert_eq!(pace.next_slow(policy, 10 * SECOND), Some(70 * SECOND));
         pace.note("transport", 100 * SECOND);
         assert_eq!(pace.next_slow(policy, 10 * SECOND), Some(210 * SECOND));

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use lookalike::graph::NodeId;
 
-/// Where a node waits.
+/// The place where a node waits.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) enum Place {
     /// It does not wait for a worker.
@@ -13,15 +13,15 @@ pub(crate) enum Place {
     Nowhere,
     /// For any worker, with this priority.
     Queue(u32),
-    /// Until this time, because it has lost its worker repeatedly.
+    /// Until this time, because it has repeatedly lost its worker.
     Delayed(Duration),
-    /// For a worker of its own, since then.
+    /// For a worker on which it is the only node, since this time.
     Suspects(Duration),
-    /// For any other worker than the one whose output is to be checked.
+    /// For a worker other than the one whose output is to be verified.
     Checks,
 }
 
-/// All of them, by place.
+/// All waiting nodes, by place.
 #[derive(Debug, Default)]
 pub(crate) struct Waiting {
     /// By priority and number; the lowest goes first.
@@ -56,17 +56,17 @@ impl Waiting {
         };
     }
 
-    /// The node that any worker may have next.
+    /// The next node for any worker.
     pub(crate) fn next(&self) -> Option<NodeId> {
         self.queue.first().map(|(_, node)| *node)
     }
 
-    /// The node that has waited longest for a worker of its own, and since when.
+    /// The suspect that has waited longest, and since when.
     pub(crate) fn suspect(&self) -> Option<(Duration, NodeId)> {
         self.suspects.first().copied()
     }
 
-    /// The next nodes to be checked.
+    /// The next nodes to be verified.
     pub(crate) fn checks(&self) -> impl Iterator<Item = NodeId> {
         self.checks.iter().copied()
     }

@@ -1,4 +1,4 @@
-//! Which pixels count, and which are the object.
+//! The pixels that are compared, and those that are the object.
 
 use crate::inputs::{LoadedMask, LoadedPhoto};
 use anyhow::Context;
@@ -7,27 +7,27 @@ use lookalike::scene::SceneError;
 /// The coverage of a comparison.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Coverage {
-    /// What both images are multiplied by before they are scored; where it is above 0 is the object.
+    /// Both images are multiplied by this before they are scored. The object is where it is above 0.
     pub(super) judged: Vec<f32>,
     /// The pixels of value 1 decide an automatic exposure.
     pub(super) exposed: Vec<f32>,
-    /// What the object is.
+    /// How the object was determined.
     pub(super) object: Object,
 }
 
-/// Where it is known from what the object is.
+/// How the object was determined.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Object {
-    /// A mask was given.
+    /// By a mask that was given.
     Mask,
-    /// An alpha channel says it.
+    /// By an alpha channel.
     Alpha,
-    /// Nothing says: the whole image.
+    /// Neither: the object is the whole image.
     Image,
 }
 
 impl Object {
-    /// The word in JSON.
+    /// The word for it in JSON.
     pub(super) fn word(self) -> &'static str {
         match self {
             Self::Mask => "mask",
@@ -38,9 +38,9 @@ impl Object {
 }
 
 impl Coverage {
-    /// The mask, if there is one. Else the alpha channels (opaque in either image), but only if both images are black outside, so
-    /// that the score of the whole image is what it would be without them; colours with alpha hold their coverage already, so it
-    /// is not applied again. Else everything.
+    /// Uses the mask, if there is one. Otherwise uses the alpha channels (opaque in either image), but only if both images are
+    /// black outside, so that the score of the whole image does not change; the coverage is not applied again, because colours
+    /// with alpha are already multiplied by it. Otherwise uses the whole image.
     ///
     /// # Errors
     /// If the mask has another size than the images.

@@ -1,4 +1,4 @@
-//! The outcome of a comparison on stdout: a table for people, or JSON.
+//! Prints the result of a comparison on stdout: a table, or JSON.
 
 use super::coverage::{Coverage, Object};
 use crate::{
@@ -9,7 +9,7 @@ use anyhow::Context;
 use serde_json::{Map, Value, json};
 use std::io::{self, ErrorKind, Write};
 
-/// The numbers.
+/// The scores.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Outcome {
     /// Over the whole image.
@@ -20,7 +20,7 @@ pub(super) struct Outcome {
     pub(super) features: Option<[[f64; 5]; 2]>,
 }
 
-/// Everything that is told.
+/// Everything that the report shows.
 #[derive(Debug)]
 pub(super) struct Report<'a> {
     pub(super) settings: &'a CompareSettings,
@@ -37,7 +37,7 @@ impl Report<'_> {
     pub(super) fn print(&self) -> anyhow::Result<()> {
         let text = if self.settings.json { format!("{:#}\n", self.json()) } else { self.table() };
         match io::stdout().write_all(text.as_bytes()) {
-            // As behind `| head`.
+            // The reader has closed the pipe, as in `| head`.
             Err(error) if error.kind() == ErrorKind::BrokenPipe => Ok(()),
             written => written.context("cannot write to stdout"),
         }
@@ -99,10 +99,10 @@ impl Report<'_> {
     }
 }
 
-/// l_L, c_L, s_L, l_C, l_H.
+/// In the order l_L, c_L, s_L, l_C, l_H.
 const FEATURES: [&str; 5] = ["lightness", "contrast", "structure", "chroma", "hue"];
 
-/// How an exposure was chosen, for people.
+/// How the exposure was chosen, in words.
 fn exposure_source(asked: &DisplayExposure) -> String {
     match asked {
         DisplayExposure::Auto => "auto: 97th percentile of the reference's largest channel to 0.9".to_owned(),

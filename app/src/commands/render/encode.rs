@@ -1,4 +1,4 @@
-//! A rendering as a file: pixels and what they are.
+//! Encodes a rendering and its metadata as a file.
 
 use super::material::LoadedMaterial;
 use crate::{
@@ -27,7 +27,7 @@ pub(super) enum Format {
 }
 
 impl Format {
-    /// The format that the file's name asks for.
+    /// The format for a file's extension.
     pub(super) fn of(path: &Path) -> anyhow::Result<Self> {
         match path.extension().and_then(|extension| extension.to_str()).map(str::to_ascii_lowercase).as_deref() {
             Some("exr") => Ok(Self::OpenExr),
@@ -38,7 +38,7 @@ impl Format {
     }
 }
 
-/// What was rendered.
+/// A description of what was rendered, for the metadata.
 #[derive(Debug)]
 pub(super) struct Subject<'a> {
     pub(super) settings: &'a RenderSettings,
@@ -51,7 +51,7 @@ pub(super) struct Subject<'a> {
 #[derive(Debug)]
 pub(super) struct Encoded {
     pub(super) bytes: Vec<u8>,
-    /// The display exposure that is in the pixels.
+    /// The display exposure that the pixels are multiplied by.
     pub(super) exposure: Option<f64>,
 }
 
@@ -106,7 +106,7 @@ impl Subject<'_> {
     }
 }
 
-/// The automatic display exposure; none for a black object.
+/// The automatic display exposure; `None` for a black object.
 fn exposure(rendering: &Rendering) -> Option<f64> {
     auto_exposure(&rendering.image, &rendering.coverage).ok()
 }

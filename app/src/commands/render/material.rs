@@ -7,7 +7,7 @@ use crate::{
 use anyhow::Context;
 use lookalike::brdf::{Material, Reflectance, flat_names};
 
-/// A material with what names it in metadata.
+/// A material and its description for metadata.
 #[derive(Debug)]
 pub(super) struct LoadedMaterial {
     pub(super) reflectance: Box<dyn Reflectance>,

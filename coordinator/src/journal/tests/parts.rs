@@ -1,4 +1,4 @@
-//! What a journal says of the parts of a run, here the fits of a batch.
+//! The rows about the parts of a run, here the fits of a batch.
 
 use super::*;
 
@@ -20,7 +20,7 @@ fn what_fits_have_written_is_there_no_later_than_the_next_transaction() {
     options.parts.tell(fit("gold", "done", &[("fit.json", "12ab")]));
     options.parts.tell(fit("chrome", "running", &[]));
     write(&mut journal, [completed(1)]);
-    // Killed.
+    // As after a kill.
     let copy = copied(&folder);
     drop(journal);
     let path = copy.path().join(JOURNAL_FILE);
@@ -34,7 +34,7 @@ fn what_fits_have_written_is_there_no_later_than_the_next_transaction() {
         let rows = statement.query_map([], |row| Ok((row.get(0)?, row.get(1)?))).unwrap();
         rows.collect::<Result<_, _>>().unwrap()
     };
-    // The columns that fits had before they were parts.
+    // The view with the columns of the earlier table `fits`.
     let fits =
         "SELECT name, state FROM (SELECT name, number, state, cssim, seconds, error, outputs FROM fits) ORDER BY name";
     assert_eq!(names(fits), names("SELECT name, state FROM parts ORDER BY name"));
@@ -44,7 +44,7 @@ fn what_fits_have_written_is_there_no_later_than_the_next_transaction() {
         parts.into_iter().map(|fit| (fit.name, fit.state)).collect::<Vec<_>>()
     };
     assert_eq!(states(), [("chrome".to_owned(), "running".to_owned()), ("gold".to_owned(), "done".to_owned())]);
-    // Another process has had the lock, and is gone.
+    // Another process has held the lock and has ended.
     drop(RunLock::take(copy.path()).unwrap());
     assert_eq!(states()[0].1, "stopped");
 }

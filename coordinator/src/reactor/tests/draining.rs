@@ -21,7 +21,7 @@ fn death_of_a_draining_worker_counts_for_nobody() {
         bench.join(worker, 1);
         bench.start(worker, 0, bench.core.look(NodeId(0)).unwrap().attempts);
         bench.handle(Event::WorkerDrains { worker });
-        // Its time is over before it is done.
+        // Its time limit ends before its node does.
         assert_eq!(bench.lose(worker, Departure::Lost), ["n0 requeued, 0"]);
     }
 }

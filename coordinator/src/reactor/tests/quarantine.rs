@@ -65,7 +65,7 @@ fn innocent_node_completes_alone_and_its_worker_goes_on() {
 fn only_deaths_alone_and_while_executing_count_against_a_suspect() {
     let mut bench = suspected(independent(1));
     bench.join(A, 1);
-    // In transfer: nobody's fault.
+    // While it received the node: the death is not counted.
     assert_eq!(bench.lose(A, Departure::Lost), ["n0 requeued, 2"]);
     for departure in [Departure::Silent, Departure::Goodbye, Departure::TooSlow] {
         bench.join(A, 1);
@@ -86,7 +86,7 @@ fn nodes_that_shared_a_worker_with_a_killer_are_told_apart_from_it() {
         }
         bench.lose(worker, Departure::Lost);
     }
-    // Each gets a worker of its own, however many threads it has.
+    // Each gets a worker without other nodes, however many threads that has.
     assert_eq!(bench.join(A, 2), ["worker 1 gets 0.3"]);
     assert_eq!(bench.join(B, 2), ["worker 2 gets 1.3"]);
     bench.start(A, 0, 3);
@@ -100,7 +100,7 @@ fn nodes_that_shared_a_worker_with_a_killer_are_told_apart_from_it() {
     assert_eq!((&bench.planner.completed[..], bench.planner.failed.len()), (&[NodeId(1)][..], 1));
 }
 
-/// Worker 1 has executed something, and worker 2 has died of a node that had killed another one before. The node.
+/// Worker 1 has executed something, and worker 2 has died of a node that had killed another worker before. Returns that node.
 fn suspected_beside_a_worker(nodes: usize) -> (Bench, NodeId) {
     let mut bench = Bench::new(independent(nodes));
     bench.join(B, 1);
@@ -172,7 +172,7 @@ fn while_workers_die_that_executed_nothing_a_suspect_is_excused_but_not_for_ever
         deaths += 1;
         assert!(deaths < 99, "it fails in the end");
     }
-    // Three count, and ten times as many were not counted.
+    // Three are counted, and ten times as many were not.
     assert_eq!(deaths, 33);
 }
 

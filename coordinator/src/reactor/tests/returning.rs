@@ -1,4 +1,4 @@
-//! Connections that break though nobody has died: the same process comes back under another number.
+//! Connections that break without a death: the process reconnects under another number.
 
 use super::*;
 
@@ -26,7 +26,7 @@ fn connection_that_is_reset_time_and_again_fails_no_node() {
         worker = WorkerId(reset);
         let attempt = u32::try_from(reset).unwrap();
         let mut said = bench.join_as(worker, 1, process(LONG));
-        // After a few losses a node rests for a moment, but this one is being executed.
+        // After a few losses a node would wait before it is queued, but this one is being executed.
         if said.is_empty() {
             said = executes(&mut bench, worker, 0, attempt - 1);
         }
@@ -45,7 +45,7 @@ fn wire_that_cuts_all_off_at_once_makes_no_suspects_once_they_are_back() {
     for number in 1..=2 {
         bench.join_as(WorkerId(number), 2, process(number));
     }
-    // Two nodes have a death each behind them already, and are suspects for the moment.
+    // Two nodes have one death each already, and are suspects for now.
     for node in 0..4 {
         bench.core.record(NodeId(node)).unwrap().deaths.in_company = 1;
         let holder = bench.core.look(NodeId(node)).unwrap().holders[0];
@@ -75,7 +75,7 @@ fn process_that_does_not_come_back_has_died_and_one_that_has_executed_something_
     bench.start(B, 0, 2);
     bench.lose(B, Departure::Lost);
     assert!(bench.core.is_suspect(NodeId(0)));
-    // Back, and with a death taken back: no suspect any more.
+    // It reconnects, and a death is subtracted: the node is no longer a suspect.
     bench.join_as(C, 1, process(8));
     assert_eq!(deaths(&bench, 0), 1);
     bench.core.record(NodeId(0)).unwrap().deaths.in_company = 2;
@@ -98,7 +98,7 @@ fn what_a_returned_worker_still_executes_it_goes_on_with() {
     bench.join_as(A, 1, process(LONG));
     bench.start(A, 0, 1);
     bench.lose(A, Departure::Silent);
-    // Node 0 goes to worker 2, which has not begun with it.
+    // Node 0 goes to worker 2, which has not begun it.
     bench.join(B, 1);
     bench.join_as(C, 1, process(LONG));
     let attempt = bench.core.look(NodeId(0)).unwrap().attempts;
@@ -110,7 +110,7 @@ fn what_a_returned_worker_still_executes_it_goes_on_with() {
     let member = bench.core.members.get(C).unwrap();
     assert!(!member.waiting.contains(&NodeId(0)), "its thread is taken");
     assert!(!member.has_too_much(2));
-    // Told again before it has read that.
+    // Reported again under the old lease, before it has read the new one.
     assert!(executes(&mut bench, C, 0, 1).is_empty());
 }
 
@@ -145,7 +145,7 @@ fn what_a_returned_worker_executes_for_nothing_is_stopped() {
     bench.finish(B, 0, 2, 5);
     bench.join_as(C, 1, process(LONG));
     assert_eq!(executes(&mut bench, C, 0, 1), ["worker 3 drops 0.1"]);
-    // Of what was taken back on this connection it has been told.
+    // The cancellation of what was taken back on this connection has been sent.
     let attempt = bench.core.look(NodeId(1)).unwrap().attempts;
     bench.finish(C, 1, attempt, 1);
     assert!(executes(&mut bench, C, 1, attempt).is_empty());

@@ -1,6 +1,7 @@
 use super::*;
 
-/// Worker 1 with one thread, which has done the first ten nodes, each in so long: eight to know it, and two that were given before.
+/// Worker 1 with one thread has finished the first ten nodes, each in this time: eight establish the duration of the kind, and
+/// two were given out before.
 fn practised(nodes: usize, took: Duration) -> Bench {
     let mut bench = Bench::new(independent(nodes));
     bench.join(A, 1);
@@ -29,7 +30,7 @@ fn node_that_is_heard_of_late_has_taken_as_long_as_it_has() {
     let mut bench = Bench::new(independent(1000));
     bench.join(A, 1);
     for node in 0..20 {
-        // The reactor was busy: begin and end are looked at back to back.
+        // The reactor was busy, so it processes begin and end one after the other.
         let (began, ended) = (bench.now, bench.now + Duration::from_secs(2));
         bench.now += Duration::from_secs(3);
         let start = Event::Started { worker: A, node: NodeId(node), attempt: 1 };

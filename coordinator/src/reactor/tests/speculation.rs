@@ -1,6 +1,6 @@
 use super::*;
 
-/// Four nodes of which three are done, each in two seconds; the first runs since then on worker 1, and worker 2 is idle.
+/// Of four nodes, three have taken two seconds each. The first one is still running on worker 1, and worker 2 is idle.
 fn one_slow() -> Bench {
     let mut bench = Bench::new(independent(4));
     bench.join(A, 1);
@@ -18,14 +18,14 @@ fn one_slow() -> Bench {
 #[test]
 fn slow_node_is_given_to_an_idle_worker_when_its_time_has_come() {
     let mut bench = one_slow();
-    // Twice the median are four seconds, but no node is slow before five, and six have passed.
+    // Twice the median is four seconds, but no node is slow before five. Six have passed.
     assert_eq!(bench.core.summary().speculated_nodes, 1);
     assert_eq!(bench.core.look(NodeId(0)).unwrap().holders, [A, B]);
     bench.start(B, 0, 2);
     let first = bench.finish(B, 0, 2, 7);
     assert_eq!(first, ["worker 2 is thanked for 0.2", "worker 1 drops 0.1"]);
     assert!(bench.core.is_finished());
-    // The slow one answers all the same.
+    // The slow worker answers too.
     assert_eq!(bench.finish(A, 0, 1, 7), ["worker 1 is thanked for 0.1"]);
     assert_eq!(bench.core.summary().duplicate_results, 1);
     let error = bench.try_handle(finished(Site::Worker(A), 0, 1, 8)).unwrap_err();
@@ -41,7 +41,7 @@ fn reactor_is_woken_when_a_node_becomes_slow() {
     bench.start(B, 1, 2);
     bench.live(3000, &[A, B]);
     bench.finish(B, 1, 2, 1);
-    // Heartbeats go on; at six seconds it is twice as slow as the other one.
+    // Heartbeats arrive. After six seconds the node has taken twice as long as the other one.
     bench.live(2500, &[A, B]);
     assert_eq!(bench.core.next_deadline(), Some(Duration::from_secs(6)));
     assert_eq!(bench.live(500, &[A, B]), ["worker 2 gets 0.2", "n0 is slow, worker 2 helps"]);
@@ -74,7 +74,7 @@ fn helper_that_leaves_is_replaced_and_the_first_worker_keeps_its_lease() {
     let mut bench = one_slow();
     assert!(bench.lose(B, Departure::Lost).is_empty(), "worker 1 still has the node");
     assert_eq!(bench.join(C, 1), ["worker 3 gets 0.3", "n0 is slow, worker 3 helps"]);
-    // Worker 1 goes: worker 3 goes on.
+    // Worker 1 leaves; worker 3 continues.
     assert!(bench.lose(A, Departure::Silent).is_empty());
     bench.start(C, 0, 3);
     bench.finish(C, 0, 3, 1);
@@ -96,7 +96,7 @@ fn worker_that_does_not_begin_is_helped() {
 fn suspect_is_never_run_twice_at_a_time() {
     let mut bench = one_slow();
     bench.start(B, 0, 2);
-    // Two deaths while others may still run it.
+    // Two deaths, while others may still run it.
     assert_eq!(bench.lose(B, Departure::Lost).len(), 0);
     assert_eq!(bench.join(C, 1)[0], "worker 3 gets 0.3");
     bench.start(C, 0, 3);

@@ -12,7 +12,7 @@ fn output_is_believed_once_another_worker_has_it_too() {
     bench.start(A, 0, 1);
     assert_eq!(bench.finish(A, 0, 1, 5), ["worker 1 is thanked for 0.1", "worker 2 gets 0.2"]);
     assert!(bench.planner.completed.is_empty() && !bench.core.is_finished());
-    // Sent again by the first one: that is no second computation.
+    // The first worker sends its output again, which is not a second computation.
     bench.finish(A, 0, 1, 5);
     assert!(!bench.core.is_finished());
     bench.finish(B, 0, 2, 5);
@@ -53,7 +53,7 @@ fn only_worker_verifies_its_own_output() {
     bench.join(A, 1);
     assert_eq!(bench.finish(A, 0, 1, 5), ["worker 1 is thanked for 0.1", "worker 1 gets 0.2"]);
     bench.finish(A, 0, 2, 5);
-    // With another one there, its output waits for that one, busy or not.
+    // If there is another worker, the output waits for it, whether or not it is busy.
     bench.join(B, 1);
     let held: Vec<u64> = bench.core.members.get(B).unwrap().leases.keys().map(|node| node.0).collect();
     let (first, second) = if held.is_empty() { (A, B) } else { (B, A) };
@@ -109,14 +109,14 @@ fn one_computation_that_is_answered_under_two_leases_verifies_nothing() {
     let mut bench = Bench::with(independent(1), all());
     bench.join_as(A, 1, process(7));
     bench.start(A, 0, 1);
-    // It has finished when its connection falls silent, and comes back with the answer.
+    // It has finished when its connection becomes silent, and reconnects with the answer.
     bench.lose(A, Departure::Silent);
     assert_eq!(bench.join_as(B, 1, process(7)), ["worker 2 gets 0.2"]);
     bench.finish(B, 0, 1, 5);
     bench.finish(B, 0, 2, 5);
     assert!(!bench.core.is_finished());
     assert_eq!(bench.core.summary().verified_nodes, 0);
-    // Computed anew, which begins with a word.
+    // Computed again, which begins with a report.
     let attempt = bench.core.look(NodeId(0)).unwrap().attempts;
     bench.start(B, 0, attempt);
     bench.finish(B, 0, attempt, 5);
