@@ -9,6 +9,7 @@ use std::thread::{available_parallelism, sleep};
 use std::time::{Duration, Instant, SystemTime};
 
 use lookalike_coordinator::access::Credentials;
+use lookalike_tests::PATIENCE;
 use lookalike_tests::cluster::read_access;
 use lookalike_tests::gate::{Gate, Waiting};
 use lookalike_tests::journal::JournalView;
@@ -21,9 +22,6 @@ const WORKER: &str = env!("CARGO_BIN_EXE_lookalike-worker-under-test");
 
 /// How many nodes wait at the gate in the test of all phases.
 const GATES: usize = 4;
-
-/// A resumed run that takes longer hangs.
-const PATIENCE: Duration = Duration::from_secs(60);
 
 /// A run of this many gates with this many local workers, started or resumed.
 fn coordinator(gate: &Gate, leaves: usize, workers: usize, folder: &TempDir) -> Process {

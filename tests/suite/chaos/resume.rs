@@ -4,10 +4,11 @@
 
 use std::process::Command;
 use std::sync::mpsc::RecvTimeoutError;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 use std::{fs, io, path::Path};
 
 use lookalike::math::sampling::{key, uniform};
+use lookalike_tests::PATIENCE;
 use lookalike_tests::journal::JournalView;
 use lookalike_tests::process::Process;
 
@@ -22,9 +23,6 @@ const FLAGS: &str = "--samples 32 --gammas 1:2:0.2 --seed 5 --polish off";
 
 /// Columns and rows of the photo.
 const SIZE: usize = 24;
-
-/// A run that prints nothing for longer hangs.
-const PATIENCE: Duration = Duration::from_secs(60);
 
 /// The most workers of a coordinator, and the most coordinators that are killed in a run.
 const MOST: (u64, u64) = (6, 3);

@@ -1,6 +1,6 @@
 //! How a fit ends when it fails: exit codes, messages, and no process left.
 
-use super::scene::{QUICK, QUICK_POLISHED, fit, folder};
+use super::scene::{QUICK, QUICK_POLISHED, fit, folder, folder_of_size};
 use lookalike_tests::{
     journal::JournalView,
     process::{Process, signal},
@@ -10,8 +10,8 @@ use std::{fs, process::Command};
 
 #[test]
 fn missed_max_cssim_is_code_one_with_all_results_written() {
-    let folder = folder();
-    let answer = fit(folder.path(), "out", &format!("{QUICK_POLISHED} --max-cssim 0"));
+    let folder = folder_of_size(20);
+    let answer = fit(folder.path(), "out", &format!("{QUICK_POLISHED} --gammas 1 --max-cssim 0"));
     assert_eq!(answer.code, Some(1), "{}", answer.stderr);
     assert!(answer.stderr.contains("more than --max-cssim 0"), "{}", answer.stderr);
     assert!(answer.stdout.contains("polished") && folder.path().join("out/fit.json").exists());

@@ -7,14 +7,19 @@ use lookalike_tests::{journal::JournalView, process::Process};
 use serde_json::Value;
 use std::{fs, path::Path, process::Command};
 
-/// [`MANY_NODES`], exploration and polish: at least 16 nodes.
-const WITH_POLISH: &str = "--samples 128 --gammas 1:2:0.2 --seed 5 --workers 2";
+/// Two shards, the coarse table, two searches, one full table, judging, exploration, polish, pictures: at least 10 nodes; with
+/// `--features slow` four shards and six searches, at least 16 nodes.
+const WITH_POLISH: &str = if cfg!(feature = "slow") {
+    "--samples 128 --gammas 1:2:0.2 --seed 5 --workers 2"
+} else {
+    "--samples 64 --gammas 1:2:1 --seed 5 --workers 2"
+};
 
 /// The undisturbed fit of [`WITH_POLISH`].
 static WHOLE: Finished = Finished::new(WITH_POLISH);
 
 /// After how many finished nodes a fit is killed; 0 is when the first worker joins.
-const KILLS: &[usize] = if cfg!(feature = "slow") { &[0, 1, 4, 7, 11, 13] } else { &[1, 11] };
+const KILLS: &[usize] = if cfg!(feature = "slow") { &[0, 1, 4, 7, 11, 13] } else { &[1, 7] };
 
 /// Starts a fit and kills it with SIGKILL after this many finished nodes; 0 is when the first worker joins.
 fn kill_after(folder: &Path, out: &str, flags: &str, finished: usize) {

@@ -1,7 +1,7 @@
 //! The same bits everywhere (design sections 2 and 9): with any number of workers, a worker killed while executing, no workers, any SIMD
 //! level.
 
-use super::scene::{fit, fit_json, folder, without_timing};
+use super::scene::{fit, fit_json, folder, folder_of_size, without_timing};
 use lookalike::{
     fit::Method,
     graph::{Execution, run_in_process},
@@ -20,7 +20,7 @@ use std::{
     fs,
     path::Path,
     process::Command,
-    sync::{Arc, Mutex, OnceLock, PoisonError},
+    sync::{Arc, Mutex, PoisonError},
 };
 
 /// Several shards of the subset's table, so that a worker can be killed between them.
@@ -68,7 +68,8 @@ fn results_do_not_depend_on_the_number_or_deaths_of_workers() {
             assert!(one == same, "{file} of {other}");
         }
     }
-    assert_eq!(numbers_of(detected()), numbers_in(&fit_json(&out("1"))));
+    let reference = in_this_process(folder.path(), Level::Detected, 128);
+    assert_eq!(numbers_of(&reference), numbers_in(&fit_json(&out("1"))));
 }
 
 #[test]
@@ -77,20 +78,16 @@ fn results_do_not_depend_on_the_simd_level() {
         println!("skipped: this processor has only the baseline's instructions");
         return;
     }
-    let (detected, baseline) = (detected(), in_this_process(folder().path(), Level::Baseline));
-    assert_eq!(numbers_of(detected), numbers_of(&baseline));
+    let (folder, samples) = (folder_of_size(24), 32);
+    let [detected, baseline] =
+        [Level::Detected, Level::Baseline].map(|level| in_this_process(folder.path(), level, samples));
+    assert_eq!(numbers_of(&detected), numbers_of(&baseline));
     assert!(detected.matched == baseline.matched, "the images differ");
     assert!(detected.error_map == baseline.error_map, "the error maps differ");
 }
 
-/// The fit of [`FLAGS`] without workers, at the processor's own SIMD level.
-fn detected() -> &'static FitOutcome {
-    static DETECTED: OnceLock<FitOutcome> = OnceLock::new();
-    DETECTED.get_or_init(|| in_this_process(folder().path(), Level::Detected))
-}
-
-/// The fit of [`FLAGS`] without workers, at a SIMD level.
-fn in_this_process(folder: &Path, level: Level) -> FitOutcome {
+/// The fit of [`FLAGS`] with this number of samples, without workers, at a SIMD level.
+fn in_this_process(folder: &Path, level: Level, samples: u32) -> FitOutcome {
     // The SIMD level is global to the process, so one fit runs at a time.
     static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
     let _guard = ONE_AT_A_TIME.lock().unwrap_or_else(PoisonError::into_inner);
@@ -102,7 +99,7 @@ fn in_this_process(folder: &Path, level: Level) -> FitOutcome {
     let coverage = capture.scoring_coverage();
     let exposure = resolve_display_exposure(&DisplayExposure::Auto, capture.photo(), &coverage).unwrap();
     let gammas = vec![1.0, 1.5, 2.0, 2.5, 3.0];
-    let method = Method { samples: SampleCount::Draws(128), seed: 5, gammas, ..Method::default() };
+    let method = Method { samples: SampleCount::Draws(samples), seed: 5, gammas, ..Method::default() };
     let planner = FitPlanner::new(Arc::new(capture), method, exposure).unwrap();
     simd::limit(level);
     let planner = run_in_process(planner, &nodes::registry(), Execution::Parallel);

@@ -19,6 +19,11 @@ use lookalike_tests::scene::{Scene, spread, synthetic};
 /// The material of the sphere: `None` is white Lambert, else a metal of F = 1 with this alpha.
 type Surface = Option<f64>;
 
+/// How many pixels are compared: `most` with `--features slow`.
+const fn count(few: usize, most: usize) -> usize {
+    if cfg!(feature = "slow") { most } else { few }
+}
+
 fn render(scene: &Scene, pixels: &[Pixel], surface: Surface, accuracy: Accuracy) -> Planes {
     // Cook-Torrance without specular colour is purely diffuse; GGX always reflects at grazing angles.
     let (model, colour): (&'static dyn Model, &str) =
@@ -49,7 +54,7 @@ fn difference(a: &Planes, b: &Planes) -> f64 {
 #[test]
 fn white_lambertian_sphere_in_constant_light_has_its_radiance() {
     let scene = sphere(synthetic::uniform(2.5));
-    let pixels = spread(&scene.interior(), 64, 3);
+    let pixels = spread(&scene.interior(), count(24, 64), 3);
     for plane in render(&scene, &pixels, None, Accuracy::SUBSET) {
         // The map has 16 rows of texels; this is the error of a cut at the kink at the horizon.
         assert!(plane.iter().all(|value| (value / 2.5 - 1.0).abs() < 2e-3), "{plane:?}");
@@ -60,7 +65,7 @@ fn white_lambertian_sphere_in_constant_light_has_its_radiance() {
 fn sharp_lobe_of_unit_fresnel_conserves_energy_in_constant_light() {
     let scene = sphere(synthetic::uniform(1.0));
     // Away from the rim, masking removes less than alpha^2 of a sharp lobe.
-    let pixels: Vec<Pixel> = (0..32).map(|i| [128 + 3 * i, 128 - 2 * i]).collect();
+    let pixels: Vec<Pixel> = (0..32).step_by(32 / count(8, 32)).map(|i| [128 + 3 * i, 128 - 2 * i]).collect();
     for plane in render(&scene, &pixels, Some(0.02), Accuracy::SUBSET) {
         assert!(plane.iter().all(|value| (value - 1.0).abs() < 2e-3), "{plane:?}");
     }
@@ -79,7 +84,7 @@ fn sharpest_lobe_mirrors_smooth_light() {
     };
     let map = Image::from_pixels(width, height, (0..width * height).map(texel).collect());
     let scene = sphere(Environment::new(map).unwrap());
-    let pixels: Vec<Pixel> = (0..32).map(|i| [128 - 3 * i, 128 + i]).collect();
+    let pixels: Vec<Pixel> = (0..32).step_by(32 / count(8, 32)).map(|i| [128 - 3 * i, 128 + i]).collect();
     let planes = render(&scene, &pixels, Some(0.005), Accuracy::SUBSET);
     for (pixel, value) in pixels.iter().zip(&planes[0]) {
         let surface = scene.geometry.point(f64::from(pixel[0]) + 0.5, f64::from(pixel[1]) + 0.5).unwrap();
@@ -99,7 +104,7 @@ fn rotating_the_map_equals_shifting_its_columns() {
     let pixels = (0..width * image.height()).map(shifted).collect();
     let shifted = Environment::new(Image::from_pixels(width, image.height(), pixels)).unwrap();
     let (turned, shifted) = (sphere(map.rotated(90.0)), sphere(shifted));
-    let pixels = spread(&turned.interior(), 64, 4);
+    let pixels = spread(&turned.interior(), count(16, 64), 4);
     for surface in [None, Some(0.1)] {
         let accuracy = Accuracy { tolerance: 1e-4, footprint: 1.0 };
         let [a, b] = [&turned, &shifted].map(|scene| render(scene, &pixels, surface, accuracy));
@@ -114,7 +119,7 @@ fn near_mirror_pixel_is_the_mean_of_an_eight_times_finer_image() {
     const FINER: u32 = 8;
     let scene = sphere(synthetic::room(256));
     let fine = Scene::sphere(256 * FINER as usize, Camera::Orthographic, synthetic::room(256)).unwrap();
-    let pixels = spread(&scene.interior(), 24, 5);
+    let pixels = spread(&scene.interior(), count(6, 24), 5);
     let inside = |[c, r]: Pixel| (0..FINER * FINER).map(move |k| [c * FINER + k % FINER, r * FINER + k / FINER]);
     let parts: Vec<Pixel> = pixels.iter().flat_map(|&pixel| inside(pixel)).collect();
     let accuracy = Accuracy { tolerance: 1e-4, footprint: 1.0 };
@@ -145,7 +150,7 @@ fn normal_map_of_the_sphere_gives_the_image_of_the_sphere() {
         let [x, y] = p.map(|k| (f64::from(k) - 127.5) / 128.0);
         x * x + y * y < 0.95 * 0.95 && mapped.geometry.is_interior(p[0] as usize, p[1] as usize)
     };
-    let pixels = spread(&scene.interior().into_iter().filter(inner).collect::<Vec<_>>(), 100, 6);
+    let pixels = spread(&scene.interior().into_iter().filter(inner).collect::<Vec<_>>(), count(24, 100), 6);
     for surface in [None, Some(0.02), Some(0.2)] {
         let accuracy = Accuracy { tolerance: 1e-4, footprint: 1.0 };
         let [a, b] = [&scene, &mapped].map(|scene| render(scene, &pixels, surface, accuracy));

@@ -33,7 +33,7 @@ pub(super) struct Comparison {
     pub(super) live: usize,
 }
 
-pub(super) static ROOM: Comparison = Comparison { build: room, stored: 12, live: 24 };
+pub(super) static ROOM: Comparison = Comparison { build: room, stored: 24, live: 24 };
 pub(super) static SUN: Comparison = Comparison { build: sun, stored: 24, live: 64 };
 pub(super) static PERSPECTIVE: Comparison = Comparison { build: perspective, stored: 12, live: 24 };
 

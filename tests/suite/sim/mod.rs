@@ -22,7 +22,7 @@ use std::time::Duration;
 use self::run::{Ending, simulate};
 
 /// How many seeds are simulated.
-const SEEDS: u64 = if cfg!(feature = "slow") { 1000 } else { 12 };
+const SEEDS: u64 = if cfg!(feature = "slow") { 1000 } else { 24 };
 
 /// How many seeds are simulated twice.
 const REPLAYS: u64 = if cfg!(feature = "slow") { 5 } else { 1 };
