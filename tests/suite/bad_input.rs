@@ -131,7 +131,7 @@ fn unusable_images_to_compare_are_refused() {
     }
     write_exr(&folder.path().join("dark.exr"), &image(24, 24, |_, _| [0.0; 3]));
     lookalike(folder.path(), "compare dark.exr photo.exr --display-exposure auto")
-        .refused(&["--display-exposure auto", "the 97th percentile is 0"]);
+        .refused(&["--display-exposure auto", "is 0, expected a positive radiance"]);
     write_png(&folder.path().join("nothing.png"), &image(24, 24, |_, _| [0.0; 3]));
     lookalike(folder.path(), "compare photo.exr photo.exr --mask nothing.png").refused(&["check the mask"]);
 }
@@ -177,7 +177,7 @@ fn unusable_photos_of_a_fit_are_refused() {
         ("half_nan.exr", None, None, &["are not finite, the first at column"]),
         ("white.png", None, None, &["no usable pixel", "clipped"]),
         ("photo.exr", Some("small.png"), None, &["small.png as the mask", "12 x 12"]),
-        ("photo.exr", Some("nothing.png"), None, &["cannot place the sphere", "white is the object"]),
+        ("photo.exr", Some("nothing.png"), None, &["cannot place the sphere", "make the object white"]),
         ("photo.exr", None, Some("wide.exr"), &["wide.exr as the normal map", "20 x 8", "24 x 24"]),
     ] {
         let message = capture(folder.path(), photo, mask, normals).unwrap_err();
