@@ -34,7 +34,7 @@ impl Ledger {
     pub(super) fn read(folder: &Path) -> anyhow::Result<Self> {
         let path = folder.join(LEDGER);
         let text = match fs::read_to_string(&path) {
-            Err(error) if error.kind() == std::io::ErrorKind::NotFound => String::new(),
+            Err(error) if error.kind() == io::ErrorKind::NotFound => String::new(),
             text => text.with_context(|| format!("cannot read {}", path.display()))?,
         };
         let mut state = State::default();
