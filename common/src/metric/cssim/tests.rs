@@ -128,7 +128,9 @@ fn invalid_input_is_an_error_with_coordinates() {
     let found = message(Judge::new(&image, &coverage, 1.0, &options));
     assert!(found.contains("the reference must be finite"), "{found}");
     assert!(judge.score(&Image::new(100, 89)).is_err());
-    assert!(message(Judge::new(&reference, &coverage[1..], 1.0, &options)).contains("expected 9000, found 8999"));
+    assert!(
+        message(Judge::new(&reference, &coverage[1..], 1.0, &options)).contains("expected 9000 values, found 8999")
+    );
     assert!(message(Judge::new(&reference, &coverage, 0.0, &options)).contains("exposure"));
     assert_eq!(message(Judge::new(&reference, &vec![0.0; 9000], 1.0, &options)), MetricError::NoObject.to_string());
     let mut corner = vec![0.0; 9000];
