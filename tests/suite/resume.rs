@@ -122,8 +122,12 @@ fn remote_worker_drops_its_nodes_and_joins_the_next_coordinator_as_a_new_member(
     // The node finishes while there is no coordinator, so its result is not journalled and is lost.
     finishes.release();
     let second = coordinator(&gate, leaves, 1, &folder);
-    (0..leaves).for_each(|_| gate.next().release());
-    // The old execution keeps its thread until it ends; its output is dropped.
+    // The old execution keeps its thread until it ends, so one thread more than those of the local worker executes.
+    let waiting: Vec<Waiting> = (0..=threads).map(|_| gate.next()).collect();
+    assert_eq!(waiting.iter().filter(|waiting| waiting.process() == remote_id).count(), 1, "the remote worker joined");
+    waiting.into_iter().for_each(Waiting::release);
+    (threads + 1..leaves).for_each(|_| gate.next().release());
+    // Its output is dropped.
     executes.release();
     let output = finish(second, "a remote worker");
     assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));

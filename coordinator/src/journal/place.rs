@@ -41,12 +41,12 @@ fn is_network(kind: i128) -> bool {
     NETWORK.iter().any(|(_, magic)| kind & 0xFFFF_FFFF == i128::from(*magic))
 }
 
-#[cfg(all(test, target_os = "linux"))]
+#[cfg(test)]
 mod tests {
-    use super::*;
-
+    #[cfg(target_os = "linux")]
     #[test]
     fn network_file_systems_are_known_by_their_numbers() {
+        use super::{Path, is_network, is_shared};
         assert!(is_network(0x6969) && is_network(0xFE53_4D42));
         // As a signed 32-bit number.
         assert!(is_network(i128::from(0xFF53_4D42_u32.cast_signed())));

@@ -8,11 +8,9 @@ const PICTURES: [&str; 5] = ["match.exr", "match.png", "reference.png", "differe
 
 #[test]
 fn fits_of_a_batch_equal_single_fits_wherever_they_are_judged() {
-    let manifest = format!(
-        "photos = ['photo.exr', 'red.exr']\nenvironments = 'map.exr'\nmodels = ['ggx', 'cook-torrance']\n[defaults]\nsamples = 32\ngammas = '1:2:0.5'\n\
-         [[fit]]\nname = 'again'\nphoto = 'photo.exr'\nenv = 'map.exr'\njudge = 'object'\n"
-    );
-    let folder = folder(&manifest);
+    let manifest = "photos = ['photo.exr', 'red.exr']\nenvironments = 'map.exr'\nmodels = ['ggx', 'cook-torrance']\n[defaults]\nsamples = 32\ngammas = '1:2:0.5'\n\
+         [[fit]]\nname = 'again'\nphoto = 'photo.exr'\nenv = 'map.exr'\njudge = 'object'\n";
+    let folder = folder(manifest);
     batch(&folder, "here", "--workers 1").done();
     batch(&folder, "there", "--workers 2 --stage-two workers").done();
     let alone = [

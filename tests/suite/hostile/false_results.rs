@@ -54,9 +54,9 @@ fn wrong_table_is_detected_if_all_outputs_are_verified() {
 fn wrong_table_is_not_detected_without_verification_as_the_threat_model_states() {
     // On fewer pixels the bit that is wrong is rounded away.
     let folder = folder_of_size(48);
-    let (code, said) = fit_with_a_liar(folder.path(), "transport", "--verify-fraction 0", false);
+    let (code, said) = fit_with_a_liar(folder.path(), "transport-full", "--verify-fraction 0", false);
     assert_eq!(code, Some(0), "{said}");
     fit(folder.path(), "honest", &format!("{FLAGS} --workers 1")).done();
-    let [honest, spoilt] = ["honest", "transport"].map(|name| without_timing(&folder.path().join(name)));
+    let [honest, spoilt] = ["honest", "transport-full"].map(|name| without_timing(&folder.path().join(name)));
     assert_ne!(honest, spoilt, "the lie had no effect: the test proves nothing");
 }
