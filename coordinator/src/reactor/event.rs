@@ -79,7 +79,7 @@ pub enum Event {
         /// How the last one ended.
         last_status: String,
     },
-    /// The time [`Core::next_deadline`] has been reached.
+    /// The time [`Core::next_deadline`](crate::state::Core::next_deadline) has been reached.
     DeadlinePassed,
     /// The planner may have nodes to add although no node has ended.
     LookAgain,

@@ -33,7 +33,7 @@ pub(super) struct Comparison {
     pub(super) live: usize,
 }
 
-pub(super) static ROOM: Comparison = Comparison { build: room, stored: 24, live: 24 };
+pub(super) static ROOM: Comparison = Comparison { build: room, stored: 12, live: 24 };
 pub(super) static SUN: Comparison = Comparison { build: sun, stored: 24, live: 64 };
 pub(super) static PERSPECTIVE: Comparison = Comparison { build: perspective, stored: 12, live: 24 };
 
@@ -69,7 +69,9 @@ fn perspective(pixels: usize, rigour: Rigour) -> Case {
 /// The whole path under light with texture, windows and a sun of one texel: both lobes and both Fresnel parts of every model.
 #[test]
 fn tables_agree_with_the_direct_integrator_in_a_room() {
-    ROOM.check();
+    // The stored reference has 12 pixels, which are too few for the lobes of `disney`; this one is integrated here.
+    let case = (ROOM.build)(ROOM.live, super::QUICK);
+    case.check(&case.integrate());
 }
 
 /// Two regressions near the rim. The `F5` part was 0.3 % too dark (`render::cut::spread`). The diffuse lobe of `ashikhmin-shirley`, which
