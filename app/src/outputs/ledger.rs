@@ -5,7 +5,7 @@ use lookalike::graph::BlobHash;
 use std::{
     collections::BTreeSet,
     fs::{self, File, OpenOptions},
-    io::{self, Read, Seek, SeekFrom, Write},
+    io::{self, Read, Write},
     path::{Path, PathBuf},
     sync::{Mutex, PoisonError},
 };
@@ -105,14 +105,10 @@ impl Ledger {
     /// Opens the file for appending, and ends an incomplete last line.
     fn open(&self) -> io::Result<File> {
         let mut file = OpenOptions::new().read(true).append(true).open(&self.path)?;
-        let mut last = [b'\n'];
-        if file.metadata()?.len() > 0 {
-            file.seek(SeekFrom::End(-1))?;
-            file.read_exact(&mut last)?;
-        }
-        if last != *b"\n" {
-            file.write_all(b"\n")?;
-        }
+        let mut text = Vec::new();
+        file.read_to_end(&mut text)?;
+        let whole = text.iter().rposition(|byte| *byte == b'\n').map_or(0, |last| last + 1);
+        file.set_len(whole as u64)?;
         Ok(file)
     }
 
