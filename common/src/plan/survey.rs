@@ -70,7 +70,7 @@ impl SurveyPlanner {
     /// transform.
     ///
     /// # Errors
-    /// As [`FitPlanner::new`].
+    /// As [`FitPlanner::new`](super::FitPlanner::new).
     pub fn new(capture: Arc<Capture>, method: Method, exposure: f64, request: SurveyRequest) -> Result<Self, FitError> {
         let method = Method { integration: Integration::Tables, ..method };
         limits::check_points(method.model, request.starts.iter().chain(&request.points))?;
