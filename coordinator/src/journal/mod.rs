@@ -172,13 +172,17 @@ impl Journal {
     }
 }
 
-/// Dropping without [`Journal::close`] in a simulated world means that the process was killed; the next one may start at once.
+/// Dropping without [`Journal::close`] waits for the thread too, so that the next process finds no writer. In a simulated world it
+/// means that the process was killed, and nothing more is written.
 impl Drop for Journal {
     fn drop(&mut self) {
-        if let (Some(_), Some(thread)) = (&self.disk, self.thread.take()) {
-            let _ = self.commands.send(Command::Die);
-            let _ = thread.join();
-        }
+        let Some(thread) = self.thread.take() else { return };
+        let last = match &self.disk {
+            Some(_) => Command::Die,
+            None => Command::Close(Some("it was dropped".into())),
+        };
+        let _ = self.commands.send(last);
+        let _ = thread.join();
     }
 }
 

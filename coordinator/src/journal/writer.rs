@@ -61,7 +61,7 @@ pub(super) struct Writer {
 }
 
 impl Writer {
-    /// Process commands until one ends the thread, or until the sender is dropped.
+    /// Process commands until one ends the thread.
     pub(super) fn run(mut self) -> Result<(), JournalError> {
         loop {
             let soon = self.next_status.saturating_duration_since(Instant::now());
@@ -80,8 +80,8 @@ impl Writer {
                 Ok(Command::Wait(done)) => _ = done.send(()),
                 Ok(Command::Die) => return Ok(()),
                 Ok(Command::Close(ended)) => return self.close(ended.as_deref()),
-                // The coordinator's future was dropped.
-                Err(RecvTimeoutError::Disconnected) => return self.close(Some("it was dropped")),
+                // A journal says how it ends before it is dropped.
+                Err(RecvTimeoutError::Disconnected) => return Ok(()),
                 // Nothing has happened, but the coordinator is alive.
                 Err(RecvTimeoutError::Timeout) => self.is_news = true,
             }
