@@ -17,6 +17,7 @@ mod run;
 pub mod settings;
 pub mod slurm;
 mod study;
+mod wrap;
 
 pub use exit::Exit;
 

@@ -4,6 +4,7 @@ use super::row::{Row, State};
 use crate::{
     outputs::{BATCH_MARK, OutFolder, aligned, parameters_json},
     progress::FitCount,
+    wrap::wrap,
 };
 use anyhow::Context;
 use lookalike::brdf::flat_names;
@@ -116,7 +117,7 @@ impl Summary {
         let mut text = aligned(&rows);
         for row in &self.rows {
             if let State::Failed(error) = &row.state {
-                let _ = writeln!(text, "\n{} failed: {error}", row.name);
+                let _ = writeln!(text, "\n{}", wrap(&format!("{} failed: {error}", row.name)));
             }
         }
         let stopped = self.rows.iter().filter(|row| matches!(row.state, State::Stopped)).count();

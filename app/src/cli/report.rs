@@ -1,6 +1,6 @@
-//! Errors as the user sees them: on stderr, the cause chain one line each, colour only on terminals.
+//! Errors as the user sees them: on stderr, the cause chain one line each; wrapped and coloured only on terminals.
 
-use crate::exit::Exit;
+use crate::{exit::Exit, wrap::wrap};
 use std::{
     env,
     io::{self, IsTerminal, Write},
@@ -15,9 +15,13 @@ pub(crate) fn failure(error: &anyhow::Error) -> ExitCode {
         let _ = error.print();
         return if error.exit_code() == 0 { Exit::Done.into() } else { Exit::BadInput.into() };
     }
-    let colour = io::stderr().is_terminal() && env::var_os("NO_COLOR").is_none_or(|value| value.is_empty());
+    let is_terminal = io::stderr().is_terminal();
+    let colour = is_terminal && env::var_os("NO_COLOR").is_none_or(|value| value.is_empty());
+    let text = render(error, colour);
+    // In a log, a cause stays on one line, where it can be searched for.
+    let text = if is_terminal { wrap(&text) } else { text };
     // A closed stderr cannot be reported anywhere.
-    let _ = io::stderr().write_all(render(error, colour).as_bytes());
+    let _ = io::stderr().write_all(text.as_bytes());
     error.downcast_ref::<Exit>().copied().unwrap_or(Exit::BadInput).into()
 }
 

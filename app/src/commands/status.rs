@@ -1,6 +1,6 @@
 //! `lookalike status`: shows the state of a run from its journal, without disturbing the run.
 
-use crate::{outputs::print_result, settings::StatusSettings};
+use crate::{outputs::print_result, settings::StatusSettings, wrap::wrap};
 use anyhow::Context;
 use lookalike_coordinator::journal::{
     PartStatus,
@@ -49,15 +49,18 @@ fn table(status: &Status, folder: &str) -> String {
     text.push_str(&kinds(status));
     text.push_str(&workers(status));
     for failure in &status.failures {
-        text.push_str(&format!("\nfailed: {} {:?}: {}\n", failure.kind, failure.label, failure.error));
+        let failed = format!("failed: {} {:?}: {}", failure.kind, failure.label, failure.error);
+        text.push_str(&format!("\n{}\n", wrap(&failed)));
     }
     let why = status.error.as_deref().unwrap_or("no reason is recorded");
     match status.state {
         RunState::Stopped => {
-            text.push_str(&format!("\nstopped: {why}\nresume it: the same command with --resume\n"));
+            text.push_str(&format!("\n{}\n", wrap(&format!("stopped: {why}"))));
+            text.push_str("to resume it, repeat the command with --resume\n");
         }
         RunState::Ended => {
-            text.push_str(&format!("\nended: {why}\nretry what failed: the same command with --resume\n"));
+            text.push_str(&format!("\n{}\n", wrap(&format!("ended: {why}"))));
+            text.push_str("to retry what failed, repeat the command with --resume\n");
         }
         RunState::Running | RunState::Finished => {}
     }
@@ -94,7 +97,7 @@ fn fits(all: &[PartStatus]) -> String {
         let seconds = seconds.map(|seconds| format!("{seconds:.1}")).unwrap_or_default();
         let error = error.as_deref().map(|error| format!("  {error}")).unwrap_or_default();
         let line = format!("{name:<width$}  {state:<7}  {cssim:>6}  {seconds:>9}{error}");
-        text.push_str(line.trim_end());
+        text.push_str(&wrap(line.trim_end()));
         text.push('\n');
     }
     match all.len() - shown.len() {
@@ -108,7 +111,7 @@ fn headline(status: &Status) -> &'static str {
     match status.state {
         RunState::Running => "running",
         RunState::Stopped => "stopped, not finished",
-        RunState::Ended => "ended, not all of it well",
+        RunState::Ended => "ended with failures",
         RunState::Finished => "finished",
     }
 }
@@ -222,7 +225,7 @@ search       21        1        4        3        1
 failed: search \"gamma 1\": black
 
 stopped: interrupted
-resume it: the same command with --resume
+to resume it, repeat the command with --resume
 ";
         assert_eq!(table(&status, "run"), expected);
         assert_eq!([1, 2, 3, 11, 22, 112].map(ordinal), ["1st", "2nd", "3rd", "11th", "22nd", "112th"]);

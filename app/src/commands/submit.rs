@@ -4,6 +4,7 @@ use crate::{
     outputs::print_result,
     settings::JobSettings,
     slurm::{SlurmJob, command_line},
+    wrap::wrap,
 };
 use anyhow::Context;
 use std::{env, path, path::Path, process::ExitCode};
@@ -24,10 +25,9 @@ pub(crate) fn submit(
     job.script()?;
     check()?;
     if job.options.is_empty() {
-        eprintln!(
-            "note: no options for sbatch after a lone --, such as -- --nodes=4 --cpus-per-task=16: the job gets the cluster's \
-             defaults, often one CPU"
-        );
+        let note = "note: no options for sbatch were given after --, such as -- --nodes=4 --cpus-per-task=16, so the job gets the \
+                    cluster's defaults, often one CPU";
+        eprintln!("{}", wrap(note));
     }
     let submitted = job.submit("sbatch")?;
     eprintln!("{}", submitted.advice());

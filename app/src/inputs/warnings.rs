@@ -1,5 +1,6 @@
-//! Warnings as the user sees them: on stderr, one line each, coloured only on terminals.
+//! Warnings as the user sees them: on stderr, one line each; wrapped and coloured only on terminals.
 
+use crate::wrap::wrap;
 use std::{
     env,
     io::{self, IsTerminal, Write},
@@ -7,9 +8,12 @@ use std::{
 
 /// Shows each warning once, in order, as `warning: ...`.
 pub fn show_warnings(warnings: &[String]) {
-    let colour = io::stderr().is_terminal() && env::var_os("NO_COLOR").is_none_or(|value| value.is_empty());
+    let is_terminal = io::stderr().is_terminal();
+    let colour = is_terminal && env::var_os("NO_COLOR").is_none_or(|value| value.is_empty());
+    let text = render(warnings, colour);
+    let text = if is_terminal { wrap(&text) } else { text };
     // A closed stderr cannot be reported anywhere.
-    let _ = io::stderr().write_all(render(warnings, colour).as_bytes());
+    let _ = io::stderr().write_all(text.as_bytes());
 }
 
 fn render(warnings: &[String], colour: bool) -> String {

@@ -1,7 +1,11 @@
 //! The table that a fit prints on stdout at its end.
 
 use super::{FitRecord, Timing};
-use lookalike::brdf::{Channels, Model};
+use crate::wrap::wrap;
+use lookalike::{
+    brdf::{Channels, Model},
+    plan::FitOutcome,
+};
 use std::{
     fmt::Write as _,
     io::{self, Write as _},
@@ -27,28 +31,34 @@ fn summary(record: &FitRecord<'_>, timing: &Timing, out: &str) -> String {
     let mut text = format!("{} on {} of {usable} usable pixels", model.name(), record.method.samples);
     let gammas = counted(record.method.gammas.len(), "gamma");
     let _ = writeln!(text, ", {gammas}, seed {}\n", record.method.seed);
-    let mut rows = vec![header(model)];
-    let first = outcome.judged.iter().find(|j| j.candidate.gamma == 1.0);
-    if let Some(j) = first {
-        rows.push(row(model, "L2 baseline", "1", j.cssim, j.cssim_object, &j.candidate.parameters));
-    }
-    let winner = &outcome.judged[outcome.winner];
-    let gamma = winner.candidate.gamma.to_string();
-    let scores = (winner.cssim, winner.cssim_object);
-    rows.push(row(model, "stage two", &gamma, scores.0, scores.1, &winner.candidate.parameters));
-    if let Some(p) = &outcome.polished {
-        rows.push(row(model, "polished", "", p.cssim, p.cssim_object, &p.parameters));
-    }
-    text.push_str(&aligned(&rows));
+    text.push_str(&aligned(&rows(model, outcome)));
     text.push_str("\n  CSSIM is a difference: 0 = identical, larger = worse.\n");
     for note in record.notes {
-        let _ = writeln!(text, "\nnote: {note}");
+        let _ = writeln!(text, "\n{}", wrap(&format!("note: {note}")));
     }
     let seconds: Vec<String> = timing.seconds.iter().map(|(stage, s)| format!("{stage} {s:.1}")).collect();
     let workers = counted(timing.workers, "worker");
-    let _ = writeln!(text, "\nseconds: {} ({workers})", seconds.join(", "));
+    let _ = writeln!(text, "\n{}", wrap(&format!("seconds: {} ({workers})", seconds.join(", "))));
     let _ = writeln!(text, "results: {out}");
     text
+}
+
+/// One row per score and parameter, one column per result. A model may have too many parameters for columns.
+fn rows(model: &dyn Model, outcome: &FitOutcome) -> Vec<Vec<String>> {
+    let texts = ["", "gamma", "CSSIM on object", "CSSIM on image"].into_iter();
+    let mut rows: Vec<Vec<String>> =
+        texts.chain(model.parameters().iter().map(|p| p.name)).map(|name| vec![name.to_owned()]).collect();
+    let mut add = |column: Vec<String>| rows.iter_mut().zip(column).for_each(|(row, cell)| row.push(cell));
+    if let Some(j) = outcome.judged.iter().find(|j| j.candidate.gamma == 1.0) {
+        add(column(model, "L2 baseline", "1", j.cssim, j.cssim_object, &j.candidate.parameters));
+    }
+    let j = &outcome.judged[outcome.winner];
+    let gamma = j.candidate.gamma.to_string();
+    add(column(model, "stage two", &gamma, j.cssim, j.cssim_object, &j.candidate.parameters));
+    if let Some(p) = &outcome.polished {
+        add(column(model, "polished", "", p.cssim, p.cssim_object, &p.parameters));
+    }
+    rows
 }
 
 /// `1 gamma`, `2 gammas`.
@@ -56,23 +66,18 @@ pub(crate) fn counted(count: usize, noun: &str) -> String {
     format!("{count} {noun}{}", if count == 1 { "" } else { "s" })
 }
 
-fn header(model: &dyn Model) -> Vec<String> {
-    let fixed = ["", "gamma", "CSSIM on object", "on image"].map(str::to_owned);
-    fixed.into_iter().chain(model.parameters().iter().map(|p| p.name.to_owned())).collect()
-}
-
-fn row(model: &dyn Model, name: &str, gamma: &str, cssim: f64, object: f64, parameters: &[f64]) -> Vec<String> {
-    let mut row = vec![name.to_owned(), gamma.to_owned(), format!("{object:.4}"), format!("{cssim:.4}")];
+fn column(model: &dyn Model, name: &str, gamma: &str, cssim: f64, object: f64, parameters: &[f64]) -> Vec<String> {
+    let mut column = vec![name.to_owned(), gamma.to_owned(), format!("{object:.4}"), format!("{cssim:.4}")];
     let mut first = 0;
     for parameter in model.parameters() {
         let values = &parameters[first..first + parameter.channels.count()];
-        row.push(match parameter.channels {
+        column.push(match parameter.channels {
             Channels::Scalar => format!("{:.4}", values[0]),
             Channels::Rgb => values.iter().map(|v| format!("{v:.3}")).collect::<Vec<_>>().join(" "),
         });
         first += values.len();
     }
-    row
+    column
 }
 
 /// Aligns columns to their widest entries: the first column left, the others right.

@@ -4,6 +4,7 @@ use super::coverage::{Coverage, Object};
 use crate::{
     inputs::{LoadedMask, LoadedPhoto},
     settings::{CompareSettings, DisplayExposure, MetricKind},
+    wrap::wrap,
 };
 use anyhow::Context;
 use serde_json::{Map, Value, json};
@@ -74,7 +75,8 @@ impl Report<'_> {
         };
         let metric = self.metric();
         let (reference, image) = (self.settings.reference.display(), self.settings.image.display());
-        let mut text = format!("{metric} of {image} against {reference}: 0 is equal, larger is worse\n\n");
+        let mut text =
+            wrap(&format!("{metric} of {image} against {reference}: 0 is equal, larger is worse")) + "\n\n";
         let mut row = |name: &str, [a, b]: [f64; 2]| text.push_str(&format!("{name:<10} {a:>10.6} {b:>10.6}\n"));
         row(metric, [score, score_object]);
         if let Some([image, object]) = features {
@@ -88,7 +90,8 @@ impl Report<'_> {
         if features.is_some() {
             text.push_str("features: 1 is equal; the score is 1 minus their product\n");
         }
-        text + &format!("display exposure: {} ({})\n", self.exposure, exposure_source(&self.settings.display_exposure))
+        let source = exposure_source(&self.settings.display_exposure);
+        text + &wrap(&format!("display exposure: {} ({source})\n", self.exposure))
     }
 
     fn metric(&self) -> &'static str {
