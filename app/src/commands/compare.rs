@@ -3,11 +3,15 @@
 mod coverage;
 mod report;
 
-use super::output::{check_writable, write_file};
+use super::{
+    activity::Activity,
+    output::{check_writable, write_file},
+};
 use crate::{
     exit::Exit,
     inputs::{LoadedPhoto, load_image, load_mask, resolve_display_exposure, show_warnings},
     settings::{CompareSettings, MetricKind},
+    wrap::wrap,
 };
 use anyhow::{Context, bail};
 use coverage::Coverage;
@@ -23,6 +27,11 @@ pub(crate) fn run(settings: CompareSettings) -> anyhow::Result<ExitCode> {
     if let Some(path) = &settings.map {
         check_map(path)?;
     }
+    let files = format!("{} and {}", settings.image.display(), settings.reference.display());
+    let activity = Activity::new({
+        let files = files.clone();
+        move || format!("reading {files}")
+    });
     let reference = load_image(&settings.reference, "reference")?;
     let image = load_image(&settings.image, "image")?;
     check_sizes(&settings, &reference, &image)?;
@@ -32,8 +41,10 @@ pub(crate) fn run(settings: CompareSettings) -> anyhow::Result<ExitCode> {
     let mut warnings = [&reference.warnings[..], &image.warnings].concat();
     warnings.extend(mixed_encodings(&reference, &image, exposure));
     show_warnings(&warnings);
+    drop(activity);
 
     let pair = Pair { reference: &reference, image: &image, coverage: &coverage.judged, exposure };
+    let _activity = Activity::new(move || format!("comparing {files}"));
     let scored = pair.score(settings.metric, settings.map.is_some());
     let (outcome, map) = scored.with_context(|| format!("cannot compare {} and {}", name(&reference), name(&image)))?;
     if let (Some(path), Some(map)) = (&settings.map, map) {
@@ -141,7 +152,7 @@ fn write_map(path: &Path, map: &ErrorMap, settings: &CompareSettings) -> anyhow:
     let version = concat!("lookalike ", env!("CARGO_PKG_VERSION")).to_owned();
     let metadata = [entry(keys::SOFTWARE, version), entry(keys::COMMENTS, subject)];
     write_file(path, &png::write(&map.picture(full_scale), &metadata)?)?;
-    eprintln!("wrote {} ({legend})", path.display());
+    eprintln!("{}", wrap(&format!("wrote {} ({legend})", path.display())));
     Ok(())
 }
 

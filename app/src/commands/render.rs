@@ -3,11 +3,15 @@
 mod encode;
 mod material;
 
-use super::output::{check_writable, write_file};
+use super::{
+    activity::Activity,
+    output::{check_writable, write_file},
+};
 use crate::{
     exit::Exit,
     inputs::{LoadedEnvironment, LoadedGeometry, load_environment, load_normals, show_warnings, sphere_geometry},
     settings::RenderSettings,
+    wrap::wrap,
 };
 use anyhow::Context;
 use encode::{Format, Subject};
@@ -19,11 +23,7 @@ use lookalike::{
     scene::Circle,
 };
 use material::LoadedMaterial;
-use std::{
-    process::ExitCode,
-    sync::Mutex,
-    time::{Duration, Instant},
-};
+use std::process::ExitCode;
 
 /// Renders a material.
 pub(crate) fn run(settings: RenderSettings) -> anyhow::Result<ExitCode> {
@@ -31,12 +31,14 @@ pub(crate) fn run(settings: RenderSettings) -> anyhow::Result<ExitCode> {
     let samples = u32::try_from(settings.samples.get())
         .with_context(|| format!("--samples must be at most {}, found {}", u32::MAX, settings.samples))?;
     check_writable(&settings.out)?;
+    let activity = Activity::new(|| "reading the inputs".to_owned());
     let material = LoadedMaterial::load(&settings.material)?;
     let shape = shape(&settings)?;
     let light = load_environment(&settings.environment)?;
     show_warnings(&[&light.warnings[..], &shape.warnings].concat());
 
     let distribution = LightDistribution::new(light.environment.clone());
+    drop(activity);
     let shot = Shot {
         geometry: &shape.geometry,
         light: &distribution,
@@ -67,23 +69,17 @@ fn shape(settings: &RenderSettings) -> anyhow::Result<LoadedGeometry> {
     }
 }
 
-/// Renders with a progress bar of rows on stderr, or with occasional lines where no bar can be drawn.
+/// Renders with a progress bar of rows on stderr, or with lines where no bar can be drawn.
 fn with_progress(shot: &Shot<'_>) -> Rendering {
     let rows = ProgressBar::new(shot.geometry.height() as u64);
     if let Ok(style) = ProgressStyle::with_template("rendering {wide_bar} {pos}/{len} rows, {eta} left") {
         rows.set_style(style);
     }
-    let told = Mutex::new(Instant::now());
-    let rendering = shot.render(|| {
-        rows.inc(1);
-        // Skip the line if another thread is printing one.
-        if let (true, Ok(mut told)) = (rows.is_hidden(), told.try_lock())
-            && told.elapsed() >= PAUSE
-        {
-            *told = Instant::now();
-            eprintln!("rendering: {} of {} rows", rows.position(), shot.geometry.height());
-        }
+    let _activity = rows.is_hidden().then(|| {
+        let (rows, height) = (rows.clone(), shot.geometry.height());
+        Activity::new(move || format!("rendering: {} of {height} rows", rows.position()))
     });
+    let rendering = shot.render(|| rows.inc(1));
     rows.finish_and_clear();
     rendering
 }
@@ -94,25 +90,26 @@ fn tell(settings: &RenderSettings, light: &LoadedEnvironment, rendering: &Render
     eprintln!("light: {} ({})", light.source.path.display(), light.mapping);
     eprintln!("mean radiance over the object: {r:.5} {g:.5} {b:.5} (linear Rec. 709)");
     match rendering.noise {
-        Some(Noise { typical, rms }) => eprintln!(
-            "noise: {:.2} % of its luminance for a typical pixel, {:.2} % of the mean radiance by root mean square (standard \
-             errors, from two independent halves of {} samples)",
-            100.0 * typical,
-            100.0 * rms,
-            settings.samples
-        ),
+        Some(Noise { typical, rms }) => {
+            let noise = format!(
+                "noise: {:.2} % of its luminance for a typical pixel, {:.2} % of the mean radiance by root mean square \
+                 (standard errors, from two independent halves of {} samples)",
+                100.0 * typical,
+                100.0 * rms,
+                settings.samples
+            );
+            eprintln!("{}", wrap(&noise));
+        }
         None => eprintln!("noise: not estimated (needs two samples per pixel and some light)"),
     }
     if let Some(exposure) = exposure {
-        eprintln!(
+        let exposure = format!(
             "display exposure: {exposure} (auto: 97th percentile of the object's largest channel to 0.9), clipped, sRGB"
         );
+        eprintln!("{}", wrap(&exposure));
     }
     eprintln!("wrote {}", settings.out.display());
 }
-
-/// The time between two lines.
-const PAUSE: Duration = Duration::from_secs(10);
 
 /// The largest width or height that the image writers and readers support.
 const LARGEST_PX: usize = 1 << 14;
