@@ -2,7 +2,7 @@
 //!
 //! ```text
 //!   lookalike-test-cluster worker --access FILE ...
-//!   lookalike-test-cluster gates COUNT ADDRESS WORKERS ACCESS_FILE [STRANGERS]
+//!   lookalike-test-cluster gates COUNT ADDRESS WORKERS ACCESS_FILE [UNAUTHENTICATED]
 //!   lookalike-test-cluster resume COUNT ADDRESS WORKERS ACCESS_FILE
 //!   lookalike-test-cluster liar KIND --access FILE ...
 //! ```
@@ -37,7 +37,7 @@ pub fn main() -> ExitCode {
     }
     let arguments: Vec<_> = arguments.iter().map(|argument| argument.to_string_lossy().into_owned()).collect();
     let mut limits = Limits::default();
-    let [command @ ("gates" | "resume"), count, address, workers, access_file, ref strangers @ ..] =
+    let [command @ ("gates" | "resume"), count, address, workers, access_file, ref unauthenticated @ ..] =
         arguments[1..].iter().map(String::as_str).collect::<Vec<_>>()[..]
     else {
         return ExitCode::from(2);
@@ -45,8 +45,8 @@ pub fn main() -> ExitCode {
     let (Ok(count), Ok(workers)) = (count.parse(), workers.parse()) else {
         return ExitCode::from(2);
     };
-    if let Some(Ok(strangers)) = strangers.first().map(|strangers| strangers.parse()) {
-        limits.strangers = strangers;
+    if let Some(Ok(count)) = unauthenticated.first().map(|count| count.parse()) {
+        limits.unauthenticated = count;
     }
     let mut options = RunnerOptions { limits, policy: policy(), ..RunnerOptions::new(workers, access_file.into()) };
     if command == "resume" {

@@ -26,7 +26,7 @@ fn crowd(workers: u32) {
     let leaves = Leaves::GateHere { address: gate.address().to_string() };
     let mut options = listening();
     // All workers connect at once and do not retry.
-    options.limits.strangers = options.limits.strangers.max(workers as usize);
+    options.limits.unauthenticated = options.limits.unauthenticated.max(workers as usize);
     options.policy.heartbeat = Duration::from_millis(500);
     options.policy.lost_after = Duration::from_millis(5000);
     let cluster = Cluster::start(leaves.clone(), options);

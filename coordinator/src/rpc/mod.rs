@@ -1,7 +1,7 @@
 //! The sockets: accepts connections, admits workers that know the secret, and turns their messages into events.
 //!
-//! A connection that has not proved the secret (a stranger) gets few resources: a place that a newer one may take, a short time,
-//! a TLS handshake, fixed lengths, no decoder. A worker gets two tasks, one that reads and one that writes, so that a large blob
+//! A connection that has not proved the secret gets few resources: a place that a newer one may take, a short time, a TLS
+//! handshake, fixed lengths, no decoder. A worker gets two tasks, one that reads and one that writes, so that a large blob
 //! in one direction never blocks the other. [`Limits`](crate::limits::Limits) holds the bounds for both.
 
 mod gate;
@@ -9,7 +9,7 @@ mod inbound;
 mod mailbox;
 mod member;
 mod outgoing;
-mod strangers;
+mod places;
 
 use std::io;
 use std::net::SocketAddr;
@@ -33,7 +33,7 @@ use self::gate::Greeted;
 pub(crate) use self::inbound::Inbound;
 pub(crate) use self::mailbox::Mailbox;
 pub(crate) use self::outgoing::Outgoing;
-use self::strangers::{Place, Strangers};
+use self::places::{Place, Places};
 use crate::tls::accept;
 
 /// The pause after the system fails to accept a connection, for example when file descriptors run out.
@@ -43,7 +43,7 @@ const ACCEPT_PAUSE: Duration = Duration::from_millis(100);
 pub(crate) async fn serve_forever<W: World>(listener: W::Listener, gate: Gate<W>, stop: CancellationToken) {
     let limits = gate.limits;
     let gate = Arc::new(gate);
-    let strangers = Strangers::new(limits.strangers);
+    let places = Places::new(limits.unauthenticated);
     let next_worker = Arc::new(AtomicU64::new(1));
     let mut connections = JoinSet::new();
     loop {
@@ -65,14 +65,14 @@ pub(crate) async fn serve_forever<W: World>(listener: W::Listener, gate: Gate<W>
             warn!(%peer, "too many connections, closing a new one");
             continue;
         }
-        let (gate, next_worker, place) = (Arc::clone(&gate), Arc::clone(&next_worker), strangers.enter());
+        let (gate, next_worker, place) = (Arc::clone(&gate), Arc::clone(&next_worker), places.enter());
         connections.spawn(async move {
             match greet(stream, place, &gate).await {
                 Ok(connection) => {
                     let worker = WorkerId(next_worker.fetch_add(1, Ordering::Relaxed));
                     member::serve(connection, worker, peer, &gate).await;
                 }
-                Err(error) => report_stranger(peer, &error),
+                Err(error) => report_refusal(peer, &error),
             }
         });
     }
@@ -85,7 +85,7 @@ pub(crate) async fn serve_forever<W: World>(listener: W::Listener, gate: Gate<W>
 
 /// Report a failed handshake. A wrong secret or version comes from a Lookalike worker, so the user is warned. Anything else is
 /// logged as noise.
-fn report_stranger(peer: SocketAddr, error: &WireError) {
+fn report_refusal(peer: SocketAddr, error: &WireError) {
     if means_us(error) {
         warn!(%peer, "refused: {error}");
     } else {
@@ -98,14 +98,14 @@ fn means_us(error: &WireError) -> bool {
     matches!(error, WireError::Handshake(why) if *why != HandshakeError::Magic)
 }
 
-/// Perform the handshake with a stranger, within its time and while no newer stranger takes its place.
+/// Perform the handshake, within its time and while no newer connection takes the place.
 async fn greet<W: World>(stream: W::Stream, place: Place, gate: &Gate<W>) -> Result<Greeted<W::Stream>, WireError> {
     tokio::select! {
         biased;
-        greeted = timeout(gate.limits.stranger_time, handshake(stream, gate)) => {
+        greeted = timeout(gate.limits.handshake_time, handshake(stream, gate)) => {
             greeted.map_err(|_| WireError::TimedOut)?
         }
-        () = place.is_needed() => Err(io::Error::other("too many strangers at a time").into()),
+        () = place.is_needed() => Err(io::Error::other("too many unauthenticated connections at a time").into()),
     }
 }
 

@@ -5,7 +5,7 @@ mod impostors;
 mod liars;
 mod refusals;
 mod secrets;
-mod strangers;
+mod unauthenticated;
 
 use lookalike_coordinator::limits::Limits;
 use lookalike_coordinator::runner::RunnerOptions;

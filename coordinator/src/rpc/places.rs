@@ -1,4 +1,4 @@
-//! Places for connections that have not proved the secret (strangers). A new one always gets a place.
+//! Places for unauthenticated connections: those that have not proved the secret. A new one always gets a place.
 
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -7,34 +7,34 @@ use tokio_util::sync::CancellationToken;
 
 /// The connections that have not proved the secret yet, in order of arrival.
 #[derive(Clone, Debug)]
-pub(super) struct Strangers {
-    places: usize,
+pub(super) struct Places {
+    limit: usize,
     present: Arc<Mutex<VecDeque<Arc<CancellationToken>>>>,
 }
 
-/// A stranger's place. Dropping this frees it.
+/// The place of one connection. Dropping this frees it.
 #[derive(Debug)]
 pub(super) struct Place {
-    strangers: Strangers,
+    all: Places,
     token: Arc<CancellationToken>,
 }
 
-impl Strangers {
+impl Places {
     /// This many places; at least one.
-    pub(super) fn new(places: usize) -> Self {
-        Self { places: places.max(1), present: Arc::default() }
+    pub(super) fn new(limit: usize) -> Self {
+        Self { limit: limit.max(1), present: Arc::default() }
     }
 
-    /// Take a place. If none is free, the oldest stranger loses its place.
+    /// Take a place. If none is free, the oldest connection loses its place.
     pub(super) fn enter(&self) -> Place {
         let token = Arc::new(CancellationToken::new());
         let mut present = self.present();
-        while present.len() >= self.places {
-            present.pop_front().into_iter().for_each(|longest| longest.cancel());
+        while present.len() >= self.limit {
+            present.pop_front().into_iter().for_each(|oldest| oldest.cancel());
         }
         present.push_back(Arc::clone(&token));
         drop(present);
-        Place { strangers: self.clone(), token }
+        Place { all: self.clone(), token }
     }
 
     fn present(&self) -> MutexGuard<'_, VecDeque<Arc<CancellationToken>>> {
@@ -43,7 +43,7 @@ impl Strangers {
 }
 
 impl Place {
-    /// Wait until a newer stranger takes the place.
+    /// Wait until a newer connection takes the place.
     pub(super) async fn is_needed(&self) {
         self.token.cancelled().await;
     }
@@ -51,7 +51,7 @@ impl Place {
 
 impl Drop for Place {
     fn drop(&mut self) {
-        self.strangers.present().retain(|token| !Arc::ptr_eq(token, &self.token));
+        self.all.present().retain(|token| !Arc::ptr_eq(token, &self.token));
     }
 }
 
@@ -60,15 +60,15 @@ mod tests {
     use super::*;
 
     #[test]
-    fn who_has_been_here_longest_makes_room() {
-        let strangers = Strangers::new(2);
-        let places = [strangers.enter(), strangers.enter(), strangers.enter()];
+    fn new_connection_takes_the_place_of_the_oldest() {
+        let all = Places::new(2);
+        let places = [all.enter(), all.enter(), all.enter()];
         assert_eq!(places.each_ref().map(|place| place.token.is_cancelled()), [true, false, false]);
         let [first, second, third] = places;
         drop(second);
-        let fourth = strangers.enter();
+        let fourth = all.enter();
         assert!(!third.token.is_cancelled() && !fourth.token.is_cancelled());
         drop((first, third, fourth));
-        assert!(strangers.present().is_empty());
+        assert!(all.present().is_empty());
     }
 }

@@ -1,4 +1,4 @@
-//! Strangers at the coordinator's port: clients without the access file.
+//! Unauthenticated clients at the coordinator's port: clients without the access file.
 
 use super::{PROGRAM, run_at_the_gate, run_within, worker};
 use lookalike::protocol::{Access, CHALLENGE_BYTES, CertificatePin, Refusal, Secret};
@@ -91,10 +91,10 @@ fn tls_session_resumption_is_not_offered() {
 }
 
 #[test]
-fn stranger_is_disconnected_after_its_time_even_while_it_sends() {
+fn unauthenticated_connection_is_closed_after_its_time_even_while_it_sends() {
     let gate = Gate::new();
     // Long enough for a handshake on a machine whose processors are busy.
-    let limits = Limits { stranger_time: Duration::from_secs(2), ..Limits::default() };
+    let limits = Limits { handshake_time: Duration::from_secs(2), ..Limits::default() };
     let cluster = run_within(&gate, 1, limits);
     let waiting = gate.next();
     let access = cluster.access();
@@ -118,9 +118,9 @@ fn stranger_is_disconnected_after_its_time_even_while_it_sends() {
 }
 
 #[test]
-fn strangers_in_all_places_do_not_block_a_worker() {
+fn unauthenticated_connections_in_all_places_do_not_block_a_worker() {
     let gate = Gate::new();
-    let limits = Limits { strangers: 8, stranger_time: Duration::from_secs(3600), ..Limits::default() };
+    let limits = Limits { unauthenticated: 8, handshake_time: Duration::from_secs(3600), ..Limits::default() };
     let cluster = run_within(&gate, 0, limits);
     let address = cluster.access().address;
     let begin = |bytes: &[u8]| {
@@ -171,13 +171,13 @@ fn peak_memory(process: u32) -> usize {
 }
 
 /// The memory for the 16 places of this test, and 10 MB for what an allocator does not return (4 MB were observed). Without the limit the
-/// 400 strangers used 29 to 38 MB.
+/// 400 connections used 29 to 38 MB.
 #[cfg(target_os = "linux")]
-const MEMORY_FOR_STRANGERS: usize = 16 * 150_000 + (10 << 20);
+const MEMORY_FOR_UNAUTHENTICATED: usize = 16 * 150_000 + (10 << 20);
 
 #[cfg(target_os = "linux")]
 #[test]
-fn strangers_cost_a_bounded_amount_of_memory() {
+fn unauthenticated_connections_cost_a_bounded_amount_of_memory() {
     let (gate, folder) = (Gate::new(), tempfile::tempdir().unwrap());
     let file = folder.path().join("access.json");
     let arguments = ["gates", "1", &gate.address().to_string(), "1"].map(str::to_owned);
@@ -197,7 +197,7 @@ fn strangers_cost_a_bounded_amount_of_memory() {
     let mut held: Vec<TcpStream> = (0..400).map(begin).collect();
     held.drain(..384).for_each(|stream| _ = read_to_the_end(stream));
     let grown = peak_memory(coordinator.id()) - before;
-    assert!(grown < MEMORY_FOR_STRANGERS, "{grown} bytes");
+    assert!(grown < MEMORY_FOR_UNAUTHENTICATED, "{grown} bytes");
     drop(held);
     waiting.release();
     assert_eq!(coordinator.output().status.code(), Some(0));
