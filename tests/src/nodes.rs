@@ -16,7 +16,7 @@ pub fn registry() -> Registry {
 
 /// The node types of fits, of which one kind returns outputs with one wrong bit.
 #[must_use]
-pub fn lying_registry(kind: &str) -> Registry {
+pub fn false_registry(kind: &str) -> Registry {
     let honest = nodes::registry();
     let kinds: Vec<_> = honest.kinds().collect();
     let honest = Arc::new(honest);

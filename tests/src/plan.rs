@@ -34,13 +34,13 @@ pub enum Leaves {
         /// The file.
         marker: String,
     },
-    /// This many nodes that wait at a gate, and possibly one more, `murderer`, that always aborts its process. If one fails, the others
+    /// This many nodes that wait at a gate, and possibly one more, `killer`, that always aborts its process. If one fails, the others
     /// continue, and the result is that of those that complete.
-    Mob {
+    GatesAndKiller {
         /// How many wait at the gate.
-        innocents: usize,
+        gates: usize,
         /// Whether there is a node that always aborts its process.
-        has_murderer: bool,
+        has_killer: bool,
         /// Where the gate is.
         address: String,
     },
@@ -118,7 +118,7 @@ impl Planner for TestPlanner {
             Leaves::Gates { count, address } => {
                 ("gate", (0..*count).map(|leaf| format!("{address}#{leaf}").into_bytes()).collect(), 0)
             }
-            Leaves::Mob { innocents: count, address, .. } => {
+            Leaves::GatesAndKiller { gates: count, address, .. } => {
                 ("gate", (0..*count).map(|leaf| format!("{address}#{leaf}").into_bytes()).collect(), 0)
             }
             Leaves::Abort { marker } => ("abort", vec![marker.clone().into_bytes()], 0),
@@ -135,8 +135,8 @@ impl Planner for TestPlanner {
             let placement = if is_here { Placement::Coordinator } else { Placement::Worker };
             self.nodes.push(graph.add_node(NodeSpec { placement, ..leaf })?);
         }
-        if matches!(self.leaves, Leaves::Mob { has_murderer: true, .. }) {
-            self.nodes.push(graph.add_node(node("abort", "murderer", vec![], vec![]))?);
+        if matches!(self.leaves, Leaves::GatesAndKiller { has_killer: true, .. }) {
+            self.nodes.push(graph.add_node(node("abort", "killer", vec![], vec![]))?);
         }
         self.open_leaves = self.nodes.len();
         Ok(())
@@ -154,7 +154,7 @@ impl Planner for TestPlanner {
     }
 
     fn failed(&mut self, id: NodeId, reason: &FailureReason, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
-        if matches!(self.leaves, Leaves::Mob { .. } | Leaves::Killers { .. }) {
+        if matches!(self.leaves, Leaves::GatesAndKiller { .. } | Leaves::Killers { .. }) {
             self.nodes.retain(|leaf| *leaf != id);
             return self.leaf_is_done(graph);
         }

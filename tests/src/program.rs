@@ -4,9 +4,9 @@
 //!   lookalike-test-cluster worker --access FILE ...
 //!   lookalike-test-cluster gates COUNT ADDRESS WORKERS ACCESS_FILE [UNAUTHENTICATED]
 //!   lookalike-test-cluster resume COUNT ADDRESS WORKERS ACCESS_FILE
-//!   lookalike-test-cluster liar KIND --access FILE ...
+//!   lookalike-test-cluster false-worker KIND --access FILE ...
 //! ```
-//! `resume` keeps a journal beside the access file, or resumes the run in it. `liar` is a worker for fits whose outputs of one kind of
+//! `resume` keeps a journal beside the access file, or resumes the run in it. `false-worker` is a worker for fits whose outputs of one kind of
 //! node are wrong by one bit.
 
 use std::io::Write;
@@ -19,7 +19,7 @@ use lookalike_coordinator::limits::Limits;
 use lookalike_coordinator::runner::{RunError, RunnerOptions, run};
 
 use crate::cluster::policy;
-use crate::nodes::{lying_registry, registry};
+use crate::nodes::{false_registry, registry};
 use crate::plan::{Leaves, TestPlanner};
 
 /// The program.
@@ -30,10 +30,10 @@ pub fn main() -> ExitCode {
         return lookalike_worker::main_from(arguments.into_iter().skip(1), registry());
     }
     if let [_, command, kind, rest @ ..] = &arguments[..]
-        && command == "liar"
+        && command == "false-worker"
     {
         let arguments = arguments.iter().take(1).chain(rest).cloned();
-        return lookalike_worker::main_from(arguments, lying_registry(&kind.to_string_lossy()));
+        return lookalike_worker::main_from(arguments, false_registry(&kind.to_string_lossy()));
     }
     let arguments: Vec<_> = arguments.iter().map(|argument| argument.to_string_lossy().into_owned()).collect();
     let mut limits = Limits::default();

@@ -221,6 +221,6 @@ mod past_outputs_tests;
 #[cfg(test)]
 mod property_tests;
 #[cfg(test)]
-mod storm_tests;
+mod random_kill_tests;
 #[cfg(test)]
 mod tests;

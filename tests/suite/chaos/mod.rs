@@ -6,7 +6,7 @@ mod network;
 mod phases;
 mod random;
 mod resume;
-mod storms;
+mod random_kills;
 
 use std::path::Path;
 use std::process::Command;

@@ -7,7 +7,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 use std::time::Instant;
 
-use lookalike_tests::ordeal::{Ending, Ordeal};
+use lookalike_tests::faulted_fit::{Ending, FaultedFit};
 use tempfile::TempDir;
 
 use crate::fit::scene::{fit, folder_of_size, without_timing};
@@ -49,8 +49,8 @@ fn survives(folder: &TempDir, seed: u64) -> bool {
     let (out, begin) = (format!("run{seed}"), Instant::now());
     let arguments = format!("fit photo.exr --env map.exr {FLAGS}");
     let program = env!("CARGO_BIN_EXE_lookalike-under-test");
-    let ordeal = Ordeal { program, folder: folder.path(), arguments: &arguments, out: &out, seed };
-    let outcome = catch_unwind(AssertUnwindSafe(|| ordeal.run()));
+    let fit = FaultedFit { program, folder: folder.path(), arguments: &arguments, out: &out, seed };
+    let outcome = catch_unwind(AssertUnwindSafe(|| fit.run()));
     let seconds = begin.elapsed().as_secs_f64();
     match outcome.map_err(|why| message(&*why)).and_then(|ending| judge(folder.path(), &out, ending)) {
         Ok(Ending { faults, coordinators, .. }) => {

@@ -18,17 +18,17 @@ use lookalike_tests::journal::JournalView;
 use lookalike_tests::plan::{Leaves, TestPlanner};
 use lookalike_tests::process::{Process, stderr};
 use lookalike_tests::proxy::Proxy;
-use lookalike_tests::stranger::{
+use lookalike_tests::raw_peer::{
     TlsClient, connect, connect_tls, greet, hear, hello, join, read_to_the_end, say, say_frame,
 };
 
 use super::{PROGRAM, run_at_the_gate, run_within, worker};
 
 /// Report this output of a node.
-fn claim(liar: &mut TlsClient, lease: LeaseName, output: &[u8]) {
+fn claim(false_worker: &mut TlsClient, lease: LeaseName, output: &[u8]) {
     let (hash, length) = (BlobHash::of(output).0, output.len() as u64);
-    say(liar, &ToCoordinator::Finished { lease, hash, length });
-    say_frame(liar, FrameTag::Part, output);
+    say(false_worker, &ToCoordinator::Finished { lease, hash, length });
+    say_frame(false_worker, FrameTag::Part, output);
 }
 
 #[test]
@@ -65,10 +65,10 @@ fn false_result_for_the_node_of_another_worker_is_detected_by_verification() {
     let listen = Some(([127, 0, 0, 1], 0).into());
     let cluster = Cluster::start(leaves, RunnerOptions { listen, policy, ..options(PROGRAM, 1) });
     let waiting = gate.next();
-    let mut liar = join(&cluster.access(), 1);
+    let mut false_worker = join(&cluster.access(), 1);
     let name = LeaseName { node: 0, attempt: 1, epoch: 1 };
-    claim(&mut liar, name, b"not passed");
-    hear(&mut liar, |message| (message == ToWorker::Acknowledge(name)).then_some(()));
+    claim(&mut false_worker, name, b"not passed");
+    hear(&mut false_worker, |message| (message == ToWorker::Acknowledge(name)).then_some(()));
     waiting.release();
     let error = cluster.error();
     assert!(matches!(error, RunError::Stop(Stop::ResultsDiffer { .. })), "{error}");
@@ -94,13 +94,13 @@ fn differing_second_result_ends_the_run_and_the_node_is_rerun_on_resume() {
         std::thread::sleep(Duration::from_millis(20));
     };
     drop(journal);
-    let mut liar = join(&read_access(&access), 1);
-    claim(&mut liar, LeaseName { node, attempt: 1, epoch: 1 }, b"not passed");
+    let mut false_worker = join(&read_access(&access), 1);
+    claim(&mut false_worker, LeaseName { node, attempt: 1, epoch: 1 }, b"not passed");
     let output = first.output();
     assert_eq!(output.status.code(), Some(3), "{}", stderr(&output));
     let expected = format!("two results of gate \"leaf {node}\" differ");
     assert!(stderr(&output).contains(&expected), "{}", stderr(&output));
-    drop(liar);
+    drop(false_worker);
     let second = coordinator();
     let keeper = gate.keep(Waiting::release);
     let output = second.output();
@@ -130,9 +130,9 @@ fn result_for_a_lease_of_an_earlier_epoch_is_a_violation() {
     waiting.into_iter().for_each(Waiting::wait_for_death);
     let second = coordinator();
     let waiting = gate.next();
-    let mut liar = join(&read_access(&access), 1);
-    claim(&mut liar, LeaseName { node: 0, attempt: 1, epoch: 1 }, b"not passed");
-    let _ = read_to_the_end(liar);
+    let mut false_worker = join(&read_access(&access), 1);
+    claim(&mut false_worker, LeaseName { node: 0, attempt: 1, epoch: 1 }, b"not passed");
+    let _ = read_to_the_end(false_worker);
     waiting.release();
     gate.next().release();
     let output = second.output();
@@ -148,8 +148,8 @@ fn result_for_a_lease_of_another_epoch_is_a_violation() {
     let cluster = run_at_the_gate(&gate);
     let waiting = gate.next();
     for epoch in [0, 2, u64::MAX] {
-        let mut liar = join(&cluster.access(), 1);
-        claim(&mut liar, LeaseName { node: 0, attempt: 1, epoch }, b"not passed");
+        let mut false_worker = join(&cluster.access(), 1);
+        claim(&mut false_worker, LeaseName { node: 0, attempt: 1, epoch }, b"not passed");
         let departure = cluster.wait_for(|event| match event {
             RunEvent::WorkerLeft { departure, .. } => Some(departure.clone()),
             _ => None,
@@ -165,15 +165,15 @@ fn worker_that_floods_its_coordinator_does_not_block_other_workers() {
     let gate = Gate::new();
     let cluster = run_at_the_gate(&gate);
     let waiting = gate.next();
-    let mut liar = join(&cluster.access(), 1);
+    let mut false_worker = join(&cluster.access(), 1);
     let lease = LeaseName { node: 7, attempt: 1, epoch: 1 };
     let beat = ToCoordinator::Heartbeat { executing: vec![Executing { lease, permille: u16::MAX }; 1000] };
     for _ in 0..200 {
-        say(&mut liar, &beat);
-        say(&mut liar, &ToCoordinator::Started(lease));
+        say(&mut false_worker, &beat);
+        say(&mut false_worker, &ToCoordinator::Started(lease));
     }
     let empty = ToCoordinator::Heartbeat { executing: Vec::new() };
-    (0..10_000).for_each(|_| say(&mut liar, &empty));
+    (0..10_000).for_each(|_| say(&mut false_worker, &empty));
     // Despite these messages, a worker on another connection joins without delay.
     let honest = worker(&cluster.access_file());
     let joined = |event: &RunEvent| matches!(event, RunEvent::WorkerJoined { threads: 1, .. }).then_some(());
@@ -215,13 +215,13 @@ fn oversized_error_message_is_truncated() {
     let leaves = Leaves::Digests { count: 1, shared_bytes: 1 };
     let cluster = Cluster::start(leaves, RunnerOptions { listen, policy, ..options(PROGRAM, 0) });
     cluster.address();
-    let mut liar = join(&cluster.access(), 1);
-    let lease = hear(&mut liar, |message| match message {
+    let mut false_worker = join(&cluster.access(), 1);
+    let lease = hear(&mut false_worker, |message| match message {
         ToWorker::Assign(assignment) => Some(assignment.lease),
         _ => None,
     });
     let message = "x".repeat(2_000_000);
-    say(&mut liar, &ToCoordinator::Failed { lease, kind: FailureKind::Application, message });
+    say(&mut false_worker, &ToCoordinator::Failed { lease, kind: FailureKind::Application, message });
     let text = cluster.error().to_string();
     assert!(text.contains("xxx") && text.len() < 20_000, "{} bytes", text.len());
 }

@@ -2,7 +2,7 @@
 
 mod false_results;
 mod impostors;
-mod liars;
+mod false_workers;
 mod refusals;
 mod secrets;
 mod unauthenticated;

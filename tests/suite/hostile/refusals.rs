@@ -11,7 +11,7 @@ use lookalike_tests::cluster::{Cluster, options};
 use lookalike_tests::gate::Gate;
 use lookalike_tests::plan::Leaves;
 use lookalike_tests::process::{Process, stderr};
-use lookalike_tests::stranger::{
+use lookalike_tests::raw_peer::{
     FalseCoordinator, TlsServer, challenge, connect_tls, greet, identity, read_message, read_to_the_end, tell, tls_of,
 };
 use lookalike_worker::tls::{channel_binding, provider};

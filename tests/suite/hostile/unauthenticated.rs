@@ -6,7 +6,7 @@ use lookalike_coordinator::limits::Limits;
 use lookalike_tests::cluster::read_access;
 use lookalike_tests::gate::Gate;
 use lookalike_tests::process::Process;
-use lookalike_tests::stranger::{connect, connect_tls, greet, read_to_the_end};
+use lookalike_tests::raw_peer::{connect, connect_tls, greet, read_to_the_end};
 use std::io::{Read, Write};
 use std::net::TcpStream;
 use std::process::Command;

@@ -7,7 +7,7 @@ use lookalike_worker::ending::Wishes;
 
 use super::chance::Chance;
 use super::stage::Place;
-use super::wire::Fate;
+use super::wire::WireControl;
 
 /// Something done to the run at its time.
 #[derive(Clone, Debug)]
@@ -17,7 +17,7 @@ pub(super) enum Event {
     /// The link to a worker works again.
     MendLink(usize, Link),
     /// An end of a connection fails.
-    Reset(Weak<Fate>),
+    Reset(Weak<WireControl>),
     /// A process starts in a place that has none.
     Start(Place),
     /// A stuck worker continues.

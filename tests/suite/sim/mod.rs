@@ -9,7 +9,7 @@ mod events;
 mod processes;
 mod run;
 mod stage;
-mod torment;
+mod faults;
 mod web;
 mod wire;
 mod world;

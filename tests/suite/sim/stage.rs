@@ -9,7 +9,7 @@ use std::time::Duration;
 use lookalike_coordinator::state::RunSummary;
 use lookalike_worker::ending::Wishes;
 
-use super::wire::Fate;
+use super::wire::WireControl;
 
 /// Where a process runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -57,9 +57,9 @@ pub(super) struct State {
     /// Violations of what must hold.
     pub(super) wrong: Vec<String>,
     /// Each end of each connection: the worker of its link, and the place of the end.
-    wires: Vec<(Place, Place, Weak<Fate>)>,
+    wires: Vec<(Place, Place, Weak<WireControl>)>,
     /// Places whose process is about to be killed by the node that it executes.
-    pub(super) doomed: BTreeSet<Place>,
+    pub(super) dying: BTreeSet<Place>,
     pub(super) stuck: BTreeSet<Place>,
     pub(super) slow: BTreeMap<Place, u32>,
     /// The means to ask the worker in a place to end.
@@ -120,25 +120,25 @@ impl Stage {
     }
 
     /// Record a new connection on the link to a worker.
-    pub(super) fn laid(&self, link: Place, end: Place, fate: Weak<Fate>) {
+    pub(super) fn laid(&self, link: Place, end: Place, control: Weak<WireControl>) {
         let mut state = self.state();
-        state.wires.retain(|(.., fate)| fate.strong_count() > 0);
-        state.wires.push((link, end, fate));
+        state.wires.retain(|(.., control)| control.strong_count() > 0);
+        state.wires.push((link, end, control));
     }
 
     /// The ends of the open connections on the link to a worker.
-    pub(super) fn wires(&self, link: Place) -> Vec<(Place, Weak<Fate>)> {
+    pub(super) fn wires(&self, link: Place) -> Vec<(Place, Weak<WireControl>)> {
         let state = self.state();
         let on_link = state.wires.iter().filter(|(other, ..)| *other == link);
-        on_link.map(|(_, end, fate)| (*end, Weak::clone(fate))).collect()
+        on_link.map(|(_, end, control)| (*end, Weak::clone(control))).collect()
     }
 
     /// The process in a place is about to be killed by its node: it sends nothing from now on.
-    pub(super) fn doom(&self, place: Place) {
+    pub(super) fn mark_dying(&self, place: Place) {
         self.say(place, "runs a deadly node");
         let ends = self.wires(place).into_iter().filter(|(end, _)| *end == place);
-        ends.filter_map(|(_, fate)| fate.upgrade()).for_each(|fate| fate.mute());
-        self.state().doomed.insert(place);
+        ends.filter_map(|(_, control)| control.upgrade()).for_each(|control| control.mute());
+        self.state().dying.insert(place);
     }
 
     pub(super) fn is_stuck(&self, place: Place) -> bool {

@@ -9,7 +9,7 @@ use lookalike::graph::{
 };
 
 use super::chance::Chance;
-use super::world::doom_this_host;
+use super::world::kill_this_host;
 
 /// How deep the web grows below its roots.
 const DEPTH: usize = 3;
@@ -190,7 +190,7 @@ impl NodeType for Deadly {
     }
 
     fn run(&self, _: &[u8], _: &[Blob], _: &RunContext) -> Result<Vec<u8>, NodeFailure> {
-        doom_this_host();
+        kill_this_host();
         Err(NodeFailure::new("deadly"))
     }
 }

@@ -13,12 +13,12 @@ use turmoil::net::TcpStream;
 #[derive(Debug)]
 pub(super) struct Wire {
     stream: TcpStream,
-    fate: Arc<Fate>,
+    control: Arc<WireControl>,
 }
 
 /// What the simulation can do to an end of a connection.
 #[derive(Debug, Default)]
-pub(super) struct Fate(Mutex<State>);
+pub(super) struct WireControl(Mutex<State>);
 
 #[derive(Debug, Default)]
 struct State {
@@ -31,15 +31,15 @@ struct State {
 
 impl Wire {
     pub(super) fn new(stream: TcpStream) -> Self {
-        Self { stream, fate: Arc::default() }
+        Self { stream, control: Arc::default() }
     }
 
-    pub(super) fn fate(&self) -> Weak<Fate> {
-        Arc::downgrade(&self.fate)
+    pub(super) fn control(&self) -> Weak<WireControl> {
+        Arc::downgrade(&self.control)
     }
 }
 
-impl Fate {
+impl WireControl {
     /// From now on reading and writing fail.
     pub(super) fn reset(&self) {
         let mut state = self.state();
@@ -74,28 +74,28 @@ const WRITING: usize = 1;
 
 impl AsyncRead for Wire {
     fn poll_read(mut self: Pin<&mut Self>, context: &mut Context<'_>, bytes: &mut ReadBuf<'_>) -> Poll<io::Result<()>> {
-        self.fate.check(READING, context)?;
+        self.control.check(READING, context)?;
         Pin::new(&mut self.stream).poll_read(context, bytes)
     }
 }
 
 impl AsyncWrite for Wire {
     fn poll_write(mut self: Pin<&mut Self>, context: &mut Context<'_>, bytes: &[u8]) -> Poll<io::Result<usize>> {
-        match self.fate.check(WRITING, context)? {
+        match self.control.check(WRITING, context)? {
             Some(()) => Pin::new(&mut self.stream).poll_write(context, bytes),
             None => Poll::Pending,
         }
     }
 
     fn poll_flush(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<io::Result<()>> {
-        match self.fate.check(WRITING, context)? {
+        match self.control.check(WRITING, context)? {
             Some(()) => Pin::new(&mut self.stream).poll_flush(context),
             None => Poll::Pending,
         }
     }
 
     fn poll_shutdown(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<io::Result<()>> {
-        match self.fate.check(WRITING, context)? {
+        match self.control.check(WRITING, context)? {
             Some(()) => Pin::new(&mut self.stream).poll_shutdown(context),
             None => Poll::Pending,
         }

@@ -25,8 +25,8 @@ thread_local! {
 }
 
 /// Mark the process that executes the calling node as about to be killed.
-pub(super) fn doom_this_host() {
-    RUNNING.with_borrow(|world| world.iter().for_each(|world| world.0.stage.doom(world.0.place)));
+pub(super) fn kill_this_host() {
+    RUNNING.with_borrow(|world| world.iter().for_each(|world| world.0.stage.mark_dying(world.0.place)));
 }
 
 /// The world of one process.
@@ -70,7 +70,7 @@ impl World for SimWorld {
 
     async fn connect(&self, address: &str) -> io::Result<Wire> {
         let stream = Wire::new(TcpStream::connect(address).await?);
-        self.0.stage.laid(self.0.place, self.0.place, stream.fate());
+        self.0.stage.laid(self.0.place, self.0.place, stream.control());
         Ok(stream)
     }
 
@@ -83,7 +83,7 @@ impl World for SimWorld {
     async fn accept(port: &Port) -> io::Result<(Wire, SocketAddr)> {
         let (stream, peer) = port.listener.accept().await?;
         let stream = Wire::new(stream);
-        port.stage.laid(Place::of(peer), Place::Coordinator, stream.fate());
+        port.stage.laid(Place::of(peer), Place::Coordinator, stream.control());
         Ok((stream, peer))
     }
 

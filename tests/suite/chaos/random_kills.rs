@@ -14,7 +14,7 @@ use lookalike_tests::process::signal;
 use super::PROGRAM;
 
 /// Kills processes that wait at the gate at random, `kills` at most, and lets the others pass. `killed` counts them.
-fn storm(gate: Gate, seed: u64, kills: u32, killed: Arc<AtomicU32>) -> Keeper {
+fn kill_at_random(gate: Gate, seed: u64, kills: u32, killed: Arc<AtomicU32>) -> Keeper {
     let mut arrivals = 0;
     gate.keep(move |waiting: Waiting| {
         arrivals += 1;
@@ -32,14 +32,14 @@ fn storm(gate: Gate, seed: u64, kills: u32, killed: Arc<AtomicU32>) -> Keeper {
 type Ending = (Option<Vec<u8>>, BTreeMap<String, String>);
 
 /// The outcome of a run of gates, possibly with a node that kills its workers, under this many kills.
-fn run(seed: u64, innocents: usize, has_murderer: bool, kills: u32) -> Ending {
+fn run(seed: u64, gates: usize, has_killer: bool, kills: u32) -> Ending {
     let (gate, killed) = (Gate::new(), Arc::new(AtomicU32::new(0)));
-    let leaves = Leaves::Mob { innocents, has_murderer, address: gate.address().to_string() };
-    let keeper = storm(gate, seed, kills, Arc::clone(&killed));
+    let leaves = Leaves::GatesAndKiller { gates, has_killer, address: gate.address().to_string() };
+    let keeper = kill_at_random(gate, seed, kills, Arc::clone(&killed));
     let (events, outcome) = Cluster::start(leaves, options(PROGRAM, 3)).outcome();
     keeper.stop();
     let (result, summary) = outcome.unwrap();
-    assert!(killed.load(Ordering::Relaxed) >= kills / 2, "seed {seed}: the storm was over too early: {summary:?}");
+    assert!(killed.load(Ordering::Relaxed) >= kills / 2, "seed {seed}: too few kills: {summary:?}");
     let failed = events.into_iter().filter_map(|event| match event {
         RunEvent::NodeFailed { name, reason } => Some((name.label, reason.to_string())),
         _ => None,
@@ -49,23 +49,23 @@ fn run(seed: u64, innocents: usize, has_murderer: bool, kills: u32) -> Ending {
 
 #[test]
 fn node_that_kills_its_workers_fails_and_all_others_complete() {
-    let (calm, failed) = run(1, 6, true, 0);
+    let (with_killer, failed) = run(1, 6, true, 0);
     assert_eq!(failed.len(), 1, "{failed:?}");
-    assert!(failed["murderer"].contains("3 worker processes died"), "{failed:?}");
+    assert!(failed["killer"].contains("3 worker processes died"), "{failed:?}");
     // The result of the other nodes is that of a run without the failing node.
-    let (innocent, failed) = run(2, 6, false, 0);
-    assert!(failed.is_empty() && calm.is_some() && calm == innocent, "{failed:?}");
+    let (without_killer, failed) = run(2, 6, false, 0);
+    assert!(failed.is_empty() && with_killer.is_some() && with_killer == without_killer, "{failed:?}");
 }
 
-/// Seeds of storms. The run of seed 5 has a node that kills its workers.
+/// Seeds of the kills. The run of seed 5 has a node that kills its workers.
 const SEEDS: &[u64] = if cfg!(feature = "slow") { &[4, 5] } else { &[5] };
 
 #[test]
 fn random_kills_from_outside_fail_no_node_except_one_that_kills_its_workers() {
-    let (calm, _) = run(3, 8, false, 0);
+    let (without_kills, _) = run(3, 8, false, 0);
     for &seed in SEEDS {
         let (result, failed) = run(seed, 8, seed == 5, 6);
-        assert_eq!(failed.keys().collect::<Vec<_>>(), if seed == 5 { vec!["murderer"] } else { vec![] }, "{failed:?}");
-        assert!(result == calm, "seed {seed}");
+        assert_eq!(failed.keys().collect::<Vec<_>>(), if seed == 5 { vec!["killer"] } else { vec![] }, "{failed:?}");
+        assert!(result == without_kills, "seed {seed}");
     }
 }

@@ -29,7 +29,7 @@ const MOST_COORDINATORS: u32 = 3;
 
 /// A fit and the seed of its faults.
 #[derive(Clone, Debug)]
-pub struct Ordeal<'a> {
+pub struct FaultedFit<'a> {
     /// The program `lookalike`.
     pub program: &'a str,
     /// A folder with the inputs.
@@ -88,7 +88,7 @@ impl Fault {
     }
 }
 
-impl Ordeal<'_> {
+impl FaultedFit<'_> {
     /// Run the fit to its end, with two local workers and one behind a proxy.
     ///
     /// # Panics
@@ -96,7 +96,7 @@ impl Ordeal<'_> {
     #[must_use]
     pub fn run(&self) -> Ending {
         let mut run = Run {
-            ordeal: self,
+            fit: self,
             ending: Ending::default(),
             chance: 0,
             told: 0,
@@ -132,7 +132,7 @@ impl Ordeal<'_> {
 }
 
 struct Run<'a> {
-    ordeal: &'a Ordeal<'a>,
+    fit: &'a FaultedFit<'a>,
     ending: Ending,
     /// How many random numbers were drawn.
     chance: u64,
@@ -153,8 +153,8 @@ struct Run<'a> {
 }
 
 /// Whether a coordinator continues or was killed.
-enum Fate {
-    Goes,
+enum Next {
+    Continues,
     Killed,
 }
 
@@ -164,9 +164,9 @@ impl Run<'_> {
         self.ending.coordinators += 1;
         self.has_begun = false;
         self.members.clear();
-        let mut coordinator = Process::start(&mut self.ordeal.command());
+        let mut coordinator = Process::start(&mut self.fit.command());
         self.seen.0.push(coordinator.id());
-        let log = self.ordeal.folder.join(format!("{}.{}.log", self.ordeal.out, self.ending.coordinators));
+        let log = self.fit.folder.join(format!("{}.{}.log", self.fit.out, self.ending.coordinators));
         let events = coordinator.follow_stderr(File::create(log).expect("a log"));
         while let Some(event) = next(&events) {
             self.heed(&event);
@@ -176,9 +176,9 @@ impl Run<'_> {
                 return true;
             }
             assert!(event["event"] != "failed", "{event}");
-            if let Fate::Killed = self.perhaps_hurt() {
+            if let Next::Killed = self.inject_fault_when_due() {
                 coordinator.kill();
-                self.hurt_the_journal();
+                self.damage_journal();
                 return false;
             }
         }
@@ -228,24 +228,24 @@ impl Run<'_> {
         }
         let is_missing = self.remote.as_mut().is_none_or(Process::has_ended);
         if let Some(wire) = self.wire.as_ref().filter(|_| is_missing) {
-            let mut command = Command::new(self.ordeal.program);
+            let mut command = Command::new(self.fit.program);
             command.args(["worker", "--threads", "1", "--address", &wire.address(), "--access"]);
-            let remote = Process::start(command.arg(self.ordeal.out().join("access.json")));
+            let remote = Process::start(command.arg(self.fit.out().join("access.json")));
             self.seen.0.push(remote.id());
             self.remote = Some(remote);
         }
     }
 
     /// Cause the next fault when its time has come.
-    fn perhaps_hurt(&mut self) -> Fate {
+    fn inject_fault_when_due(&mut self) -> Next {
         if !self.has_begun || self.faults_left == 0 || self.told < self.next_fault {
-            return Fate::Goes;
+            return Next::Continues;
         }
         self.faults_left -= 1;
         self.plan_next();
         let fault = Fault::ALL[self.index(Fault::ALL.len())];
         if self.is_enough(fault) {
-            return Fate::Goes;
+            return Next::Continues;
         }
         let victim = self.victim();
         match (fault, victim) {
@@ -263,12 +263,12 @@ impl Run<'_> {
             }
             (Fault::KillCoordinator, _) => {
                 self.count(fault.name());
-                return Fate::Killed;
+                return Next::Killed;
             }
-            (_, None) => return Fate::Goes,
+            (_, None) => return Next::Continues,
         }
         self.count(fault.name());
-        Fate::Goes
+        Next::Continues
     }
 
     /// A random worker that is not stopped.
@@ -289,8 +289,8 @@ impl Run<'_> {
     }
 
     /// Damage the journal as a power failure or a bad disk may.
-    fn hurt_the_journal(&mut self) {
-        let (out, lot) = (self.ordeal.out(), self.random());
+    fn damage_journal(&mut self) {
+        let (out, lot) = (self.fit.out(), self.random());
         if lot < 0.4 {
             let share = self.random();
             let _ = tear(&out, share);
@@ -314,7 +314,7 @@ impl Run<'_> {
 
     fn random(&mut self) -> f64 {
         self.chance += 1;
-        uniform(key(&[self.ordeal.seed, self.chance]))
+        uniform(key(&[self.fit.seed, self.chance]))
     }
 
     /// A whole number from `least` to `most`.

@@ -28,14 +28,14 @@ impl Run {
     pub(super) fn perform(&mut self, event: Event) {
         match event {
             Event::Fault => {
-                let (fault, victim) = (Fault::draw(&mut self.chance), self.chance.index(self.workers));
-                if self.hurt(fault, victim) {
+                let (fault, index) = (Fault::draw(&mut self.chance), self.chance.index(self.workers));
+                if self.inject(fault, index) {
                     *self.faults.entry(fault.name()).or_default() += 1;
                 }
                 self.plan_fault();
             }
             Event::MendLink(index, link) => self.mend(index, link),
-            Event::Reset(fate) => fate.upgrade().iter().for_each(|fate| fate.reset()),
+            Event::Reset(control) => control.upgrade().iter().for_each(|control| control.reset()),
             Event::Start(place) => {
                 self.absent.remove(&place);
                 if place == Place::Coordinator {
@@ -50,7 +50,7 @@ impl Run {
     }
 
     /// Cause a fault of a worker or of the coordinator. Returns whether that was possible.
-    fn hurt(&mut self, fault: Fault, index: usize) -> bool {
+    fn inject(&mut self, fault: Fault, index: usize) -> bool {
         let time = fault.time(&mut self.chance);
         let is_coordinator = matches!(fault, Fault::KillCoordinator | Fault::KillAll);
         let place = if is_coordinator { Place::Coordinator } else { Place::Worker(index) };
@@ -202,18 +202,18 @@ impl Run {
     /// Reset both ends of every connection of a worker, each at its own time.
     fn reset_ends(&mut self, index: usize, within: Duration) {
         let most = u64::try_from(within.as_millis()).unwrap_or(0);
-        for (_, fate) in self.stage.wires(Place::Worker(index)) {
+        for (_, control) in self.stage.wires(Place::Worker(index)) {
             let after = self.chance.time(0, most);
-            self.plan(after, Event::Reset(fate));
+            self.plan(after, Event::Reset(control));
         }
     }
 
     /// Handle the processes that have ended.
     pub(super) fn mark_dead(&mut self) {
         let mut state = self.stage.state();
-        let (doomed, ended) = (std::mem::take(&mut state.doomed), std::mem::take(&mut state.ended));
+        let (dying, ended) = (std::mem::take(&mut state.dying), std::mem::take(&mut state.ended));
         drop(state);
-        for place in doomed {
+        for place in dying {
             self.harm(place);
             let pause = self.chance.time(10, 1000);
             self.kill(place, pause);

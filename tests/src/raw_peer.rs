@@ -22,7 +22,7 @@ use crate::PATIENCE;
 use crate::gate::is_end;
 
 /// The process id that false workers report.
-pub const LIAR: u32 = 77;
+pub const FALSE_WORKER: u32 = 77;
 
 /// A TLS connection to a coordinator.
 pub type TlsClient = StreamOwned<ClientConnection, TcpStream>;
@@ -120,9 +120,9 @@ pub fn join(access: &Access, threads: u32) -> TlsClient {
 /// The hello of a false worker that joins for the first time.
 #[must_use]
 pub fn hello(threads: u32) -> Hello {
-    static LIARS: AtomicU8 = AtomicU8::new(0);
-    let name = ProcessName([LIARS.fetch_add(1, Ordering::Relaxed); 16]);
-    Hello { build: "liar".into(), threads, process: LIAR, name, is_local: false }
+    static COUNT: AtomicU8 = AtomicU8::new(0);
+    let name = ProcessName([COUNT.fetch_add(1, Ordering::Relaxed); 16]);
+    Hello { build: "false-worker".into(), threads, process: FALSE_WORKER, name, is_local: false }
 }
 
 /// Send a message.
