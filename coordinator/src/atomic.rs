@@ -82,7 +82,7 @@ mod tests {
     use std::os::unix::fs::symlink;
 
     #[test]
-    fn links_in_place_of_file_and_draft_are_replaced_and_not_followed() {
+    fn links_in_place_of_the_file_are_replaced_and_not_followed() {
         let folder = tempfile::tempdir().unwrap();
         let at = |name: &str| folder.path().join(name);
         fs::write(at("mine"), "precious").unwrap();

@@ -199,7 +199,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn defaults_make_sense_and_nonsense_is_named() {
+    fn defaults_are_valid_and_invalid_values_are_named() {
         assert_eq!(Policy::default().check(), Ok(()));
         let said = |change: fn(&mut Policy)| {
             let mut policy = Policy::default();

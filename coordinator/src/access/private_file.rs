@@ -39,7 +39,7 @@ mod tests {
     use crate::atomic;
 
     #[test]
-    fn file_is_private_even_where_a_public_one_was() {
+    fn file_is_private_even_if_it_replaces_a_public_one() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("secret");
         fs::write(&path, "public").unwrap();
@@ -53,7 +53,7 @@ mod tests {
     }
 
     #[test]
-    fn new_file_takes_no_place_of_another() {
+    fn new_file_replaces_no_other() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("secret");
         create(&path, b"first").unwrap();

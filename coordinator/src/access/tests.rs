@@ -27,7 +27,7 @@ fn both_files_are_private_and_read_back() {
 }
 
 #[test]
-fn workers_copy_holds_nothing_of_the_key_and_debug_nothing_of_either() {
+fn workers_copy_has_no_key_and_debug_shows_neither_secret() {
     let credentials = new();
     let (json, pem) = (credentials.access.to_json(), credentials.identity.to_pem());
     let key: String = pem.split("PRIVATE KEY-----").nth(1).unwrap().lines().collect();
@@ -43,7 +43,7 @@ fn two_runs_have_two_secrets() {
 }
 
 #[test]
-fn beforehand_nothing_is_overwritten() {
+fn new_access_file_overwrites_nothing() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("cluster.json");
     new().create(&path).unwrap();
@@ -58,7 +58,7 @@ fn beforehand_nothing_is_overwritten() {
 }
 
 #[test]
-fn files_that_do_not_belong_together_or_are_none_are_named() {
+fn mismatched_and_invalid_files_are_named() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("access.json");
     let key = key_path(&path);

@@ -165,7 +165,7 @@ mod tests {
     }
 
     #[test]
-    fn what_a_transaction_has_not_kept_is_written_by_the_next() {
+    fn rolled_back_entries_are_written_by_the_next_transaction() {
         let folder = tempfile::tempdir().unwrap();
         let mut connection = schema::create(&folder.path().join("run.sqlite"), |_| Ok(())).unwrap();
         let mut deferred = Deferred::new(1);

@@ -71,7 +71,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_differs_is_named_with_both_values() {
+    fn difference_is_named_with_both_values() {
         let there = RunIdentity::default().with("photo", "12ab").with("--mask", "77").with("--seed", "0");
         let here = RunIdentity::default().with("photo", "34cd").with("--seed", "0").with("--normals", "99");
         let told: Vec<_> = here.differences(&there).iter().map(ToString::to_string).collect();

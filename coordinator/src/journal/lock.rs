@@ -96,7 +96,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn lock_names_its_holder_and_ends_with_it() {
+    fn lock_names_its_holder_and_is_released_when_dropped() {
         let folder = tempfile::tempdir().unwrap();
         assert_eq!(RunLock::is_held(folder.path()), None);
         let first = RunLock::take(folder.path()).unwrap();

@@ -45,7 +45,7 @@ fn is_network(kind: i128) -> bool {
 mod tests {
     #[cfg(target_os = "linux")]
     #[test]
-    fn network_file_systems_are_known_by_their_numbers() {
+    fn network_file_systems_are_recognised_by_their_numbers() {
         use super::{Path, is_network, is_shared};
         assert!(is_network(0x6969) && is_network(0xFE53_4D42));
         // As a signed 32-bit number.

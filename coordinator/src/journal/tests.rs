@@ -100,7 +100,7 @@ fn copied(folder: &TempDir) -> TempDir {
 }
 
 #[test]
-fn torn_write_costs_only_the_group_that_was_being_written() {
+fn torn_write_loses_only_the_unfinished_transaction() {
     let folder = tempfile::tempdir().unwrap();
     let mut journal = begun(&folder);
     write(&mut journal, [completed(1)]);
@@ -120,7 +120,7 @@ fn torn_write_costs_only_the_group_that_was_being_written() {
 }
 
 #[test]
-fn number_of_an_epoch_is_never_given_again_whatever_is_left_of_the_log() {
+fn epoch_numbers_are_never_reused_whatever_is_left_of_the_log() {
     let folder = tempfile::tempdir().unwrap();
     let mut journal = begun(&folder);
     let mut batch = Batch::default();
@@ -152,7 +152,7 @@ fn damaged_output_is_dropped_and_the_others_stay() {
 }
 
 #[test]
-fn wrong_results_are_forgotten_and_released_ones_keep_their_hash() {
+fn wrong_results_are_dropped_and_released_ones_keep_their_hash() {
     let folder = tempfile::tempdir().unwrap();
     let mut journal = begun(&folder);
     let mut wrong = completed(1);
@@ -174,7 +174,7 @@ fn wrong_results_are_forgotten_and_released_ones_keep_their_hash() {
 }
 
 #[test]
-fn output_that_is_computed_again_after_its_release_is_written_again() {
+fn output_recomputed_after_its_release_is_written_again() {
     let folder = tempfile::tempdir().unwrap();
     let mut journal = begun(&folder);
     let released = |byte| {
@@ -196,7 +196,7 @@ fn output_that_is_computed_again_after_its_release_is_written_again() {
 }
 
 #[test]
-fn journal_is_there_as_a_whole_or_not_at_all() {
+fn journal_is_created_atomically() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join(JOURNAL_FILE);
     let full = |_: &Connection| Err(rusqlite::Error::InvalidQuery);
@@ -215,7 +215,7 @@ fn journal_is_there_as_a_whole_or_not_at_all() {
 }
 
 #[test]
-fn file_that_does_not_fit_is_refused_by_name() {
+fn file_of_another_kind_version_or_run_is_refused_by_name() {
     let folder = tempfile::tempdir().unwrap();
     let refused = |expected: &str| {
         let error = Journal::open(&options(&folder), NAME, None).unwrap_err();
@@ -244,7 +244,7 @@ fn file_that_does_not_fit_is_refused_by_name() {
 }
 
 #[test]
-fn finished_run_knows_its_files_and_needs_no_outputs_any_more() {
+fn finished_run_lists_its_files_and_keeps_no_outputs() {
     let folder = tempfile::tempdir().unwrap();
     let path: PathBuf = folder.path().join(JOURNAL_FILE);
     let mut journal = begun(&folder);
@@ -269,7 +269,7 @@ fn finished_run_knows_its_files_and_needs_no_outputs_any_more() {
 }
 
 #[test]
-fn status_tells_counts_workers_and_whether_somebody_is_at_work() {
+fn status_reports_counts_workers_and_whether_a_coordinator_runs() {
     let folder = tempfile::tempdir().unwrap();
     assert!(Status::of(folder.path()).unwrap_err().to_string().contains("found no run.sqlite"));
     let lock = RunLock::take(folder.path()).unwrap();
@@ -299,7 +299,7 @@ fn status_tells_counts_workers_and_whether_somebody_is_at_work() {
 }
 
 #[test]
-fn where_the_journal_is_locked_the_status_file_tells() {
+fn status_is_read_from_its_file_while_the_journal_is_locked() {
     let folder = tempfile::tempdir().unwrap();
     let _lock = RunLock::take(folder.path()).unwrap();
     let mut journal = begun(&folder);
@@ -319,7 +319,7 @@ fn where_the_journal_is_locked_the_status_file_tells() {
 
 #[cfg(unix)]
 #[test]
-fn journal_is_readable_by_its_owner_alone() {
+fn journal_is_readable_by_its_owner_only() {
     use std::os::unix::fs::PermissionsExt;
     let folder = tempfile::tempdir().unwrap();
     let mut journal = begun(&folder);
@@ -331,7 +331,7 @@ fn journal_is_readable_by_its_owner_alone() {
 }
 
 #[test]
-fn status_of_a_journal_with_impossible_times_is_no_panic() {
+fn status_of_a_journal_with_impossible_times_does_not_panic() {
     let folder = tempfile::tempdir().unwrap();
     let options = options(&folder);
     drop(Journal::open(&options, NAME, None).unwrap());

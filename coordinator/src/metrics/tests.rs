@@ -53,7 +53,7 @@ fn run() -> String {
 }
 
 #[test]
-fn nodes_are_where_the_last_event_left_them() {
+fn node_counts_follow_the_events() {
     let page = run();
     let nodes = |state: &str| value(&page, &format!("lookalike_nodes{{kind=\"search\",state=\"{state}\"}}"));
     let states = ["waiting", "ready", "leased", "running", "completed", "failed", "cancelled"];
@@ -82,7 +82,7 @@ fn nodes_are_where_the_last_event_left_them() {
 }
 
 #[test]
-fn node_that_runs_goes_on_when_a_second_worker_gets_it_too() {
+fn speculated_node_counts_as_running_once() {
     let began = Instant::now();
     let mut book = Book::new(began);
     book.note(&RunEvent::NodeAdded { name: name(0, "search") }, began);
@@ -97,7 +97,7 @@ fn node_that_runs_goes_on_when_a_second_worker_gets_it_too() {
 }
 
 #[test]
-fn every_sample_belongs_to_a_family_that_was_announced_and_names_follow_the_conventions() {
+fn every_sample_belongs_to_a_declared_family_and_names_follow_the_conventions() {
     let page = run();
     let mut family = (String::new(), String::new());
     for line in page.lines() {
@@ -130,7 +130,7 @@ impl Pages for Round {
 }
 
 #[test]
-fn health_is_that_of_the_loop() {
+fn health_is_that_of_the_event_loop() {
     let answer = |age: Option<u64>| String::from_utf8(response(b"GET /healthz HTTP/1.1\r\n\r\n", &Round(age))).unwrap();
     for well in [None, Some(0), Some(30)] {
         assert!(answer(well).starts_with("HTTP/1.1 200 OK\r\n"), "{well:?}");
@@ -141,7 +141,7 @@ fn health_is_that_of_the_loop() {
 }
 
 #[test]
-fn requests_get_the_page_or_are_told_where_it_is() {
+fn requests_get_the_page_or_its_path() {
     let answer = |head: &str| String::from_utf8(response(head.as_bytes(), &Round(None))).unwrap();
     let page = answer("GET /metrics?a=b HTTP/1.1\r\nHost: h\r\n\r\n");
     assert!(page.starts_with("HTTP/1.1 200 OK\r\nContent-Type: text/plain; version=0.0.4"), "{page}");

@@ -89,7 +89,7 @@ fn output(byte: u8) -> Memory {
 }
 
 #[test]
-fn remembered_nodes_complete_without_running_wherever_they_belong() {
+fn nodes_with_past_outputs_complete_without_running() {
     let mut bench = Bench::new(&[("x", Placement::Worker, output(1)), ("z", Placement::Coordinator, output(3))]);
     assert_eq!(bench.said(), ["x recalled", "z recalled"]);
     assert_eq!(bench.planner.completed, [NodeId(0), NodeId(2)]);
@@ -99,7 +99,7 @@ fn remembered_nodes_complete_without_running_wherever_they_belong() {
 }
 
 #[test]
-fn run_whose_nodes_are_all_remembered_is_finished_at_once() {
+fn run_with_past_outputs_of_all_nodes_finishes_at_once() {
     let bytes = [("x", 1), ("y", 2)].map(|(name, byte)| (name, Placement::Worker, output(byte)));
     let mut bench = Bench::new(&[bytes[0].clone(), bytes[1].clone(), ("z", Placement::Coordinator, output(3))]);
     assert!(!bench.core.is_finished(), "the join is not remembered");
@@ -160,7 +160,7 @@ fn deaths_are_remembered() {
 }
 
 #[test]
-fn output_that_deaths_make_the_last_word_is_kept() {
+fn output_accepted_after_deaths_is_kept() {
     let nodes = vec![leaf("x", Placement::Worker)];
     let policy = Policy { verify_fraction: 1.0, ..Policy::default() };
     let core = Core::new(policy, 1).with_past_outputs(Box::new(Notebook::default()));

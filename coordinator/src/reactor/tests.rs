@@ -207,7 +207,7 @@ fn nodes_fan_out_to_the_least_busy_worker_earliest_first() {
 }
 
 #[test]
-fn node_that_merely_waits_moves_to_an_idle_worker() {
+fn queued_node_moves_to_an_idle_worker() {
     let mut bench = Bench::new(independent(3));
     bench.join(A, 1);
     bench.start(A, 0, 1);
@@ -219,7 +219,7 @@ fn node_that_merely_waits_moves_to_an_idle_worker() {
 }
 
 #[test]
-fn worker_is_not_given_more_bytes_than_it_may_leave_unread() {
+fn worker_is_not_sent_more_bytes_than_it_may_leave_unread() {
     let large = NodeSpec { parameters: vec![0; 1 << 20], ..node("n", vec![], Placement::Worker) };
     let mut bench = Bench::new(Script { nodes: vec![large; 40], ..Script::default() });
     // It has threads for all of them, but eight of them take 8 MiB.
@@ -231,7 +231,7 @@ fn worker_is_not_given_more_bytes_than_it_may_leave_unread() {
 }
 
 #[test]
-fn what_the_planner_adds_when_it_looks_again_is_given_out_at_once() {
+fn nodes_that_the_planner_adds_when_polled_are_assigned_at_once() {
     let late = Some(node("late", vec![], Placement::Worker));
     let mut bench = Bench::new(Script { late, ..independent(1) });
     bench.join(A, 2);
@@ -302,7 +302,7 @@ fn late_result_of_an_earlier_attempt_counts() {
 }
 
 #[test]
-fn late_result_while_the_node_is_queued_takes_it_out_of_the_queue() {
+fn late_result_removes_its_node_from_the_queue() {
     let mut bench = Bench::new(independent(1));
     bench.join(A, 1);
     bench.lose(A, Departure::Lost);
@@ -312,7 +312,7 @@ fn late_result_while_the_node_is_queued_takes_it_out_of_the_queue() {
 }
 
 #[test]
-fn answer_to_nothing_ends_the_membership() {
+fn answer_without_a_lease_ends_the_membership() {
     let mut bench = Bench::new(independent(4));
     bench.join(A, 1);
     assert_eq!(bench.finish(A, 3, 1, 0)[0], "worker 1 is thrown out");
@@ -324,7 +324,7 @@ fn answer_to_nothing_ends_the_membership() {
 }
 
 #[test]
-fn blob_is_sent_when_asked_for_and_counted() {
+fn blob_is_sent_on_request_and_counted() {
     let blob = vec![1; 40];
     let hash = BlobHash::of(&blob);
     let nodes = (0..2).map(|_| node("n", vec![Input::Blob(hash)], Placement::Worker)).collect();
@@ -336,7 +336,7 @@ fn blob_is_sent_when_asked_for_and_counted() {
 }
 
 #[test]
-fn blob_goes_to_workers_whose_nodes_read_it_and_to_nobody_else() {
+fn blob_is_sent_only_to_workers_whose_nodes_read_it() {
     let blob = vec![1; 40];
     let hash = BlobHash::of(&blob);
     let nodes = vec![node("n", vec![], Placement::Worker), node("n", vec![Input::Blob(hash)], Placement::Worker)];
@@ -399,7 +399,7 @@ fn application_error_is_not_retried_and_fails_what_depends_on_it() {
 }
 
 #[test]
-fn silent_worker_is_lost_after_its_lease_ends_and_any_sign_of_life_renews_it() {
+fn silent_worker_is_lost_after_its_lease_and_any_message_renews_the_lease() {
     let mut bench = Bench::new(independent(1));
     bench.join(A, 1);
     bench.start(A, 0, 1);
@@ -415,7 +415,7 @@ fn silent_worker_is_lost_after_its_lease_ends_and_any_sign_of_life_renews_it() {
 }
 
 #[test]
-fn without_any_worker_the_user_is_reminded_and_then_told() {
+fn run_without_workers_reports_it_repeatedly() {
     let mut bench = Bench::new(independent(1));
     assert_eq!(bench.core.next_deadline(), Some(Duration::from_secs(30)));
     assert_eq!(bench.pass_time(30).unwrap(), ["waiting since 30 s"]);
@@ -426,7 +426,7 @@ fn without_any_worker_the_user_is_reminded_and_then_told() {
 }
 
 #[test]
-fn after_the_last_worker_there_is_a_grace_and_a_new_one_ends_it() {
+fn run_waits_after_its_last_worker_until_a_new_one_joins() {
     let mut bench = Bench::new(independent(1));
     bench.join(A, 1);
     bench.lose(A, Departure::Lost);
@@ -439,7 +439,7 @@ fn after_the_last_worker_there_is_a_grace_and_a_new_one_ends_it() {
 }
 
 #[test]
-fn nobody_waits_for_workers_while_only_the_coordinator_has_work() {
+fn run_does_not_wait_for_workers_while_only_the_coordinator_has_nodes() {
     let mut bench =
         Bench::new(Script { nodes: vec![node("here", vec![], Placement::Coordinator)], ..Script::default() });
     assert_eq!(bench.core.next_deadline(), None);
@@ -477,7 +477,7 @@ fn wrong_result_ends_the_run_and_names_gamma_numbers_and_worker() {
 }
 
 #[test]
-fn nodes_of_lower_priority_numbers_go_first_whenever_they_came() {
+fn nodes_of_lower_priority_number_are_assigned_first() {
     let mut planner = independent(4);
     for (spec, priority) in planner.nodes.iter_mut().zip([2, 1, 1, 0]) {
         spec.priority = priority;
@@ -493,7 +493,7 @@ fn nodes_of_lower_priority_numbers_go_first_whenever_they_came() {
 }
 
 #[test]
-fn cancelled_nodes_leave_queue_and_workers_and_are_no_failures() {
+fn cancelled_nodes_leave_queue_and_workers_and_do_not_fail() {
     let mut bench = Bench::new(Script { released: vec![NodeId(1), NodeId(3)], ..independent(4) });
     bench.join(A, 1);
     bench.start(A, 1, 1);
@@ -512,7 +512,7 @@ fn cancelled_nodes_leave_queue_and_workers_and_are_no_failures() {
 }
 
 #[test]
-fn request_for_a_blob_that_was_let_go_is_no_violation() {
+fn request_for_a_released_blob_is_not_a_violation() {
     let blob = vec![1; 40];
     let hash = BlobHash::of(&blob);
     let nodes = vec![node("n", vec![], Placement::Worker), node("n", vec![Input::Blob(hash)], Placement::Worker)];

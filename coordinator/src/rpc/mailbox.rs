@@ -159,7 +159,7 @@ mod tests {
     use tokio::io::{AsyncReadExt, AsyncWriteExt, duplex};
 
     #[test]
-    fn mailbox_that_nobody_empties_overflows_and_blobs_weigh_nothing() {
+    fn unread_mailbox_overflows_and_blobs_do_not_count() {
         let (mailbox, postman) = mailbox(10_000);
         let blob = Blob::new(vec![0; 1 << 20]);
         (0..50).for_each(|_| mailbox.send(Outgoing::Blob(blob.clone())));
@@ -170,7 +170,7 @@ mod tests {
     }
 
     #[tokio::test(start_paused = true)]
-    async fn stream_is_given_up_on_only_when_nothing_at_all_is_read_for_too_long() {
+    async fn stream_times_out_only_when_nothing_is_read_at_all() {
         let (near, mut far) = duplex(10);
         let mut near = Patient::new(near, Duration::from_secs(5));
         let writing = tokio::spawn(async move { near.write_all(&[7; 100]).await });

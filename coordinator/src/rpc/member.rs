@@ -321,7 +321,7 @@ mod tests {
     }
 
     #[tokio::test(start_paused = true)]
-    async fn worker_on_a_slow_line_is_heard_of_though_no_frame_ends_for_long() {
+    async fn partial_frames_on_a_slow_connection_renew_the_lease() {
         let (mut near, far) = duplex(1 << 20);
         let (inbound, mut events) = channel(1024);
         let reading = tokio::spawn(async move { reader(far, inbound).read_to_the_end().await });
@@ -353,7 +353,7 @@ mod tests {
     }
 
     #[tokio::test(start_paused = true)]
-    async fn worker_hears_of_its_coordinator_as_often_as_that_one_of_it() {
+    async fn idle_coordinator_sends_a_heartbeat_every_interval() {
         let (near, far) = duplex(1 << 20);
         let (mailbox, postman) = mailbox(1000);
         let writing = tokio::spawn(async move {

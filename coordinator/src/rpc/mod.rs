@@ -132,7 +132,7 @@ mod tests {
     use lookalike::protocol::Refusal;
 
     #[test]
-    fn only_a_lookalike_that_is_refused_is_worth_a_warning() {
+    fn only_a_refused_lookalike_worker_is_a_warning() {
         let version = HandshakeError::Version { expected: 2, found: 1 };
         for known in [HandshakeError::Refused(Refusal::WrongSecret), HandshakeError::Impostor, version] {
             assert!(means_us(&WireError::Handshake(known)));

@@ -156,7 +156,7 @@ mod tests {
     }
 
     #[test]
-    fn run_that_no_worker_can_join_is_refused() {
+    fn run_that_workers_cannot_join_is_refused() {
         let error = options(0, None, None).check().unwrap_err();
         assert!(error.to_string().contains("use --workers N or --listen ADDR"), "{error}");
         assert_eq!(error.exit_code(), 2);
@@ -168,7 +168,7 @@ mod tests {
     }
 
     #[test]
-    fn without_listen_only_the_loopback_interface_is_listened_on() {
+    fn default_address_is_loopback_only() {
         let nowhere = options(1, None, None);
         assert_eq!(nowhere.listen_address(None).unwrap().to_string(), "127.0.0.1:0");
         assert_eq!(nowhere.listen_address(Some("127.0.0.1:4100")).unwrap().to_string(), "127.0.0.1:4100");
@@ -186,7 +186,7 @@ mod tests {
     }
 
     #[test]
-    fn resumed_run_listens_where_it_did_unless_another_port_is_named() {
+    fn resumed_run_listens_on_the_same_port_unless_another_is_given() {
         let before: SocketAddr = "127.0.0.1:4100".parse().unwrap();
         let again = |listen| options(1, listen, None).listen_again(Some(before)).to_string();
         assert_eq!(again(None), "127.0.0.1:4100");
@@ -197,7 +197,7 @@ mod tests {
     }
 
     #[test]
-    fn advertised_address_gets_the_port_that_it_lacks() {
+    fn advertised_address_without_a_port_gets_the_port_of_the_listener() {
         let bound = "0.0.0.0:4000".parse().unwrap();
         let advertised = |advertise| options(0, None, advertise).advertised(bound);
         assert_eq!(advertised(Some("node7")), "node7:4000");

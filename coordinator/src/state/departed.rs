@@ -63,7 +63,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn latest_departures_are_remembered_once_each() {
+    fn latest_departures_are_kept_once_each() {
         let name = |number: usize| ProcessName((number as u128).to_le_bytes());
         let mut departed = Departed::default();
         (0..REMEMBERED + 2).for_each(|number| departed.insert(name(number), Lost::default()));

@@ -128,7 +128,7 @@ mod tests {
     const SECOND: Duration = Duration::from_secs(1);
 
     #[test]
-    fn node_is_slow_after_twice_the_median_of_its_kind_and_not_before_a_moment() {
+    fn node_is_slow_after_twice_the_median_of_its_kind_and_a_minimum_time() {
         let policy = Speculation { factor: Some(2.0), after: 5 * SECOND };
         let mut pace = Pace::default();
         pace.watch("search", 10 * SECOND, NodeId(1));
@@ -152,7 +152,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_usual_is_what_was_usual_lately() {
+    fn median_is_that_of_recent_nodes() {
         let policy = Speculation { factor: Some(1.0), after: Duration::ZERO };
         let mut pace = Pace::default();
         (0..RECENT).for_each(|_| pace.note("k", 100 * SECOND));

@@ -51,8 +51,8 @@ fn malformed_frames_end_the_membership() {
     let unknown_tag = [1, 0, 0, 0, 9].to_vec();
     let no_message = [3, 0, 0, 0, 0, 99, 99].to_vec();
     let part_of_nothing = [2, 0, 0, 0, 1, 0].to_vec();
-    for act in [oversized, unknown_tag, no_message, part_of_nothing] {
-        assert_disconnected(Limits::default(), |stream| stream.write_all(&act).unwrap());
+    for frame in [oversized, unknown_tag, no_message, part_of_nothing] {
+        assert_disconnected(Limits::default(), |stream| stream.write_all(&frame).unwrap());
     }
 }
 
@@ -66,7 +66,7 @@ fn frame_beyond_the_coordinators_limit_is_refused_by_its_header() {
 #[test]
 fn unrequested_answers_and_false_hashes_end_the_membership() {
     let lease = LeaseName { node: 0, attempt: 9, epoch: 1 };
-    let never_asked = ToCoordinator::Failed { lease, kind: FailureKind::Application, message: "I act".into() };
+    let never_asked = ToCoordinator::Failed { lease, kind: FailureKind::Application, message: "failed".into() };
     let false_hash = ToCoordinator::Finished { lease, hash: [1; 32], length: 0 };
     let too_long = ToCoordinator::Finished { lease, hash: [1; 32], length: u64::MAX };
     // Refused before its first byte has arrived.
@@ -74,8 +74,8 @@ fn unrequested_answers_and_false_hashes_end_the_membership() {
     let unknown_blob = ToCoordinator::Fetch { hash: [1; 32] };
     // The input of the node at the gate: it exists, but this worker was not assigned the node.
     let blob_of_another = ToCoordinator::Fetch { hash: BlobHash::of(&[]).0 };
-    for act in [never_asked, false_hash, too_long, large_and_never_asked, unknown_blob, blob_of_another] {
-        assert_disconnected(Limits::default(), |stream| say(stream, &act));
+    for message in [never_asked, false_hash, too_long, large_and_never_asked, unknown_blob, blob_of_another] {
+        assert_disconnected(Limits::default(), |stream| say(stream, &message));
     }
 }
 

@@ -12,7 +12,7 @@ fn fit(name: &str, state: &str, outputs: &[(&str, &str)]) -> PartRow {
 }
 
 #[test]
-fn what_fits_have_written_is_there_no_later_than_the_next_transaction() {
+fn parts_are_written_no_later_than_the_next_transaction() {
     let folder = tempfile::tempdir().unwrap();
     let options = options(&folder);
     let mut journal = Journal::open(&options, NAME, None).unwrap();

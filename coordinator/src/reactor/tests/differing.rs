@@ -18,7 +18,7 @@ fn executed_twice() -> Bench {
 }
 
 #[test]
-fn error_that_comes_after_an_output_is_told_with_both_sites() {
+fn error_after_an_output_is_reported_with_both_sites() {
     let mut bench = executed_twice();
     bench.finish(B, 0, 2, 5);
     let said = bench.handle(failed(C, 0, 1));
@@ -27,7 +27,7 @@ fn error_that_comes_after_an_output_is_told_with_both_sites() {
 }
 
 #[test]
-fn output_that_comes_after_an_error_is_told_with_both_sites() {
+fn output_after_an_error_is_reported_with_both_sites() {
     let mut bench = executed_twice();
     bench.handle(failed(B, 0, 2));
     let said = bench.finish(C, 0, 1, 5);
@@ -36,7 +36,7 @@ fn output_that_comes_after_an_error_is_told_with_both_sites() {
 }
 
 #[test]
-fn what_was_stopped_has_no_opinion_and_nodes_here_are_stopped_at_once() {
+fn answer_of_a_cancelled_node_is_ignored_and_coordinator_nodes_are_cancelled_at_once() {
     let released = vec![NodeId(1)];
     let mut planner = Script { released, ..independent(1) };
     planner.nodes.push(node("here", vec![], Placement::Coordinator));

@@ -1,7 +1,7 @@
 use super::*;
 
 #[test]
-fn draining_worker_hands_back_what_it_has_not_begun_and_gets_nothing_more() {
+fn draining_worker_returns_nodes_it_has_not_started_and_gets_no_more() {
     let mut bench = Bench::new(independent(4));
     bench.join(A, 1);
     bench.start(A, 0, 1);
@@ -14,7 +14,7 @@ fn draining_worker_hands_back_what_it_has_not_begun_and_gets_nothing_more() {
 }
 
 #[test]
-fn death_of_a_draining_worker_counts_for_nobody() {
+fn death_of_a_draining_worker_counts_against_no_node() {
     let mut bench = Bench::new(independent(1));
     for number in 11..20 {
         let worker = WorkerId(number);
@@ -27,7 +27,7 @@ fn death_of_a_draining_worker_counts_for_nobody() {
 }
 
 #[test]
-fn work_waits_for_a_worker_that_comes_when_all_others_drain() {
+fn nodes_wait_for_a_new_worker_while_all_others_drain() {
     let mut bench = Bench::new(independent(2));
     bench.join(A, 1);
     bench.start(A, 0, 1);
@@ -40,7 +40,7 @@ fn work_waits_for_a_worker_that_comes_when_all_others_drain() {
 }
 
 #[test]
-fn late_start_of_what_was_handed_back_is_ignored_and_its_answer_taken() {
+fn late_start_of_a_returned_node_is_ignored_and_its_result_accepted() {
     let mut bench = Bench::new(independent(1));
     bench.join(A, 1);
     bench.handle(Event::WorkerDrains { worker: A });

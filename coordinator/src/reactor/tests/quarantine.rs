@@ -38,7 +38,7 @@ fn node_that_kills_its_workers_runs_alone_and_fails_by_name_after_three_more_dea
 }
 
 #[test]
-fn failure_of_a_suspect_is_its_own_and_the_others_complete() {
+fn failed_suspect_fails_alone_and_the_others_complete() {
     let mut bench = suspected(Script { tolerates_failures: true, ..independent(2) });
     for number in 20..23 {
         die(&mut bench, number);
@@ -50,7 +50,7 @@ fn failure_of_a_suspect_is_its_own_and_the_others_complete() {
 }
 
 #[test]
-fn innocent_node_completes_alone_and_its_worker_goes_on() {
+fn harmless_suspect_completes_alone_and_its_worker_continues() {
     let mut bench = suspected(independent(2));
     assert_eq!(bench.join(A, 1), ["worker 1 gets 0.3"]);
     bench.start(A, 0, 3);
@@ -76,7 +76,7 @@ fn only_deaths_alone_and_while_executing_count_against_a_suspect() {
 }
 
 #[test]
-fn nodes_that_shared_a_worker_with_a_killer_are_told_apart_from_it() {
+fn nodes_that_shared_a_worker_with_a_killer_do_not_fail() {
     let mut bench = Bench::new(Script { tolerates_failures: true, ..independent(2) });
     for number in 11..=12 {
         let worker = WorkerId(number);
@@ -120,7 +120,7 @@ fn suspected_beside_a_worker(nodes: usize) -> (Bench, NodeId) {
 }
 
 #[test]
-fn suspect_takes_a_fresh_worker_at_once_and_an_idle_one_after_a_moment() {
+fn suspect_gets_a_fresh_worker_at_once_and_an_idle_one_after_a_delay() {
     let (mut bench, suspect) = suspected_beside_a_worker(2);
     assert!(bench.core.members.get(A).unwrap().leases.is_empty());
     assert!(bench.live(1999, &[A]).is_empty());
@@ -132,7 +132,7 @@ fn suspect_takes_a_fresh_worker_at_once_and_an_idle_one_after_a_moment() {
 }
 
 #[test]
-fn without_a_fresh_or_idle_worker_one_is_cleared_and_has_the_suspect_for_itself() {
+fn without_a_fresh_or_idle_worker_one_is_cleared_for_the_suspect() {
     let (mut bench, suspect) = suspected_beside_a_worker(6);
     let leases = &bench.core.members.get(A).unwrap().leases;
     assert_eq!(leases.len(), 3);
@@ -149,7 +149,7 @@ fn without_a_fresh_or_idle_worker_one_is_cleared_and_has_the_suspect_for_itself(
 }
 
 #[test]
-fn worker_that_is_cleared_goes_on_when_a_fresh_one_comes() {
+fn worker_being_cleared_continues_when_a_fresh_one_joins() {
     let (mut bench, suspect) = suspected_beside_a_worker(6);
     let (busy_with, held) = bench.core.members.get(A).unwrap().leases.iter().next().map(|(n, h)| (*n, *h)).unwrap();
     bench.start(A, busy_with.0, held.attempt);
@@ -160,7 +160,7 @@ fn worker_that_is_cleared_goes_on_when_a_fresh_one_comes() {
 }
 
 #[test]
-fn while_workers_die_that_executed_nothing_a_suspect_is_excused_but_not_for_ever() {
+fn deaths_of_a_suspects_workers_count_less_while_idle_workers_die_too() {
     let mut bench = suspected(independent(1));
     let mut deaths = 0;
     while bench.planner.failed.is_empty() {
@@ -177,7 +177,7 @@ fn while_workers_die_that_executed_nothing_a_suspect_is_excused_but_not_for_ever
 }
 
 #[test]
-fn node_whose_workers_are_lost_time_and_again_waits_longer_and_longer() {
+fn node_whose_workers_are_lost_repeatedly_backs_off() {
     let mut bench = Bench::new(independent(1));
     let mut delays = Vec::new();
     for _ in 0..9 {
@@ -195,7 +195,7 @@ fn node_whose_workers_are_lost_time_and_again_waits_longer_and_longer() {
 }
 
 #[test]
-fn worker_that_ends_in_order_costs_its_nodes_no_time() {
+fn orderly_end_of_a_worker_does_not_delay_its_nodes() {
     let mut bench = Bench::new(independent(1));
     for _ in 0..9 {
         assert_eq!(bench.join(A, 1).len(), 1);

@@ -14,7 +14,7 @@ fn deaths(bench: &Bench, node: u64) -> u32 {
 }
 
 #[test]
-fn connection_that_is_reset_time_and_again_fails_no_node() {
+fn repeated_connection_resets_fail_no_node() {
     let mut bench = Bench::new(independent(1));
     let mut worker = WorkerId(1);
     bench.join_as(worker, 1, process(LONG));
@@ -40,7 +40,7 @@ fn connection_that_is_reset_time_and_again_fails_no_node() {
 }
 
 #[test]
-fn wire_that_cuts_all_off_at_once_makes_no_suspects_once_they_are_back() {
+fn network_outage_of_all_workers_makes_no_suspects_once_they_reconnect() {
     let mut bench = Bench::new(independent(4));
     for number in 1..=2 {
         bench.join_as(WorkerId(number), 2, process(number));
@@ -65,7 +65,7 @@ fn wire_that_cuts_all_off_at_once_makes_no_suspects_once_they_are_back() {
 }
 
 #[test]
-fn process_that_does_not_come_back_has_died_and_one_that_has_executed_something_is_not_fresh() {
+fn process_that_does_not_reconnect_counts_as_dead_and_one_that_executed_a_node_is_not_fresh() {
     let mut bench = Bench::new(independent(2));
     bench.join_as(A, 1, process(LONG));
     bench.start(A, 0, 1);
@@ -83,7 +83,7 @@ fn process_that_does_not_come_back_has_died_and_one_that_has_executed_something_
 }
 
 #[test]
-fn process_that_is_back_before_its_connection_is_missed_has_one_membership() {
+fn process_that_reconnects_before_its_loss_is_noticed_has_one_membership() {
     let mut bench = Bench::new(independent(1));
     bench.join_as(A, 1, process(LONG));
     bench.start(A, 0, 1);
@@ -93,7 +93,7 @@ fn process_that_is_back_before_its_connection_is_missed_has_one_membership() {
 }
 
 #[test]
-fn what_a_returned_worker_still_executes_it_goes_on_with() {
+fn reconnected_worker_keeps_the_nodes_it_still_executes() {
     let mut bench = Bench::new(independent(4));
     bench.join_as(A, 1, process(LONG));
     bench.start(A, 0, 1);
@@ -115,7 +115,7 @@ fn what_a_returned_worker_still_executes_it_goes_on_with() {
 }
 
 #[test]
-fn beside_one_that_has_begun_it_is_the_second_and_with_two_it_is_stopped() {
+fn node_of_a_reconnected_worker_runs_beside_one_other_execution_but_not_two() {
     let mut bench = Bench::new(independent(1));
     bench.join_as(A, 1, process(LONG));
     bench.start(A, 0, 1);
@@ -136,7 +136,7 @@ fn beside_one_that_has_begun_it_is_the_second_and_with_two_it_is_stopped() {
 }
 
 #[test]
-fn what_a_returned_worker_executes_for_nothing_is_stopped() {
+fn node_that_a_reconnected_worker_executes_needlessly_is_cancelled() {
     let mut bench = Bench::new(independent(2));
     bench.join_as(A, 1, process(LONG));
     bench.start(A, 0, 1);

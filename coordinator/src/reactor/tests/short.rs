@@ -26,7 +26,7 @@ fn one_short_node_does_not_make_its_kind_short() {
 }
 
 #[test]
-fn node_that_is_heard_of_late_has_taken_as_long_as_it_has() {
+fn late_report_of_a_node_counts_with_its_full_duration() {
     let mut bench = Bench::new(independent(1000));
     bench.join(A, 1);
     for node in 0..20 {
@@ -52,7 +52,7 @@ fn held(bench: &Bench, worker: WorkerId) -> usize {
 }
 
 #[test]
-fn short_nodes_are_given_out_many_at_a_time_and_long_ones_few() {
+fn short_nodes_are_assigned_in_large_groups_and_long_ones_in_small() {
     let bench = practised(1000, Duration::from_micros(50));
     assert_eq!(held(&bench, A), 200, "10 ms of work");
     let bench = practised(1000, Duration::from_micros(1));
@@ -61,7 +61,7 @@ fn short_nodes_are_given_out_many_at_a_time_and_long_ones_few() {
 }
 
 #[test]
-fn short_nodes_are_moved_only_from_a_worker_that_does_not_get_on() {
+fn short_nodes_are_moved_only_from_a_stalled_worker() {
     let mut bench = practised(50, Duration::from_micros(50));
     bench.start(A, 10, 1);
     assert_eq!(held(&bench, A), 40);

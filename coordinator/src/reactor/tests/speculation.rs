@@ -16,7 +16,7 @@ fn one_slow() -> Bench {
 }
 
 #[test]
-fn slow_node_is_given_to_an_idle_worker_when_its_time_has_come() {
+fn slow_node_is_also_assigned_to_an_idle_worker() {
     let mut bench = one_slow();
     // Twice the median is four seconds, but no node is slow before five. Six have passed.
     assert_eq!(bench.core.summary().speculated_nodes, 1);
@@ -49,7 +49,7 @@ fn reactor_is_woken_when_a_node_becomes_slow() {
 }
 
 #[test]
-fn nobody_helps_against_the_policy_and_without_experience_only_after_long() {
+fn speculation_follows_the_policy_and_starts_late_without_known_durations() {
     let never = Policy { speculation: Speculation { factor: None, ..Speculation::default() }, ..Policy::default() };
     for (policy, done) in [(Policy::default(), 0), (never, 1)] {
         let mut bench = Bench::with(independent(1 + done), policy);
@@ -70,7 +70,7 @@ fn nobody_helps_against_the_policy_and_without_experience_only_after_long() {
 }
 
 #[test]
-fn helper_that_leaves_is_replaced_and_the_first_worker_keeps_its_lease() {
+fn speculative_worker_that_leaves_is_replaced_and_the_first_keeps_its_lease() {
     let mut bench = one_slow();
     assert!(bench.lose(B, Departure::Lost).is_empty(), "worker 1 still has the node");
     assert_eq!(bench.join(C, 1), ["worker 3 gets 0.3", "n0 is slow, worker 3 helps"]);
@@ -82,7 +82,7 @@ fn helper_that_leaves_is_replaced_and_the_first_worker_keeps_its_lease() {
 }
 
 #[test]
-fn worker_that_does_not_begin_is_helped() {
+fn node_that_its_worker_does_not_start_is_speculated() {
     let mut bench = Bench::new(independent(1));
     bench.join(A, 1);
     bench.join(B, 1);

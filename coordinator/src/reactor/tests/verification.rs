@@ -5,7 +5,7 @@ fn all() -> Policy {
 }
 
 #[test]
-fn output_is_believed_once_another_worker_has_it_too() {
+fn output_is_accepted_when_a_second_worker_computes_the_same() {
     let mut bench = Bench::with(independent(1), all());
     bench.join(A, 1);
     bench.join(B, 1);
@@ -36,7 +36,7 @@ fn outputs_that_differ_end_the_run_and_name_both_workers() {
 }
 
 #[test]
-fn error_after_an_output_is_a_difference_too() {
+fn error_after_an_output_is_a_mismatch() {
     let mut bench = Bench::with(independent(1), all());
     bench.join(A, 1);
     bench.join(B, 1);
@@ -62,7 +62,7 @@ fn only_worker_verifies_its_own_output() {
 }
 
 #[test]
-fn verifier_that_dies_is_replaced_and_a_suspect_is_taken_as_it_is() {
+fn dead_verifier_is_replaced_and_the_output_of_a_suspect_is_not_verified() {
     let mut bench = Bench::with(independent(1), all());
     bench.join(A, 1);
     bench.finish(A, 0, 1, 5);
@@ -79,7 +79,7 @@ fn verifier_that_dies_is_replaced_and_a_suspect_is_taken_as_it_is() {
 }
 
 #[test]
-fn share_that_is_verified_is_that_of_the_policy_and_the_same_in_every_run() {
+fn verified_share_is_that_of_the_policy_and_the_same_in_every_run() {
     let chosen = |fraction: f64, verify_seed: u64| {
         let nodes = (0..2000_u32)
             .map(|index| NodeSpec { parameters: index.to_le_bytes().to_vec(), ..node("n", vec![], Placement::Worker) });
@@ -97,7 +97,7 @@ fn share_that_is_verified_is_that_of_the_policy_and_the_same_in_every_run() {
 }
 
 #[test]
-fn planner_that_checks_outputs_itself_has_none_verified() {
+fn outputs_that_the_planner_checks_are_not_verified() {
     let mut bench = Bench::with(Script { checks_itself: true, ..independent(1) }, all());
     bench.join(A, 1);
     bench.finish(A, 0, 1, 5);
@@ -105,7 +105,7 @@ fn planner_that_checks_outputs_itself_has_none_verified() {
 }
 
 #[test]
-fn one_computation_that_is_answered_under_two_leases_verifies_nothing() {
+fn one_computation_returned_under_two_leases_does_not_verify_itself() {
     let mut bench = Bench::with(independent(1), all());
     bench.join_as(A, 1, process(7));
     bench.start(A, 0, 1);
@@ -125,7 +125,7 @@ fn one_computation_that_is_answered_under_two_leases_verifies_nothing() {
 }
 
 #[test]
-fn process_is_not_another_one_for_being_back_under_another_number() {
+fn reconnected_process_does_not_verify_its_own_output() {
     let mut bench = Bench::with(independent(1), all());
     bench.join_as(A, 1, process(7));
     bench.start(A, 0, 1);
