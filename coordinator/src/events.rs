@@ -10,7 +10,7 @@ use lookalike::graph::{FailureReason, NodeId, WorkerId};
 pub enum Departure {
     /// Its connection ended without a word: the process died, or the network broke.
     Lost,
-    /// It was not heard of for too long.
+    /// It was silent for too long.
     Silent,
     /// It did not read what was sent to it.
     TooSlow,
@@ -53,9 +53,9 @@ impl fmt::Display for Departure {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Lost => formatter.write_str("its connection ended"),
-            Self::Silent => formatter.write_str("it was not heard of for too long"),
+            Self::Silent => formatter.write_str("it was silent for too long"),
             Self::TooSlow => formatter.write_str("it did not read what was sent to it"),
-            Self::Replaced => formatter.write_str("it came back on another connection"),
+            Self::Replaced => formatter.write_str("it reconnected"),
             Self::Goodbye => formatter.write_str("it was asked to end"),
             Self::Violation(what) => write!(formatter, "it broke the protocol: {what}"),
         }

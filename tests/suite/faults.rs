@@ -101,7 +101,7 @@ fn worker_asked_to_end_finishes_its_executing_nodes() {
         assert_eq!(departure(&cluster), Departure::Goodbye);
         let output = worker.output();
         assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
-        assert!(stderr(&output).contains("asked to end: finishing what is being computed"), "{}", stderr(&output));
+        assert!(stderr(&output).contains("asked to end: finishing the nodes being computed"), "{}", stderr(&output));
         // The last node needs another worker.
         let another = Process::start(Command::new(PROGRAM).args(["worker", "--access"]).arg(cluster.access_file()));
         let (result, summary) = cluster.finish();

@@ -167,7 +167,7 @@ fn occupied_port_is_named_with_a_remedy() {
     let squatter = TcpListener::bind(&address).unwrap();
     let refused = coordinator(&gate, 2, 2, &folder).output();
     assert_eq!(refused.status.code(), Some(2), "{}", stderr(&refused));
-    let expected = format!("cannot listen on {address}, where the workers of this run look for their coordinator");
+    let expected = format!("cannot listen on {address}, the address to which the workers of this run connect");
     assert!(stderr(&refused).contains(&expected), "{}", stderr(&refused));
     drop(squatter);
     let second = coordinator(&gate, 2, 2, &folder);

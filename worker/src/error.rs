@@ -39,7 +39,7 @@ pub enum WorkerError {
         source: WireError,
     },
     /// The coordinator cannot be reached any more.
-    #[error("gave up on the coordinator at {address} after {} s without it", after.as_secs())]
+    #[error("gave up on the coordinator at {address}: no connection for {} s", after.as_secs())]
     CoordinatorLost {
         /// Where the coordinator should be.
         address: String,

@@ -136,7 +136,7 @@ impl<W: World> Session<W> {
             if after >= patience {
                 return Err(WorkerError::CoordinatorLost { address: self.address.clone(), after, source: error });
             }
-            info!(address = %self.address, %error, ?pause, "without coordinator, trying again");
+            info!(address = %self.address, %error, ?pause, "no coordinator, retrying");
             let wishes = self.wishes.clone();
             tokio::select! {
                 biased;
@@ -156,7 +156,7 @@ impl<W: World> Session<W> {
         self.tasks.drain();
         if !self.tasks.are_done() {
             let seconds = self.drain_time.as_secs_f64();
-            warn!("asked to end: finishing what is being computed, for at most {seconds} s; ask again to end at once");
+            warn!("asked to end: finishing the nodes being computed, for at most {seconds} s; signal again to end at once");
         }
     }
 

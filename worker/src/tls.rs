@@ -63,7 +63,7 @@ pub enum TlsError {
     Impostor,
     /// The peer does not speak TLS 1.3, or has no common cipher suite.
     #[error(
-        "expected TLS 1.3, found something else ({found}); is the address right, and the coordinator of the same build?"
+        "expected TLS 1.3, but the handshake failed ({found}); check the address, and that the coordinator is of the same build"
     )]
     NotTls13 {
         /// The error of rustls.

@@ -104,7 +104,7 @@ mod tests {
         window.demand.note(&RunEvent::WorkerLeft { worker: WorkerId(1), departure: Departure::Lost });
         assert!(
             has_room(&window, 1, 1, 0, 0) && !has_room(&window, 1, 2, 0, 0),
-            "the one that was expected is not given up"
+            "the expected fit is not dropped"
         );
     }
 

@@ -8,7 +8,7 @@ pub(crate) fn run(settings: AccessSettings) -> anyhow::Result<ExitCode> {
     let AccessSettings { address, out } = settings;
     Credentials::new(address.to_string(), SystemTime::now())?.create(&out)?;
     eprintln!(
-        "wrote {}, which workers need, and {}, which only their coordinator may have",
+        "wrote {} for workers, and {} for the coordinator only",
         out.display(),
         key_path(&out).display()
     );

@@ -104,7 +104,7 @@ fn tell(settings: &RenderSettings, light: &LoadedEnvironment, rendering: &Render
     }
     if let Some(exposure) = exposure {
         let exposure = format!(
-            "display exposure: {exposure} (auto: 97th percentile of the object's largest channel to 0.9), clipped, sRGB"
+            "display exposure: {exposure} (auto: the 97th percentile of the object's largest channel becomes 0.9), clipped, sRGB"
         );
         eprintln!("{}", wrap(&exposure));
     }

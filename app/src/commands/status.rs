@@ -30,7 +30,7 @@ pub(crate) fn run(settings: &StatusSettings) -> anyhow::Result<ExitCode> {
 fn table(status: &Status, folder: &str) -> String {
     let mut text = format!("{folder}: {}\n\n", headline(status));
     let mut line = |name: &str, value: String| text.push_str(&format!("{name:<12}{value}\n"));
-    line("began", format!("{}, {} at work", short(&status.started_at), seconds(status.elapsed_s)));
+    line("started", format!("{}, {} elapsed", short(&status.started_at), seconds(status.elapsed_s)));
     match &status.finished_at {
         Some(finished) => line("finished", short(finished)),
         None => line("last seen", short(&status.updated_at)),
@@ -149,7 +149,7 @@ fn workers(status: &Status) -> String {
     if status.workers.is_empty() || status.state != RunState::Running {
         return String::new();
     }
-    let mut text = format!("\n{:>6}  {:>8}  {:>7}  {:>8}  {:>7}\n", "worker", "process", "threads", "at work", "done");
+    let mut text = format!("\n{:>6}  {:>8}  {:>7}  {:>8}  {:>7}\n", "worker", "process", "threads", "running", "done");
     for worker in status.workers.iter().take(MOST_WORKERS) {
         let (number, process, threads) = (worker.worker, worker.process, worker.threads);
         text.push_str(&format!(
@@ -212,7 +212,7 @@ mod tests {
         let expected = "\
 run: stopped, not finished
 
-began       2026-11-22 09:20:11 UTC, 1h 2m 3s at work
+started     2026-11-22 09:20:11 UTC, 1h 2m 3s elapsed
 last seen   2026-11-22 09:21:11 UTC
 coordinator process 7 on h, the 2nd of this run
 nodes       21 of 30 done (5 by an earlier coordinator), 1 running, 4 ready, 3 waiting, 1 failed

@@ -24,7 +24,7 @@ impl SlurmJob {
             let flag = argument.split('=').next().unwrap_or_default();
             if OF_THE_SCRIPT.contains(&flag) {
                 bail!(
-                    "{flag} is not for a job of Slurm: the job script starts a worker on each node and gives it the address; leave {flag} out"
+                    "{flag} cannot be used in a Slurm job, whose script starts a worker on each node and gives it the address; leave {flag} out"
                 );
             }
         }

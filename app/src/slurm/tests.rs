@@ -58,7 +58,7 @@ fn shell_reads_the_command_line_as_it_was_given() {
 fn flags_that_say_where_workers_are_and_options_of_two_lines_are_refused() {
     let mut wrong = job(Path::new("/scratch/run"));
     wrong.command.push("--workers=3".into());
-    assert!(wrong.script().unwrap_err().to_string().starts_with("--workers is not for a job of Slurm"));
+    assert!(wrong.script().unwrap_err().to_string().starts_with("--workers cannot be used in a Slurm job"));
     let mut wrong = job(Path::new("/scratch/run"));
     wrong.options.push("--comment=a\nrm -rf b".into());
     assert!(wrong.script().unwrap_err().to_string().contains("one line"));

@@ -1,9 +1,9 @@
 //! `ggx-f90`: `ggx` whose reflectance at grazing incidence is a parameter.
 //!
-//! `f = kd/pi + F D V` with `D` and `V` of `ggx` and `F = f0 + (f90 - f0) F5`, `F5 = (1 - v.h)^5` (Schlick 1994, with his 1 replaced).
+//! `f = kd/pi + F D V` with `D` and `V` of `ggx` and `F = f0 + (f90 - f0) F5`, `F5 = (1 - v.h)^5`: Schlick (1994) with `f90` instead of 1.
 //!
-//! A smooth interface reflects all light at grazing incidence. The measured materials of docs/results.md darken towards the rim, either
-//! by their roughness or by the way they were measured and fitted; `ggx` renders them with a rim that is too bright.
+//! A smooth interface reflects all light at grazing incidence, and so does `ggx`. The measured materials of docs/results.md reflect less
+//! there, because they are rough or because of how they were measured and fitted, so the rim of their `ggx` renderings is too bright.
 //! MaterialX has this model as the generalized Schlick BSDF with a grey `color90`.
 //!
 //! Split: `F = f0 (1 - F5) + f90 F5`, so the weights are `kd`, `f0` and `f90`.
@@ -12,7 +12,7 @@
 //! |---|---|---|
 //! | `kd` | diffuse albedo, linear Rec. 709 | [0, 1] |
 //! | `f0` | specular reflectance at normal incidence, linear Rec. 709 | [0, 1] |
-//! | `f90` | specular reflectance at grazing incidence, of all colours | [0, 1] |
+//! | `f90` | specular reflectance at grazing incidence, the same in all channels | [0, 1] |
 //! | `alpha` | microfacet width (an artist's roughness is its square root) | [0.005, 1] |
 
 use super::{BasisLobe, Lambert, LinearModel, Parameter, Role, Weight, Width, ggx::GgxLobe};

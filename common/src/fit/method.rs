@@ -9,7 +9,7 @@ use crate::{
 use std::{fmt, str::FromStr};
 use thiserror::Error;
 
-/// How Eq. 1 is minimised.
+/// The search that minimises Eq. 1.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum SearchKind {
     /// Generalised pattern search, as in the paper.
@@ -37,15 +37,15 @@ pub enum Integration {
     },
 }
 
-/// A text that is no [`Integration`].
+/// The text does not name an [`Integration`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
 #[error("expected tables, direct or direct:SAMPLES with 1 to {MOST_SAMPLES} samples per pixel")]
 pub struct UnknownIntegration;
 
-/// Samples per pixel of `direct` unless it says how many.
+/// Samples per pixel of `direct` without a number.
 const DIRECT_SAMPLES: u32 = 256;
 
-/// Most samples per pixel that a text may ask for.
+/// The most samples per pixel that `direct:SAMPLES` accepts.
 const MOST_SAMPLES: u32 = 1 << 20;
 
 impl FromStr for Integration {
@@ -84,11 +84,11 @@ pub enum Start {
     Paper,
 }
 
-/// The function that Eq. 1 applies to radiance: the power `1/gamma` with a rule for values at and below zero, or an alternative for
-/// studies.
+/// The function that Eq. 1 applies to radiance before it compares: the power `1/gamma`, which needs a rule at and below zero, or a
+/// function that studies compare with it.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub enum Compress {
-    /// The power; below its knee, its tangent line.
+    /// The power; below a small radiance, the knee, its tangent.
     #[default]
     Tangent,
     /// The power of `max(x, 0)`, as in the paper.
@@ -102,7 +102,7 @@ pub enum Compress {
     Logarithm,
 }
 
-/// Which score selects and polishes.
+/// The score by which stage two selects and stage three polishes.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum JudgedBy {
     /// CSSIM over the whole image, as in the paper.
@@ -126,11 +126,11 @@ pub struct Method {
     pub gammas: Vec<f64>,
     /// Pixels of stage one.
     pub samples: SampleCount,
-    /// How these pixels are drawn.
+    /// The distribution from which they are drawn.
     pub sampling: Sampling,
-    /// Independent subsets, at least 1.
+    /// The number of independent pixel subsets, at least 1.
     pub subsets: u32,
-    /// How Eq. 1 is minimised.
+    /// The search that minimises Eq. 1.
     pub search: SearchKind,
     /// How stage one renders its pixels.
     pub integration: Integration,
@@ -140,7 +140,7 @@ pub struct Method {
     pub compress: Compress,
     /// Whether stage three runs.
     pub polish: bool,
-    /// Which score selects and polishes.
+    /// The score by which stage two selects and stage three polishes.
     pub judge: JudgedBy,
     /// Seed of every random choice.
     pub seed: u64,
@@ -165,37 +165,37 @@ impl Default for Method {
     }
 }
 
-/// Most searches of one fit: their candidates are sent to stage two in one message.
+/// The most searches of one fit: their candidates are sent to stage two in one message.
 pub const MOST_SEARCHES: usize = 5000;
 
-/// What is wrong with a method.
+/// An invalid setting of the method.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum MethodError {
-    /// Gammas must be positive and ascending.
+    /// The gammas are not positive and ascending.
     #[error("gammas must be positive, finite and ascending, found {found:?}")]
     Gammas {
         /// The values given.
         found: Vec<f64>,
     },
-    /// No pixels.
+    /// The number of samples is 0.
     #[error("the number of samples must be at least 1, found 0; the paper uses 256")]
     NoSamples,
-    /// No subsets.
+    /// The number of subsets is 0.
     #[error("the number of subsets must be at least 1, found 0")]
     NoSubsets,
-    /// All subsets would be the same.
+    /// Several subsets of all pixels.
     #[error("{subsets} subsets of all pixels would be equal: use 1 subset, or give a number of samples")]
     SameSubsets {
         /// The number of subsets.
         subsets: u32,
     },
-    /// The direct integrator has no derivatives.
+    /// Least squares with the direct integrator, which has no derivatives.
     #[error(
         "the direct integrator (--integrator direct) has no derivatives, which least squares needs: use --search pattern"
     )]
     NoDerivatives,
-    /// Too many gammas times subsets.
+    /// More than [`MOST_SEARCHES`] gammas times subsets.
     #[error(
         "{found} searches (gammas times subsets) are more than the limit of {MOST_SEARCHES}: use fewer gammas or subsets"
     )]
@@ -206,7 +206,7 @@ pub enum MethodError {
 }
 
 impl Method {
-    /// Checks the settings that their types do not.
+    /// Checks the settings that their types do not check.
     ///
     /// # Errors
     /// Names the setting that is out of range.

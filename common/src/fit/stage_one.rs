@@ -117,7 +117,7 @@ pub(crate) fn objective_of<'a>(
     Objective::new(method.model, table, subset, photo, compression)
 }
 
-/// The evaluations of a search without its start, which was evaluated and counted before.
+/// The evaluations of a search except that of its start, which the scan has already counted.
 fn beyond_its_start(evaluations: usize) -> usize {
     evaluations.saturating_sub(1)
 }
@@ -143,8 +143,8 @@ pub(super) fn paper_start(model: &dyn Model) -> Vec<f64> {
     model.parameters().iter().flat_map(|p| std::iter::repeat_n(p.start, p.channels.count())).collect()
 }
 
-/// The box of a model's parameters. Least squares steps in the logarithm of widths, in which the table's grid is even; pattern search
-/// uses the scale that the model declares for each parameter.
+/// The bounds of a model's parameters and the scale in which a search steps. Least squares steps in the logarithm of a width, because the
+/// table's widths are evenly spaced in it. For all other parameters, and in pattern search, the model declares the scale.
 pub(super) fn search_bounds(model: &dyn Model, search: SearchKind) -> Result<Bounds, SearchError> {
     let (lower, upper) = flat_bounds(model.parameters());
     let declared = model.parameters().iter().flat_map(|p| std::iter::repeat_n(p.scale, p.channels.count()));

@@ -81,7 +81,7 @@ pub enum AccessError {
     },
     /// The certificate is not a pin. The message does not repeat it, because it may be the secret in the wrong field.
     #[error(
-        "expected a \"certificate\" of the form blake3:HASH with 64 hexadecimal digits, found something else; was the file written by another version?"
+        "expected a \"certificate\" of the form blake3:HASH with 64 hexadecimal digits, found another text; check whether another version wrote the file"
     )]
     Certificate,
 }

@@ -69,7 +69,7 @@ const COORDINATOR_LABEL: &[u8] = b"lookalike coordinator proof";
 #[non_exhaustive]
 pub enum HandshakeError {
     /// The peer does not speak this protocol.
-    #[error("expected the greeting of a lookalike coordinator or worker, found something else; is the address right?")]
+    #[error("expected the greeting of a lookalike coordinator or worker, found other bytes; check the address")]
     Magic,
     /// The peer speaks another version.
     #[error("expected protocol version {expected}, found {found}; use the same build of coordinator and worker")]

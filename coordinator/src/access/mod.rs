@@ -65,7 +65,7 @@ pub enum CredentialsError {
     },
     /// The key file cannot be read.
     #[error(
-        "cannot read the coordinator's key {}; it is made together with the access file by `lookalike access new` and has to lie beside it",
+        "cannot read the coordinator's key {}; `lookalike access new` creates it together with the access file, and both must be in one folder",
         path.display()
     )]
     ReadKey {

@@ -92,7 +92,7 @@ pub enum JournalError {
         path: PathBuf,
     },
     /// The journal's file cannot be created.
-    #[error("cannot make the journal {}", path.display())]
+    #[error("cannot create the journal {}", path.display())]
     Create {
         /// The journal.
         path: PathBuf,

@@ -26,7 +26,7 @@ pub struct RunLock {
 #[non_exhaustive]
 pub enum LockError {
     /// Another process holds it.
-    #[error("another coordinator is at work in {} ({holder}): wait for it to end, or choose another --out", folder.display())]
+    #[error("another coordinator is running in {} ({holder}): wait for it to end, or choose another --out", folder.display())]
     Held {
         /// The folder.
         folder: PathBuf,

@@ -94,7 +94,7 @@ impl http::Pages for Metrics {
 fn health(age: Option<Duration>) -> Result<(), String> {
     match age.filter(|age| *age > LONGEST_ROUND) {
         None => Ok(()),
-        Some(age) => Err(format!("the loop that hands out work went round {} s ago", age.as_secs())),
+        Some(age) => Err(format!("the event loop last ran {} s ago", age.as_secs())),
     }
 }
 

@@ -137,7 +137,7 @@ fn health_is_that_of_the_event_loop() {
     }
     let hangs = answer(Some(31));
     assert!(hangs.starts_with("HTTP/1.1 503 Service Unavailable\r\n"), "{hangs}");
-    assert!(hangs.ends_with("\r\n\r\nthe loop that hands out work went round 31 s ago\n"), "{hangs}");
+    assert!(hangs.ends_with("\r\n\r\nthe event loop last ran 31 s ago\n"), "{hangs}");
 }
 
 #[test]

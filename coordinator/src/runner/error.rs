@@ -30,7 +30,7 @@ pub enum RunError {
         listen: SocketAddr,
     },
     /// The coordinator cannot listen.
-    #[error("cannot listen on {listen}; is the address this machine's, and the port free?")]
+    #[error("cannot listen on {listen}; check that the address belongs to this machine and that the port is free")]
     Listen {
         /// The address.
         listen: SocketAddr,
@@ -39,7 +39,7 @@ pub enum RunError {
     },
     /// The coordinator cannot listen at the address to which the run's workers connect.
     #[error(
-        "cannot listen on {listen}, where the workers of this run look for their coordinator; end the process that has the port, or name another one with --listen IP:PORT, which workers elsewhere have to be told"
+        "cannot listen on {listen}, the address to which the workers of this run connect; end the process that uses the port, or choose another one with --listen IP:PORT and copy the new access file to the remote workers"
     )]
     PortTaken {
         /// The address.

@@ -202,8 +202,8 @@ fn invalid_command_lines_are_refused_before_anything_is_started() {
         ("demo --out run", "expected the command batch, study or fit, found demo"),
         ("fit photo.exr --env map.exr", "expected --out DIR"),
         ("study study.toml", "expected --out DIR"),
-        ("fit photo.exr --env map.exr --out run --workers 3", "--workers is not for a job of Slurm"),
-        ("fit photo.exr --env map.exr --out run --listen=0.0.0.0:1", "--listen is not for a job of Slurm"),
+        ("fit photo.exr --env map.exr --out run --workers 3", "--workers cannot be used in a Slurm job"),
+        ("fit photo.exr --env map.exr --out run --listen=0.0.0.0:1", "--listen cannot be used in a Slurm job"),
     ];
     for (line, words) in cases {
         let output = Process::start(&mut job(site.path(), line, &[])).output();

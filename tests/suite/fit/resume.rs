@@ -147,7 +147,7 @@ fn second_coordinator_in_one_folder_is_refused_with_the_process_id_of_the_first(
     let lock = RunLock::take(&out).unwrap();
     let who = format!("process {} on ", std::process::id());
     for flags in [QUICK.to_owned(), format!("{QUICK} --resume")] {
-        fit(folder.path(), "out", &flags).refused(&["another coordinator is at work in out", &who]);
+        fit(folder.path(), "out", &flags).refused(&["another coordinator is running in out", &who]);
     }
     drop(lock);
     fit(folder.path(), "out", &format!("{QUICK} --gammas 1")).done();

@@ -132,7 +132,7 @@ fn worker_refuses_a_server_that_is_not_a_coordinator() {
             stream.write_all(&answer).unwrap();
             let _ = read_to_the_end(stream);
         };
-        assert_ends(&pinned, behave, &["expected TLS 1.3, found something else", "is the address right"]);
+        assert_ends(&pinned, behave, &["expected TLS 1.3, but the handshake failed", "check the address"]);
     }
 }
 

@@ -58,7 +58,7 @@ fn stored_references_match_the_integrator() {
     }
     assert!(text.len() < 100_000, "{} bytes", text.len());
     let stored = std::fs::read_to_string(FILE).unwrap();
-    assert!(text == stored, "the integrator says something else: see LOOKALIKE_BLESS in this file");
+    assert!(text == stored, "the integrator gives other values: see LOOKALIKE_BLESS in this file");
 }
 
 /// A section of the file, with one line for each entry.

@@ -108,7 +108,7 @@ const FEATURES: [&str; 5] = ["lightness", "contrast", "structure", "chroma", "hu
 /// How the exposure was chosen, in words.
 fn exposure_source(asked: &DisplayExposure) -> String {
     match asked {
-        DisplayExposure::Auto => "auto: 97th percentile of the reference's largest channel to 0.9".to_owned(),
+        DisplayExposure::Auto => "auto: the 97th percentile of the reference's largest channel becomes 0.9".to_owned(),
         DisplayExposure::Value(_) => "as given; 1 unless --display-exposure says otherwise".to_owned(),
         DisplayExposure::From(path) => format!("from {}", path.display()),
     }
