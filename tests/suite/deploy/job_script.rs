@@ -154,8 +154,8 @@ fn killed_worker_and_coordinator_are_restarted_and_results_are_the_same() {
     });
     assert!(worker.is_some() && coordinator.is_some(), "{events:?}");
     assert_eq!(output.status.code(), Some(0), "{events:?}");
-    assert!(says(&events, "ended with status 137; starting it again in 1 s"), "{events:?}");
-    assert!(says(&events, "the coordinator was killed (status 137); starting it again"), "{events:?}");
+    assert!(says(&events, "ended with status 137; restarting it in 1 s"), "{events:?}");
+    assert!(says(&events, "the coordinator was killed (status 137); restarting it"), "{events:?}");
     assert_same_as_local(site.path(), "run");
 }
 
@@ -171,7 +171,7 @@ fn time_limit_requeues_the_job_and_its_restart_resumes_the_run() {
     });
     assert_eq!(output.status.code(), Some(130), "{events:?}");
     assert_eq!(fs::read_to_string(site.path().join("requeued")).unwrap(), "7\n");
-    assert!(says(&events, "the time limit is near; giving the job back to the queue"), "{events:?}");
+    assert!(says(&events, "the time limit is near; requeueing the job"), "{events:?}");
     let (output, events) = watch(job(site.path(), &line("run"), &[("SLURM_RESTART_COUNT", "1")]), |_, _| ());
     assert_eq!(output.status.code(), Some(0), "{events:?}");
     assert!(!events.iter().any(|event| is(event, "node-started", "search")), "searches were done twice: {events:?}");
@@ -190,7 +190,7 @@ fn job_requeued_too_often_reports_it_and_ends() {
         }
     });
     assert_eq!(output.status.code(), Some(130), "{events:?}");
-    assert!(says(&events, "the job was given back 2 times already"), "{events:?}");
+    assert!(says(&events, "the job was requeued 2 times already"), "{events:?}");
     assert!(!site.path().join("requeued").exists());
 }
 
