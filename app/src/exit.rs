@@ -13,7 +13,7 @@ pub enum Exit {
     MissedMaxCssim = 1,
     /// Bad input or usage.
     BadInput = 2,
-    /// The run failed: no workers, a worker or node at fault, a full disk.
+    /// The run failed: no workers, a faulty worker or node, a full disk.
     ClusterFailed = 3,
     /// Some fits of a batch failed, the others are complete.
     SomeFitsFailed = 4,

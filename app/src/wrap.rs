@@ -1,4 +1,4 @@
-//! Results for people: lines of at most 100 columns.
+//! Wraps results for people to lines of at most 100 columns.
 
 use textwrap::{Options, WordSplitter};
 

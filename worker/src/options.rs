@@ -21,8 +21,8 @@ pub struct Arguments {
     #[arg(long, value_name = "TIME", default_value = "10min", value_parser = humantime::parse_duration)]
     pub reconnect_for: Duration,
 
-    /// How long to finish what is being computed when asked to end by SIGTERM or Ctrl-C, before it goes to others; asked twice,
-    /// the worker ends at once [default: as the coordinator says, 30s]
+    /// How long to finish running nodes after SIGTERM or Ctrl-C; other workers then compute those that are not finished. A second
+    /// signal ends the worker at once [default: the coordinator's --drain-time, 30s]
     #[arg(long, value_name = "TIME", value_parser = humantime::parse_duration)]
     pub drain_time: Option<Duration>,
 

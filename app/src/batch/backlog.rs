@@ -1,4 +1,4 @@
-//! Fits whose nodes have ended and whose results are not written yet: what their files need is still in memory.
+//! Fits whose nodes have ended but whose results are not written yet, and therefore still in memory.
 
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 

@@ -1,4 +1,4 @@
-//! The parts of the run: takes fits from the loader, and hands ended ones to the writers of results.
+//! The fits as parts of the run: takes them from the loader, and passes ended ones to the writers of results.
 
 use super::{
     backlog::Load,

@@ -1,4 +1,4 @@
-//! Which tokens of an argument list are positional, told from the grammar before it is parsed.
+//! Finds the positional arguments of a command line before clap parses it, from the grammar.
 
 use clap::{Arg, Command};
 use std::ffi::OsString;

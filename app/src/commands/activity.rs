@@ -1,4 +1,4 @@
-//! What a command does, in lines on stderr, where there is no other display: the first after 2 s, then one every 10 s.
+//! Lines on stderr that say what a slow command does, where there is no other display: one after 2 s, then one every 10 s.
 
 use std::{
     io::{self, Write as _},

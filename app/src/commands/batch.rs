@@ -1,4 +1,4 @@
-//! `lookalike batch`: many fits as one run, here or as a job of Slurm.
+//! `lookalike batch`: many fits as one run, on this machine or as a Slurm job.
 
 use super::submit;
 use crate::{

@@ -1,4 +1,4 @@
-//! `lookalike study`: the paper's experiments as one run, here or as a job of Slurm.
+//! `lookalike study`: the paper's experiments as one run, on this machine or as a Slurm job.
 
 use super::submit;
 use crate::{

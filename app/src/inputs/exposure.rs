@@ -1,4 +1,4 @@
-//! `--display-exposure`: from what was asked for to a number.
+//! `--display-exposure`: computes or reads the number that the flag stands for.
 
 use super::file::read_with;
 use crate::settings::DisplayExposure;

@@ -1,4 +1,4 @@
-//! The bytes of a file, and its name by content.
+//! Reads a file, and describes it by its path and the hash of its content.
 
 use anyhow::{Context, anyhow};
 use lookalike::image::{Image, content_hash};

@@ -1,4 +1,4 @@
-//! What to render: parameters of a model by name, or a measured table.
+//! The material to render: the named parameters of a model, or a measured table.
 
 use super::file::{InputFile, read_with};
 use crate::settings::ModelParams;

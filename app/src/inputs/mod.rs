@@ -1,7 +1,7 @@
 //! From settings to the objects of the science: the files a user names are read, decoded and checked here, once.
 //!
-//! Every error says which file was to serve as what, what was expected and found, and what to do. What can be used but should be known
-//! comes back as warnings, which the caller shows ([`show_warnings`]). Every file that shapes a result comes with the
+//! Every error says which file was to serve as what, what was expected and found, and what to do. An input that can be used but is doubtful
+//! comes with warnings, which the caller shows ([`show_warnings`]). Every file that shapes a result comes with the
 //! hash of its decoded content ([`InputFile`]), for `fit.json` and the metadata of images.
 //!
 //! What is deliberately absent: nothing here renders, scores or writes a file.

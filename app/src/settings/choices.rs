@@ -1,4 +1,4 @@
-//! Settings of the program alone that are one of a few names. The comment of each name is its line in `--help`.
+//! Settings whose values are names that the program defines. The comment of each name is its line in `--help`.
 
 use clap::ValueEnum;
 

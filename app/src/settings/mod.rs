@@ -1,4 +1,4 @@
-//! Settings: what a command is to do, in types that cannot hold nonsense.
+//! Settings: what a command is to do, in types that cannot hold invalid values.
 //!
 //! Raw arguments (`cli::args`, clap) become these structs in one place, with every default and rule applied; nothing
 //! downstream validates again. One struct per command. What the library knows (cameras, methods, layouts of maps) is the library's

@@ -1,4 +1,4 @@
-//! A photo, what surrounds its object and how it is seen.
+//! The scene of a photo: the light, the shape of the object and the camera.
 
 use lookalike::{
     light::Mapping,

@@ -1,4 +1,4 @@
-//! What a job runs, from what the user typed to submit it.
+//! The command line of a job, from the one with which the user submits it.
 
 use anyhow::bail;
 use std::ffi::OsString;

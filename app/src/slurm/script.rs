@@ -1,4 +1,4 @@
-//! The job script: `deploy/slurm/lookalike.sbatch` with a command line and options in the places that it marks for them.
+//! The job script: `deploy/slurm/lookalike.sbatch` with a command line and options inserted at the marked lines.
 
 use super::SlurmJob;
 use anyhow::{Context, bail};

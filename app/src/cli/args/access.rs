@@ -19,7 +19,7 @@ enum AccessCommand {
         /// Host and port where workers will reach the coordinator, for example node7:4100
         #[arg(long, value_name = "HOST:PORT", value_parser = with_port)]
         address: Advertise,
-        /// File to write, readable by its owner only; the key goes beside it, cluster.key.pem to cluster.json
+        /// File to write, readable by its owner only; the key goes beside it, for example cluster.key.pem for cluster.json
         #[arg(long, short, value_name = "FILE", help_heading = "Output")]
         out: PathBuf,
     },

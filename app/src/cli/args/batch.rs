@@ -19,7 +19,7 @@ pub(crate) struct BatchArgs {
     /// These override the manifest.
     #[command(flatten)]
     method: MethodArgs,
-    /// Flags of the method that were given, as they were typed.
+    /// The flags of the method on the command line, as typed.
     #[arg(skip)]
     pub(crate) given: Vec<OsString>,
     /// The whole command line, the command first.
@@ -57,7 +57,7 @@ pub(crate) struct BatchArgs {
 }
 
 impl BatchArgs {
-    /// The settings, for fits that the manifest lists.
+    /// The settings of a batch of these fits.
     pub(crate) fn into_settings(self, fits: Vec<BatchFit>) -> anyhow::Result<BatchSettings> {
         let DiagnosticsArgs { progress, metrics } = self.diagnostics;
         Ok(BatchSettings {
@@ -74,13 +74,13 @@ impl BatchArgs {
         })
     }
 
-    /// The job that the run is to be, if it is to be one.
+    /// The Slurm job to submit, with --slurm.
     pub(crate) fn job(&self) -> Option<JobSettings> {
         self.slurm.then(|| JobSettings { typed: self.typed.clone(), options: self.sbatch.clone() })
     }
 }
 
-/// One fit of a manifest: what `lookalike fit` takes but for its outputs and its workers, which the batch has for all.
+/// One fit of a manifest: the flags of `lookalike fit` without those of outputs and workers, which belong to the whole batch.
 #[derive(Debug, Parser)]
 #[command(name = "fit", no_binary_name = true, args_override_self = true, disable_help_flag = true)]
 pub(crate) struct EntryArgs {
@@ -98,7 +98,7 @@ impl EntryArgs {
         self.method.preset
     }
 
-    /// The settings of the fit `name`, which a line of the manifest asks for.
+    /// The settings of the fit `name`, from a line of the manifest.
     pub(crate) fn into_settings(self, name: String, line: usize) -> anyhow::Result<BatchFit> {
         Ok(BatchFit {
             name,

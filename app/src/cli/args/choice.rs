@@ -1,4 +1,4 @@
-//! Flags that take one of a few names of the library.
+//! Flags whose values are names that the library defines, such as models.
 
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use lookalike::choice::Choice;

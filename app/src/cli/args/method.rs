@@ -12,8 +12,8 @@ use std::num::NonZeroU32;
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Method")]
 pub(crate) struct MethodArgs {
-    /// Bundle of settings; flags that are given as well override it. paper: the papers' model, 256 samples, pattern search
-    /// from the papers' one start, 21 gammas, no polish
+    /// Set of settings; other flags override it. paper: the published method, with Cook-Torrance, 256 samples, pattern search
+    /// from one start, 21 gammas, no polish
     #[arg(long, value_name = "PRESET", value_enum)]
     pub(crate) preset: Option<Preset>,
     /// BRDF model
@@ -25,13 +25,13 @@ pub(crate) struct MethodArgs {
     /// Pixels that the searches compare: a number of random draws, or full for all usable pixels
     #[arg(long, value_name = "N|full", default_value_t, allow_negative_numbers = true)]
     samples: SampleCount,
-    /// How these pixels are drawn
+    /// Distribution from which these pixels are drawn
     #[arg(long, value_name = "SAMPLING", value_parser = choice::<Sampling>(), default_value_t)]
     sampling: Sampling,
     /// Number of independent pixel subsets to search; candidates and time grow in proportion
     #[arg(long, value_name = "K", default_value = "1", allow_negative_numbers = true)]
     subsets: NonZeroU32,
-    /// How the cost is minimised
+    /// Search that minimises the cost
     #[arg(long, value_name = "SEARCH", value_parser = choice::<SearchKind>(), default_value_t)]
     search: SearchKind,
     /// How the searches render their pixels: tables, or direct[:SAMPLES] to integrate every evaluation as in the paper (256

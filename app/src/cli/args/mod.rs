@@ -50,7 +50,7 @@ pub(crate) enum Command {
     Render(render::RenderArgs),
     /// Measure how different two images look
     Compare(compare::CompareArgs),
-    /// Reproduce the paper's tables and figures on measured materials, beside rival methods
+    /// Reproduce the paper's tables and figures on measured materials, and compare with other methods
     Study(Box<study::StudyArgs>),
     /// Create an access file, so that workers can be started before their run
     Access(access::AccessArgs),
@@ -60,7 +60,7 @@ pub(crate) enum Command {
 }
 
 impl Command {
-    /// The bundle of settings this command asks for.
+    /// The preset that the command line names.
     pub(crate) fn preset(&self) -> Option<Preset> {
         match self {
             Self::Fit(args) => args.method.preset,
@@ -72,10 +72,10 @@ impl Command {
 #[derive(Debug, Args)]
 #[command(args_override_self = true, after_long_help = "Example:\n  lookalike demo --out /tmp/demo")]
 pub(crate) struct DemoArgs {
-    /// Folder for the results; files of an earlier demo there are replaced, no others
+    /// Folder for the results; only files of an earlier demo are replaced there
     #[arg(long, short, value_name = "DIR", default_value = "lookalike-demo", help_heading = "Output")]
     out: PathBuf,
-    /// Replace files with our names in the folder, also those of no demo
+    /// Replace files in the folder that have the names of the demo's, even if another command wrote them
     #[arg(long, help_heading = "Output")]
     force: bool,
     /// Worker processes to start: auto starts one per core

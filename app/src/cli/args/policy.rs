@@ -1,4 +1,5 @@
-//! Flags of the coordinator: how long it waits, whom it takes for lost, and what it does about slow and dangerous nodes.
+//! Flags of the coordinator: how long it waits for workers, when a worker is lost, and how it treats slow nodes and nodes that kill
+//! their workers.
 
 use anyhow::bail;
 use clap::Args;
@@ -15,41 +16,41 @@ pub(crate) struct PolicyArgs {
     #[arg(long, value_name = "T", default_value_t = Time(Policy::default().grace))]
     #[arg(help_heading = "Workers")]
     grace: Time,
-    /// How often a worker tells that it lives
+    /// How often workers and coordinator send each other a heartbeat
     #[arg(long, value_name = "T", default_value_t = Time(Policy::default().heartbeat))]
     #[arg(help_heading = "Policy", hide_short_help = true)]
     heartbeat: Time,
-    /// A worker that was not heard of for this long is lost, and so is one that reads nothing for this long; at least two
-    /// heartbeats
+    /// Declare a worker lost after it has sent or read nothing for this long; at least two heartbeats
     #[arg(long, value_name = "T", default_value_t = Time(Policy::default().lost_after))]
     #[arg(help_heading = "Policy", hide_short_help = true)]
     lost_after: Time,
-    /// How many nodes a worker is given beyond its threads, so that it never waits for the next one
+    /// How many nodes beyond its threads a worker is assigned in advance, so that it never waits for one
     #[arg(long, value_name = "N", default_value_t = Policy::default().spare_leases)]
     #[arg(help_heading = "Policy", hide_short_help = true)]
     spare_leases: usize,
-    /// After so many deaths of workers that were executing a node, it runs alone on a fresh worker
+    /// Run a node alone on a fresh worker after this many workers have died while they executed it
     #[arg(long, value_name = "N", default_value_t = Policy::default().suspect_after)]
     #[arg(help_heading = "Policy", hide_short_help = true)]
     suspect_after: u32,
-    /// A node that runs alone fails after so many deaths of its workers
+    /// Fail a node that runs alone after this many of its workers have died
     #[arg(long, value_name = "N", default_value_t = Policy::default().node_crashes)]
     #[arg(help_heading = "Policy", hide_short_help = true)]
     node_crashes: u32,
-    /// Whether an idle worker runs a slow node too, and the first answer counts: on, off, or how many times the median of its kind a
-    /// slow node takes (on: 2)
+    /// Run a slow node on an idle worker too and take the first result: on, off, or the factor above the median time of its kind from
+    /// which a node is slow (on: 2)
     #[arg(long, value_name = "on|off|FACTOR", default_value = "on")]
     #[arg(help_heading = "Policy", hide_short_help = true)]
     speculate: Speculate,
-    /// A node that has not run for this long is not slow
+    /// The shortest time after which a node may count as slow
     #[arg(long, value_name = "T", default_value_t = Time(Policy::default().speculation.after))]
     #[arg(help_heading = "Policy", hide_short_help = true)]
     speculate_after: Time,
-    /// Share of nodes on workers, searches left out, from 0 to 1, to run again on another worker and compare bit for bit
+    /// Share of the nodes on workers, from 0 to 1, that a second worker computes too, to compare the results bit for bit. Searches are
+    /// left out, because the coordinator computes the costs of their results itself
     #[arg(long, value_name = "F", default_value_t = Policy::default().verify_fraction, allow_negative_numbers = true)]
     #[arg(help_heading = "Policy", hide_short_help = true)]
     verify_fraction: f64,
-    /// How long a worker that is asked to end may take to finish what it executes, unless it was told otherwise
+    /// How long a worker that is asked to end may take to finish its running nodes, unless the worker has a --drain-time of its own
     #[arg(long, value_name = "T", default_value_t = Time(Policy::default().drain_time))]
     #[arg(help_heading = "Policy", hide_short_help = true)]
     drain_time: Time,
@@ -77,7 +78,7 @@ impl FromStr for Time {
     }
 }
 
-/// How much slower than usual a slow node is; none: no node is slow.
+/// The factor above the median time from which a node is slow; none: no node is slow.
 #[derive(Clone, Copy, Debug)]
 struct Speculate(Option<f64>);
 

@@ -52,7 +52,7 @@ struct QualityArgs {
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Output")]
 struct OutputArgs {
-    /// Image to write: .exr (radiance, coverage, metadata), .pfm (radiance) or .png (as shown at automatic exposure)
+    /// Image to write: .exr (radiance, coverage, metadata), .pfm (radiance) or .png (for display, at automatic exposure)
     #[arg(long, short, value_name = "OUT.exr")]
     out: PathBuf,
 }

@@ -14,7 +14,7 @@ pub(crate) struct StudyArgs {
     /// Folder for the results; it must not already hold a run, unless --resume or --force is given
     #[arg(long, short, value_name = "DIR", help_heading = "Output")]
     out: PathBuf,
-    /// Resume the study in the folder without computing complete results again. Of a finished study, write the report again
+    /// Resume the study in the folder without computing complete results again. If it is finished, only write its report again
     #[arg(long, help_heading = "Output")]
     resume: bool,
     /// Replace files with our names in the folder, never an input and never through a symbolic link
@@ -50,7 +50,7 @@ impl StudyArgs {
         })
     }
 
-    /// The job that the run is to be, if it is to be one.
+    /// The Slurm job to submit, with --slurm.
     pub(crate) fn job(&self) -> Option<JobSettings> {
         self.slurm.then(|| JobSettings { typed: self.typed.clone(), options: self.sbatch.clone() })
     }

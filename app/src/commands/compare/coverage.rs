@@ -1,4 +1,4 @@
-//! The pixels that are compared, and those that are the object.
+//! Selects the pixels to compare and those of the object.
 
 use crate::inputs::{LoadedMask, LoadedPhoto};
 use anyhow::Context;
