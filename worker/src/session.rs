@@ -156,7 +156,9 @@ impl<W: World> Session<W> {
         self.tasks.drain();
         if !self.tasks.are_done() {
             let seconds = self.drain_time.as_secs_f64();
-            warn!("asked to end: finishing the nodes being computed, for at most {seconds} s; signal again to end at once");
+            warn!(
+                "asked to end: finishing the nodes being computed, for at most {seconds} s; signal again to end at once"
+            );
         }
     }
 

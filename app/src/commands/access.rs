@@ -7,10 +7,6 @@ use std::{process::ExitCode, time::SystemTime};
 pub(crate) fn run(settings: AccessSettings) -> anyhow::Result<ExitCode> {
     let AccessSettings { address, out } = settings;
     Credentials::new(address.to_string(), SystemTime::now())?.create(&out)?;
-    eprintln!(
-        "wrote {} for workers, and {} for the coordinator only",
-        out.display(),
-        key_path(&out).display()
-    );
+    eprintln!("wrote {} for workers, and {} for the coordinator only", out.display(), key_path(&out).display());
     Ok(ExitCode::SUCCESS)
 }

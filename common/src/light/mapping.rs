@@ -145,7 +145,11 @@ impl crate::choice::Choice for Mapping {
         (Self::LatLong, "latlong", "Latitude and longitude (equirectangular), 2:1; the image's centre is +Z"),
         (Self::Cross, "cross", "Vertical cross of the six faces of a cube, 3:4"),
         (Self::Angular, "angular", "Debevec's angular map, square"),
-        (Self::MirrorBall, "mirror-ball", "A photo of a mirror ball, square and cropped to it; first divide it by the ball's reflectance"),
+        (
+            Self::MirrorBall,
+            "mirror-ball",
+            "A photo of a mirror ball, square and cropped to it; first divide it by the ball's reflectance",
+        ),
     ];
 }
 

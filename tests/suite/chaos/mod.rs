@@ -5,8 +5,8 @@ mod fits;
 mod network;
 mod phases;
 mod random;
-mod resume;
 mod random_kills;
+mod resume;
 
 use std::path::Path;
 use std::process::Command;

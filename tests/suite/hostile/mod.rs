@@ -1,8 +1,8 @@
 //! False peers on either end of a connection: they are not admitted or are disconnected, they cost little, and the run continues.
 
 mod false_results;
-mod impostors;
 mod false_workers;
+mod impostors;
 mod refusals;
 mod secrets;
 mod unauthenticated;

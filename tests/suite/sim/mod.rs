@@ -6,10 +6,10 @@
 
 mod chance;
 mod events;
+mod faults;
 mod processes;
 mod run;
 mod stage;
-mod faults;
 mod web;
 mod wire;
 mod world;

@@ -75,8 +75,7 @@ impl Report<'_> {
         };
         let metric = self.metric();
         let (reference, image) = (self.settings.reference.display(), self.settings.image.display());
-        let mut text =
-            wrap(&format!("{metric} of {image} against {reference}: 0 is equal, larger is worse")) + "\n\n";
+        let mut text = wrap(&format!("{metric} of {image} against {reference}: 0 is equal, larger is worse")) + "\n\n";
         let mut row = |name: &str, [a, b]: [f64; 2]| text.push_str(&format!("{name:<10} {a:>10.6} {b:>10.6}\n"));
         row(metric, [score, score_object]);
         if let Some([image, object]) = features {
