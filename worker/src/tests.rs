@@ -136,7 +136,7 @@ fn nodes_that_have_not_started_are_dropped_with_their_connection() {
 }
 
 #[test]
-fn another_coordinator_gets_nothing_of_what_an_earlier_one_gave_out() {
+fn another_coordinator_gets_no_results_of_nodes_of_an_earlier_one() {
     for (run, epoch) in [(RUN, 2), (RunName([2; 16]), 1)] {
         let mut tasks = tasks(2);
         let mut actions = tasks.assigned(assignment(lease(0, 1), &[]), context);

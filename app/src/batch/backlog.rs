@@ -68,7 +68,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn who_waits_goes_on_when_enough_is_written() {
+    fn waiting_thread_continues_when_enough_fits_are_written() {
         let backlog = Backlog::default();
         let entries: Vec<Entry> = [100, 20, 3].map(|pixels| backlog.add(pixels)).into();
         assert_eq!(backlog.load(), Load { fits: 3, pixels: 123 });

@@ -202,7 +202,7 @@ mod tests {
     }
 
     #[test]
-    fn json_says_null_where_there_is_nothing() {
+    fn missing_values_are_null_in_json() {
         let json = summary().json();
         assert_eq!((&json["schema"], &json["count"]["failed"]), (&json!("lookalike.batch/1"), &json!(1)));
         assert_eq!(
@@ -214,7 +214,7 @@ mod tests {
     }
 
     #[test]
-    fn table_tells_failures_below_the_fits() {
+    fn failures_are_listed_below_the_table() {
         let table = summary().table();
         assert!(
             table.contains("three failed: it said \"no\"\n\n2 of 3 done, 1 missed, 1 failed in 9.0 s\n"),

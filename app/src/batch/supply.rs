@@ -207,7 +207,7 @@ mod tests {
     }
 
     #[test]
-    fn fits_that_are_being_written_take_room_until_they_are() {
+    fn fits_being_written_occupy_the_backlog() {
         let folder = tempfile::tempdir().unwrap();
         let supply = {
             let claim = Claim::of_fit(folder.path(), OldFiles::Refuse);

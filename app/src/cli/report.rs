@@ -49,7 +49,7 @@ mod tests {
     }
 
     #[test]
-    fn the_exit_code_is_the_marked_one_else_bad_input() {
+    fn exit_code_is_that_of_the_context_or_bad_input() {
         let marked = anyhow!("no worker").context(Exit::ClusterFailed).context("the fit of a.exr");
         assert_eq!(failure(&marked), ExitCode::from(3));
         assert_eq!(failure(&anyhow!("anything")), ExitCode::from(2));

@@ -114,7 +114,7 @@ fn every_group_of_flags_reaches_the_settings() {
 }
 
 #[test]
-fn a_settings_file_says_the_same_as_flags() {
+fn settings_file_equals_flags() {
     let file = Settings::new(
         "same",
         "photo = 'ball.exr'\nenv = '/maps/garden.hdr'\nenv_rotation = -30\nout = 'run'\nsphere = [128, 127.5, 100]\n\
@@ -152,7 +152,7 @@ fn positional_arguments_fill_up_from_the_file() {
 }
 
 #[test]
-fn a_file_that_is_wrong_is_told_by_line_and_key() {
+fn mistakes_in_a_settings_file_are_reported_with_line_and_key() {
     let head = "photo = 'ball.exr'\nenv = 'garden.hdr'\nout = 'run'\n";
     for (line, phrase) in [
         ("gama = '1:3:0.1'", "unknown key \"gama\"; the nearest one is \"gammas\""),
@@ -230,7 +230,7 @@ fn a_rendering_needs_exactly_one_material() {
 }
 
 #[test]
-fn policy_has_one_meaning_as_flags_in_a_file_and_by_default() {
+fn policy_is_the_same_from_flags_file_and_defaults() {
     assert_eq!(fit(&PLAIN).unwrap().cluster.policy, Policy::default());
     let flags = [
         "--heartbeat=200ms",
@@ -264,7 +264,7 @@ fn policy_has_one_meaning_as_flags_in_a_file_and_by_default() {
 }
 
 #[test]
-fn policy_that_makes_no_sense_is_refused_by_name() {
+fn invalid_policy_is_refused_by_name() {
     for (flag, expected) in [
         ("--heartbeat=4s", "--lost-after: expected at least two heartbeats, 8s, found 5s"),
         ("--verify-fraction=1.5", "--verify-fraction: expected a number from 0 to 1, found 1.5"),

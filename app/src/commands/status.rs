@@ -197,7 +197,7 @@ mod tests {
     use serde_json::json;
 
     #[test]
-    fn stopped_run_says_where_it_stands_and_how_to_go_on() {
+    fn stopped_run_shows_its_progress_and_how_to_resume_it() {
         let counts =
             json!({ "total": 30, "waiting": 3, "ready": 4, "running": 1, "completed": 21, "recalled": 5, "failed": 1 });
         let mut kind = counts.clone();

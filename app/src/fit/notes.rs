@@ -102,14 +102,14 @@ mod tests {
     }
 
     #[test]
-    fn a_bound_that_means_nothing_is_not_called_a_limit_of_the_model() {
+    fn undetermined_parameter_at_its_bound_is_not_called_a_limit_of_the_model() {
         let parameters = [0.3, 0.3, 0.3, 0.0, 0.0, 0.0, 0.5, 1.0];
         assert!(at_bounds(&CookTorrance, &parameters, |_| true).is_some_and(|note| note.contains("m = 1")));
         assert_eq!(at_bounds(&CookTorrance, &parameters, |i| i != 7), None);
     }
 
     #[test]
-    fn a_metal_and_a_full_rim_are_answers_and_a_full_coat_is_a_limit() {
+    fn metal_and_full_rim_are_valid_results_and_a_full_coat_is_a_limit() {
         let rim = |f90: f64, f0: f64| at_bounds(&GgxF90, &[0.3, 0.3, 0.3, f0, 0.1, 0.1, f90, 0.2], |_| true);
         assert_eq!(rim(1.0, 0.1), None);
         assert!(rim(1.0, 1.0).is_some_and(|note| note.contains("f0.r = 1;")));

@@ -68,7 +68,7 @@ mod tests {
     }
 
     #[test]
-    fn wrong_names_and_counts_say_what_to_give() {
+    fn wrong_names_and_counts_list_what_is_expected() {
         for (text, phrase) in [
             ("kd=.5,f0=.04", "parameter 'alpha' of model ggx is missing: give alpha=0.1"),
             ("f0=.04,alpha=.1", "give kd=0.5,0.4,0.3"),

@@ -118,7 +118,7 @@ fn links_are_neither_followed_nor_replaced() {
 }
 
 #[test]
-fn resumed_run_replaces_what_it_wrote_and_nothing_else() {
+fn resumed_run_replaces_only_files_that_it_wrote() {
     let folder = folder(&[]);
     let out = begin(&fit(folder.path(), OldFiles::Refuse));
     out.write("match.png", b"one").unwrap();
@@ -152,7 +152,7 @@ fn refused_while_locked(claim: &Claim<'_>, phrase: &str) {
 }
 
 #[test]
-fn batch_takes_no_folder_of_another_fit() {
+fn batch_refuses_the_folder_of_another_fit() {
     let folder = folder(&[("a/fit.json", FIT), ("b/run.sqlite", ""), ("c/match.png", ""), ("d/notes.txt", "")]);
     let claim = |old| Claim {
         command: "batch",
@@ -170,7 +170,7 @@ fn batch_takes_no_folder_of_another_fit() {
 }
 
 #[test]
-fn study_takes_no_cells_of_another() {
+fn study_refuses_the_cells_of_another() {
     let folder = folder(&[("cells/x.json", "")]);
     let claim = |old| Claim { command: "study", files: Vec::new(), folders: vec!["cells"], ..fit(folder.path(), old) };
     refused(&claim(OldFiles::Refuse), &["cells is a folder, where this run writes"]);

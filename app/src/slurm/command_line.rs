@@ -26,7 +26,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn job_runs_what_was_typed_without_what_submits_it() {
+    fn job_runs_the_command_line_without_the_flags_that_submit_it() {
         let typed = "batch a.toml --resume --out run --slurm --seed 3 -- --nodes=4 -p gpu";
         let command = command_line(&typed.split(' ').map(OsString::from).collect::<Vec<_>>()).unwrap();
         assert_eq!(command, ["batch", "a.toml", "--out", "run", "--seed", "3"]);

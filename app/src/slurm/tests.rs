@@ -81,7 +81,7 @@ fn submitted_job_has_its_number_and_its_script() {
 }
 
 #[test]
-fn what_sbatch_says_reaches_the_user_with_the_exit_code() {
+fn message_of_sbatch_reaches_the_user_with_the_exit_code() {
     let folder = tempfile::tempdir().unwrap();
     let mut job = job(&folder.path().join("run"));
     job.folder = folder.path().to_owned();

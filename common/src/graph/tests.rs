@@ -238,7 +238,7 @@ fn blob_with_another_hash_is_refused() {
 }
 
 #[test]
-fn context_tells_cancellation_and_progress() {
+fn context_passes_on_cancellation_and_progress() {
     let context = RunContext::new(Arc::new(DecodedCache::new(0)));
     context.report(1, 3);
     assert_eq!((context.progress_permille(), context.check()), (333, Ok(())));

@@ -141,7 +141,7 @@ mod tests {
     }
 
     #[test]
-    fn a_name_is_given_once_whatever_its_case() {
+    fn names_that_differ_only_in_case_are_refused() {
         let mut names = Names::default();
         names.claim("Gold", 3).unwrap();
         let message = names.claim("gold", 7).unwrap_err().to_string();

@@ -52,7 +52,7 @@ fn product_is_every_photo_under_every_light_with_every_model() {
 }
 
 #[test]
-fn single_files_need_no_list_and_are_taken_by_name_whether_they_are_there_or_not() {
+fn single_files_need_no_list_and_need_not_exist() {
     let fits = fits("photos = 'a [1].exr'\nenvironments = 'm.hdr'\n", &["a 1.exr"]);
     assert_eq!(names(&fits), ["a_1-m-ggx"], "brackets are a pattern");
     let fits = self::fits("photos = 'not-there.exr'\nenvironments = 'm.hdr'\n", &[]);
@@ -89,7 +89,7 @@ fn presets_come_before_everything_else() {
 }
 
 #[test]
-fn sets_can_be_told_apart_by_a_name_before_those_of_their_fits() {
+fn name_of_a_set_is_a_prefix_of_the_names_of_its_fits() {
     let text = "[[set]]\nname = 'day'\nphotos = 'a.exr'\nenv = 'm.hdr'\n[[set]]\nname = 'turned'\nphotos = 'a.exr'\n\
                 env = 'm.hdr'\nenv-rotation = 90\n";
     assert_eq!(names(&fits(text, &[])), ["day-a-m-ggx", "turned-a-m-ggx"]);
@@ -103,7 +103,7 @@ fn refusal(text: &str) -> String {
 }
 
 #[test]
-fn mistakes_are_told_by_line_and_key() {
+fn mistakes_are_reported_with_line_and_key() {
     for (text, phrase) in [
         ("", "batch.toml: it lists no fit"),
         ("photos = ", "batch.toml:1: "),
@@ -173,7 +173,7 @@ fn name_that_is_too_long_by_itself_has_a_way_out() {
 }
 
 #[test]
-fn everything_that_is_wrong_is_told_at_once() {
+fn all_mistakes_are_reported_together() {
     let said = refusal(
         "photos = 'in/*.png'\nenvironments = 'm.hdr'\n[defaults]\nsampels = 3\n[[fit]]\nphoto = 'a.exr'\nenv = 'm.hdr'\n\
          seed = 'x'\n[[fit]]\nenv = 'm.hdr'\n",
@@ -188,7 +188,7 @@ fn everything_that_is_wrong_is_told_at_once() {
 }
 
 #[test]
-fn manifest_that_is_not_there_is_named() {
+fn missing_manifest_is_named() {
     let error = read(&PathBuf::from("nowhere.toml"), &[]).unwrap_err();
     assert!(format!("{error:#}").starts_with("cannot read the manifest nowhere.toml"), "{error:#}");
 }

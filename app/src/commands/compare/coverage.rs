@@ -101,7 +101,7 @@ mod tests {
     }
 
     #[test]
-    fn alpha_tells_the_object_only_over_black() {
+    fn alpha_marks_the_object_only_over_black() {
         let plain = photo([0.0, 1.0, 1.0, 1.0], None);
         let rendered = photo([0.0, 0.2, 0.5, 1.0], Some([0.0, 0.25, 0.5, 1.0]));
         let choose = |a: &LoadedPhoto, b: &LoadedPhoto| Coverage::choose(None, a, b).unwrap();

@@ -191,7 +191,7 @@ fn negative_neighbours_are_dropped_and_a_hole_is_black() {
 }
 
 #[test]
-fn bad_files_are_told_by_what_is_wrong_with_them() {
+fn bad_files_are_refused_with_the_reason() {
     let good = file(|_| Some([0.5; 3]));
     let message = |bytes: &[u8]| MerlTable::read("gold.binary", bytes).unwrap_err().to_string();
     for cut in [0, 3, 11, 12, 1000, good.len() - 1] {

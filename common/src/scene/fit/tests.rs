@@ -54,7 +54,7 @@ fn a_disk_cut_off_by_the_border_of_the_photo_is_found() {
 }
 
 #[test]
-fn the_mismatch_tells_a_disk_from_a_square() {
+fn mismatch_distinguishes_a_disk_from_a_square() {
     let round = fit_circle(&disk(140, 110, CIRCLE, |_, _, m| m)).unwrap();
     assert!(round.mismatch < 0.01, "{round:?}");
     let square = |k: usize| if (40..100).contains(&(k % 140)) && (25..85).contains(&(k / 140)) { 1.0 } else { 0.0 };
