@@ -45,20 +45,27 @@ fn summary(record: &FitRecord<'_>, timing: &Timing, out: &str) -> String {
 
 /// One row per score and parameter, one column per result. A model may have too many parameters for columns.
 fn rows(model: &dyn Model, outcome: &FitOutcome) -> Vec<Vec<String>> {
-    let texts = ["", "gamma", "CSSIM on object", "CSSIM on image"].into_iter();
-    let mut rows: Vec<Vec<String>> =
-        texts.chain(model.parameters().iter().map(|p| p.name)).map(|name| vec![name.to_owned()]).collect();
-    let mut add = |column: Vec<String>| rows.iter_mut().zip(column).for_each(|(row, cell)| row.push(cell));
+    let mut rows = names(model);
     if let Some(j) = outcome.judged.iter().find(|j| j.candidate.gamma == 1.0) {
-        add(column(model, "L2 baseline", "1", j.cssim, j.cssim_object, &j.candidate.parameters));
+        add(&mut rows, column(model, "L2 baseline", "1", j.cssim, j.cssim_object, &j.candidate.parameters));
     }
     let j = &outcome.judged[outcome.winner];
     let gamma = j.candidate.gamma.to_string();
-    add(column(model, "stage two", &gamma, j.cssim, j.cssim_object, &j.candidate.parameters));
+    add(&mut rows, column(model, "stage two", &gamma, j.cssim, j.cssim_object, &j.candidate.parameters));
     if let Some(p) = &outcome.polished {
-        add(column(model, "polished", "", p.cssim, p.cssim_object, &p.parameters));
+        add(&mut rows, column(model, "polished", "", p.cssim, p.cssim_object, &p.parameters));
     }
     rows
+}
+
+/// Rows that have only their names.
+fn names(model: &dyn Model) -> Vec<Vec<String>> {
+    let scores = ["", "gamma", "CSSIM on object", "CSSIM on image"].into_iter();
+    scores.chain(model.parameters().iter().map(|p| p.name)).map(|name| vec![name.to_owned()]).collect()
+}
+
+fn add(rows: &mut [Vec<String>], column: Vec<String>) {
+    rows.iter_mut().zip(column).for_each(|(row, cell)| row.push(cell));
 }
 
 /// `1 gamma`, `2 gammas`.
@@ -100,6 +107,21 @@ pub(crate) fn aligned(rows: &[Vec<String>]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::wrap::COLUMNS;
+    use lookalike::brdf::{MODELS, flat_bounds};
+
+    #[test]
+    fn results_of_every_model_fit_in_100_columns() {
+        for model in MODELS {
+            let (_, upper) = flat_bounds(model.parameters());
+            let results =
+                ["L2 baseline", "stage two", "polished"].map(|name| column(*model, name, "1.5", 0.5, 0.5, &upper));
+            let mut rows = names(*model);
+            results.into_iter().for_each(|result| add(&mut rows, result));
+            let text = aligned(&rows);
+            assert!(text.lines().all(|line| line.len() <= COLUMNS), "{text}");
+        }
+    }
 
     #[test]
     fn columns_line_up() {
