@@ -164,9 +164,33 @@ fn batch_takes_no_folder_of_another_fit() {
         let phrases = ["3 problems", "/a holds a fit that is not of this run", "/b holds a fit", "c/match.png is "];
         refused(&claim(old), &phrases);
     }
+    let claim_e = |old| Claim { fits: vec!["e"], ..claim(old) };
+    fs::write(folder.path().join("e"), "mine").unwrap();
+    for old in [OldFiles::Refuse, OldFiles::Resume, OldFiles::Replace] {
+        refused(&claim_e(old), &["/e is not a file of this run"]);
+    }
     let out = begin(&claim(OldFiles::Replace));
     out.sub("a").unwrap().write("fit.json", b"{}").unwrap();
     assert!(folder.path().join("b/run.sqlite").exists() && !folder.path().join("c/match.png").exists());
+}
+
+#[test]
+fn folder_in_the_place_of_a_draft_is_found_before_any_work() {
+    let folder = folder(&[("match.exr.partial/mine", "")]);
+    for old in [OldFiles::Refuse, OldFiles::Resume, OldFiles::Replace] {
+        refused(&fit(folder.path(), old), &["match.exr.partial is a folder"]);
+    }
+}
+
+#[test]
+fn fit_begun_where_a_demo_died_is_no_demo() {
+    let folder = folder(&[]);
+    drop(begin(&demo(folder.path(), OldFiles::Refuse)));
+    drop(begin(&fit(folder.path(), OldFiles::Resume)));
+    fs::write(folder.path().join("run.sqlite"), "").unwrap();
+    refused_while_locked(&demo(folder.path(), OldFiles::ReplaceDemo), "run.sqlite");
+    // Its journal is there, so it is the same run.
+    drop(begin(&fit(folder.path(), OldFiles::Resume)));
 }
 
 #[test]

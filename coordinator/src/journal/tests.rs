@@ -190,7 +190,8 @@ fn output_that_is_computed_again_after_its_release_is_written_again() {
     both.keep(key(2), output(2));
     write(&mut journal, [again, completed(2), both]);
     let copy = copied(&folder);
-    let mut past = Journal::open(&options(&copy), NAME, None).unwrap().past_outputs();
+    let journal = Journal::open(&options(&copy), NAME, None).unwrap();
+    let mut past = journal.past_outputs();
     assert_eq!(past.of(key(1)).output, Some(output(1)));
     assert_eq!(past.of(key(2)).output, Some(output(2)));
 }
