@@ -30,7 +30,7 @@ use crate::{
     outputs::{BATCH_MARK, Claim, ClaimedFolder, FIT_FILES, OldFiles, OutFolder, print_result},
     progress::{Ending, Shape, display},
     run::Session,
-    settings::{BatchFit, BatchSettings, OnFailure, ProgressKind},
+    settings::{BatchFit, BatchSettings, OnFailure},
 };
 use anyhow::Context;
 use board::{Board, Watchers};
@@ -58,10 +58,7 @@ pub(crate) fn run(settings: BatchSettings) -> anyhow::Result<ExitCode> {
         (0..).zip(&complete).filter(|(_, complete)| complete.is_none()).map(|(number, _)| number).collect();
     let fits: Arc<[_]> = settings.fits.into();
     let mut display = display(settings.progress, Shape::Many { noun: "fit", total: fits.len() });
-    match settings.progress {
-        ProgressKind::Json => checked.warnings.iter().for_each(|text| display.say(&format!("warning: {text}"))),
-        _ => show_warnings(&checked.warnings),
-    }
+    checked.warnings.iter().for_each(|text| display.say(&format!("warning: {text}")));
     remark.iter().for_each(|text| display.say(text));
     metrics.iter().for_each(|metrics| display.say(&format!("metrics at {}", metrics.url())));
     let ledger = PartLedger::default();
