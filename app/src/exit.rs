@@ -2,7 +2,7 @@
 
 use std::{fmt, process::ExitCode};
 
-/// How the program ended. Attached to an error with `.context(Exit::ClusterFailed)`, it is also that error's heading;
+/// How the program ended. Attached to an error with `.context(Exit::RunFailed)`, it is also that error's heading;
 /// an error without one is bad input.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u8)]
@@ -14,7 +14,7 @@ pub enum Exit {
     /// Bad input or usage.
     BadInput = 2,
     /// The run failed: no workers, a faulty worker or node, a full disk.
-    ClusterFailed = 3,
+    RunFailed = 3,
     /// Some fits of a batch failed, the others are complete.
     SomeFitsFailed = 4,
     /// Interrupted by the user.
@@ -33,7 +33,7 @@ impl fmt::Display for Exit {
             Self::Done => "done",
             Self::MissedMaxCssim => "the score of --max-cssim was missed",
             Self::BadInput => "bad input",
-            Self::ClusterFailed => "the run failed",
+            Self::RunFailed => "the run failed",
             Self::SomeFitsFailed => "some fits failed",
             Self::Interrupted => "interrupted",
         })

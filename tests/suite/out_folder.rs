@@ -37,7 +37,7 @@ fn demo_refuses_to_replace_a_fit_and_a_fit_its_own_photo() {
     fs::copy(at("photo.exr"), at("own/match.exr")).unwrap();
     let photo = fs::read(at("photo.exr")).unwrap();
     lookalike(folder.path(), "demo -o own --progress none")
-        .refused(&["own holds something else than a demo (fit.json)"]);
+        .refused(&["own holds files that are not from a demo (fit.json)"]);
     for flags in ["", "--resume", "--force"] {
         lookalike(folder.path(), &format!("fit own/match.exr --env map.exr --out own {QUICK} {flags}"))
             .refused(&["own/match.exr is an input of this run", "choose another --out"]);

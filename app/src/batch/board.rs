@@ -8,7 +8,7 @@ use super::{
 use crate::{
     exit::Exit,
     outputs::{OutFolder, Timing},
-    progress::{Display, Ending, FitCount, FitEvent},
+    progress::{Display, Ending, PartCount, PartEvent, PartScores},
     run::Clock,
     settings::BatchFit,
 };
@@ -115,7 +115,7 @@ impl Board {
         inner.clocks.insert(number, clock);
         inner.set(number, State::Running);
         let name = inner.name(number);
-        inner.show(number, &FitEvent::Started { number, name, best });
+        inner.show(number, &PartEvent::Started { number, name, best });
     }
 
     /// The nodes of a fit have ended. Returns the time they took and the attempts.
@@ -138,7 +138,8 @@ impl Board {
         inner.set(number, State::Done(scores));
         let name = inner.name(number);
         let seconds = inner.end(number);
-        let event = FitEvent::Finished { number, name, cssim, cssim_object, is_missed, seconds };
+        let scores = Some(PartScores { cssim, cssim_object, is_missed, seconds });
+        let event = PartEvent::Finished { number, name, scores };
         inner.show(number, &event);
         drop(inner);
         self.write_summaries_soon();
@@ -150,7 +151,7 @@ impl Board {
         inner.set(number, State::Failed(error.to_owned()));
         let name = inner.name(number);
         inner.end(number);
-        inner.show(number, &FitEvent::Failed { number, name, error: error.to_owned() });
+        inner.show(number, &PartEvent::Failed { number, name, error: error.to_owned() });
         drop(inner);
         self.write_summaries_soon();
     }
@@ -169,7 +170,7 @@ impl Board {
 
     /// The problem to report at the end, if fits are left without results.
     pub(super) fn problem(&self) -> Option<String> {
-        let FitCount { total, done, .. } = self.lock().count();
+        let PartCount { total, done, .. } = self.lock().count();
         match (total, total - done) {
             (_, 0) => None,
             (1, _) => Some("the fit failed".to_owned()),
@@ -271,8 +272,8 @@ impl Inner {
         self.clocks.get_mut(number)
     }
 
-    fn count(&self) -> FitCount {
-        let mut count = FitCount { total: self.rows.len(), ..FitCount::default() };
+    fn count(&self) -> PartCount {
+        let mut count = PartCount { total: self.rows.len(), ..PartCount::default() };
         for row in &self.rows {
             match &row.state {
                 State::Running => count.running += 1,
@@ -288,13 +289,13 @@ impl Inner {
     }
 
     /// Reports a change of a fit to the journal, the metrics and the display.
-    fn show(&mut self, number: u32, event: &FitEvent) {
+    fn show(&mut self, number: u32, event: &PartEvent) {
         if let Some(row) = self.rows.get(number as usize) {
             self.watchers.ledger.tell(row.journal_row(number));
         }
         self.show_metrics();
         let count = self.count();
-        self.watchers.display.fit(event, count);
+        self.watchers.display.part(event, count);
     }
 
     fn show_metrics(&self) {
@@ -306,7 +307,7 @@ impl Inner {
 }
 
 /// The exit code of a batch: a failed fit takes precedence over one that missed its score.
-fn exit(count: &FitCount) -> Exit {
+fn exit(count: &PartCount) -> Exit {
     if count.failed > 0 {
         Exit::SomeFitsFailed
     } else if count.missed > 0 {

@@ -28,15 +28,15 @@ use crate::{
     exit::Exit,
     inputs::show_warnings,
     outputs::{BATCH_MARK, Claim, ClaimedFolder, FIT_FILES, OldFiles, OutFolder, print_result},
-    progress::{Ending, display_of_many},
-    run::{journal_failed, run_to_end, runner_options},
-    settings::{BatchFit, BatchSettings, OnFailure, ProgressKind},
+    progress::{Ending, Shape, display},
+    run::Session,
+    settings::{BatchFit, BatchSettings, OnFailure},
 };
 use anyhow::Context;
 use board::{Board, Watchers};
 use lights::Lights;
 use lookalike::graph::Many;
-use lookalike_coordinator::journal::{self, Finished, JOURNAL_FILE, JournalOptions, PartLedger};
+use lookalike_coordinator::journal::{JOURNAL_FILE, PartLedger};
 use std::{path::Path, process::ExitCode, sync::Arc};
 use supply::{Supply, SupplyOptions};
 use tokio::sync::Notify;
@@ -57,16 +57,13 @@ pub(crate) fn run(settings: BatchSettings) -> anyhow::Result<ExitCode> {
     let open: Vec<u32> =
         (0..).zip(&complete).filter(|(_, complete)| complete.is_none()).map(|(number, _)| number).collect();
     let fits: Arc<[_]> = settings.fits.into();
-    let mut display = display_of_many(settings.progress, fits.len());
-    match settings.progress {
-        ProgressKind::Json => checked.warnings.iter().for_each(|text| display.say(&format!("warning: {text}"))),
-        _ => show_warnings(&checked.warnings),
-    }
+    let mut display = display(settings.progress, Shape::Many { noun: "fit", total: fits.len() });
+    checked.warnings.iter().for_each(|text| display.say(&format!("warning: {text}")));
     remark.iter().for_each(|text| display.say(text));
     metrics.iter().for_each(|metrics| display.say(&format!("metrics at {}", metrics.url())));
     let ledger = PartLedger::default();
     let watchers = Watchers { display, metrics: metrics.clone(), ledger: ledger.clone() };
-    let board = Arc::new(Board::new(&fits, complete, watchers, out.clone()).context(Exit::ClusterFailed)?);
+    let board = Arc::new(Board::new(&fits, complete, watchers, out.clone()).context(Exit::RunFailed)?);
     if is_finished {
         return end(&board, Ok(()));
     }
@@ -83,42 +80,43 @@ pub(crate) fn run(settings: BatchSettings) -> anyhow::Result<ExitCode> {
         stage_two: settings.stage_two,
         is_fail_fast: settings.on_failure == OnFailure::FailFast,
         out: out.clone(),
-        out_name,
+        out_name: out_name.clone(),
         wake: Arc::clone(&wake),
     })?;
-    let seed = fits.first().map_or(0, |fit| fit.method.seed);
-    let mut options = runner_options(&settings.cluster, &out, seed);
-    options.wake = Some(wake);
-    options.journal = Some(JournalOptions {
-        path: out.file(JOURNAL_FILE),
+    let session = Session {
+        cluster: &settings.cluster,
+        out: &out,
+        out_name: &out_name,
         identity,
         resume: settings.resume,
+        seed: fits.first().map_or(0, |fit| fit.method.seed),
+        metrics: metrics.as_ref(),
         score: None,
-        parts: ledger.clone(),
-    });
-    let run = run_to_end(options, Many::new(supply), metrics.as_ref(), |event| {
+        parts: ledger,
+    };
+    let mut options = session.options();
+    options.wake = Some(wake);
+    let run = session.run(options, Many::new(supply), |event| {
         demand.note(event);
         board.note(event);
     });
     // Also after an error: what was computed is written.
     let run = run.map(|(planner, summary)| (drop(planner), summary).1);
     written.wait();
-    let closed = close(&out, &board, &ledger, run.is_ok(), &fits);
+    let closed = close(&session, &board, run.is_ok(), &fits);
     end(&board, first_error(run.map(|_| ()), closed))
 }
 
 /// Adds to the closed journal the fits whose results were written last, and how the run ended.
-fn close(out: &OutFolder, board: &Board, ledger: &PartLedger, is_whole: bool, fits: &[BatchFit]) -> anyhow::Result<()> {
-    let path = out.file(JOURNAL_FILE);
-    if !path.exists() {
+fn close(session: &Session<'_>, board: &Board, is_whole: bool, fits: &[BatchFit]) -> anyhow::Result<()> {
+    if !session.out.file(JOURNAL_FILE).exists() {
         // The run did not begin.
         return Ok(());
     }
     let ended = board.problem().filter(|_| is_whole);
-    journal::settle(&path, ledger, ended.as_deref()).map_err(journal_failed)?;
+    session.settle(ended.as_deref())?;
     if is_whole && ended.is_none() {
-        let finished = Finished { outputs: outputs(out, fits).context(Exit::ClusterFailed)? };
-        journal::finish(&path, &finished).map_err(journal_failed)?;
+        session.finish(outputs(session.out, fits).context(Exit::RunFailed)?)?;
     }
     Ok(())
 }
@@ -157,7 +155,7 @@ fn outputs(out: &OutFolder, fits: &[BatchFit]) -> anyhow::Result<Vec<(String, St
 /// Writes the last summaries and prints the outcome.
 fn end(board: &Board, run: anyhow::Result<()>) -> anyhow::Result<ExitCode> {
     // Not an error of the input: a full disk may have room when the batch is resumed.
-    let written = board.close().context(Exit::ClusterFailed);
+    let written = board.close().context(Exit::RunFailed);
     let stopped =
         run.as_ref().err().filter(|_| board.was_stopped_by_a_fit()).map(|error| error.root_cause().to_string());
     let outcome = first_error(if stopped.is_some() { Ok(()) } else { run }, written);

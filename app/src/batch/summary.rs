@@ -3,7 +3,7 @@
 use super::row::{Row, State};
 use crate::{
     outputs::{BATCH_MARK, OutFolder, aligned, parameters_json},
-    progress::FitCount,
+    progress::PartCount,
     wrap::wrap,
 };
 use anyhow::Context;
@@ -21,7 +21,7 @@ pub(super) const CSV: &str = "summary.csv";
 #[derive(Debug)]
 pub(super) struct Summary {
     pub(super) rows: Vec<Row>,
-    pub(super) count: FitCount,
+    pub(super) count: PartCount,
     /// `running`, `finished` or `stopped`.
     pub(super) state: &'static str,
     pub(super) seconds: f64,
@@ -36,7 +36,7 @@ pub(super) fn write(summary: &Summary, out: &OutFolder) -> anyhow::Result<()> {
 
 impl Summary {
     fn json(&self) -> Value {
-        let FitCount { total, running, done, missed, failed } = self.count;
+        let PartCount { total, running, done, missed, failed } = self.count;
         json!({
             "schema": SCHEMA,
             "software": { "name": "lookalike", "version": env!("CARGO_PKG_VERSION") },
@@ -183,7 +183,7 @@ mod tests {
             row("two", "cook-torrance", scores((1..=8).map(f64::from).collect(), true)),
             row("three", "ggx", State::Failed("it said \"no\"".to_owned())),
         ];
-        let count = FitCount { total: 3, running: 0, done: 2, missed: 1, failed: 1 };
+        let count = PartCount { total: 3, running: 0, done: 2, missed: 1, failed: 1 };
         Summary { rows, count, state: "finished", seconds: 9.0 }
     }
 

@@ -177,7 +177,7 @@ mod tests {
     use crate::{
         batch::{board::Watchers, window::Demand},
         outputs::{Claim, ClaimedFolder, OldFiles},
-        progress::display_of_many,
+        progress::{Shape, display},
         settings::ProgressKind,
     };
     use lookalike_coordinator::journal::PartLedger;
@@ -185,8 +185,11 @@ mod tests {
 
     /// A supply whose next fit has this many pixels, for one worker of one thread.
     fn supply(out: &OutFolder, pixels: usize) -> Supply {
-        let watchers =
-            Watchers { display: display_of_many(ProgressKind::None, 0), metrics: None, ledger: PartLedger::default() };
+        let watchers = Watchers {
+            display: display(ProgressKind::None, Shape::OneFit),
+            metrics: None,
+            ledger: PartLedger::default(),
+        };
         let board = Arc::new(Board::new(&[], Vec::new(), watchers, out.clone()).unwrap());
         let options = SupplyOptions {
             fits: Arc::new([]),

@@ -42,7 +42,7 @@ mod tests {
 
     #[test]
     fn each_cause_has_its_line_and_no_backtrace() {
-        let error = anyhow!("no such file").context("cannot read the photo").context(Exit::ClusterFailed);
+        let error = anyhow!("no such file").context("cannot read the photo").context(Exit::RunFailed);
         let expected = "error: the run failed\n  caused by: cannot read the photo\n  caused by: no such file\n";
         assert_eq!(render(&error, false), expected);
         assert!(render(&error, true).starts_with("\x1b[1;31merror:\x1b[0m "));
@@ -50,7 +50,7 @@ mod tests {
 
     #[test]
     fn exit_code_is_that_of_the_context_or_bad_input() {
-        let marked = anyhow!("no worker").context(Exit::ClusterFailed).context("the fit of a.exr");
+        let marked = anyhow!("no worker").context(Exit::RunFailed).context("the fit of a.exr");
         assert_eq!(failure(&marked), ExitCode::from(3));
         assert_eq!(failure(&anyhow!("anything")), ExitCode::from(2));
     }

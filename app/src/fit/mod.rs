@@ -8,11 +8,11 @@ pub(crate) use identity::{FitIdentity, version};
 pub(crate) use notes::notes;
 pub(crate) use results::{final_parameters, final_score, final_scores, write_results};
 
-use crate::run::{Clock, cpu_seconds, is_finished, journal_failed, run_to_end, runner_options};
+use crate::run::{Clock, Session, cpu_seconds};
 use crate::{
     exit::Exit,
     outputs::{FitRecord, OutFolder, Pictures, Timing, print_summary},
-    progress::{Display, Ending, display},
+    progress::{Display, Ending, PartCount, PartEvent, Shape, display},
     settings::{ClusterSettings, MetricsAddress, ProgressKind},
 };
 use anyhow::Context;
@@ -21,10 +21,7 @@ use lookalike::{
     plan::{FitOutcome, FitPlanner},
     scene::Capture,
 };
-use lookalike_coordinator::{
-    journal::{self, JOURNAL_FILE, JournalOptions, PartLedger},
-    metrics::Metrics,
-};
+use lookalike_coordinator::{journal::PartLedger, metrics::Metrics};
 use serde_json::Value;
 use std::{process::ExitCode, sync::Arc};
 
@@ -67,7 +64,7 @@ pub(crate) fn run(job: FitJob) -> anyhow::Result<Option<Finished>> {
         .context("the photo cannot be fitted")?
         .also_render(&job.also_render);
     let metrics = job.metrics.map(MetricsAddress::listen).transpose()?;
-    let mut display = display(job.progress, planner.best());
+    let mut display = display(job.progress, Shape::OneFit);
     let done = run_shown(&job, &method, planner, metrics.as_ref(), &mut *display);
     let problem = done.as_ref().err().map(|error| format!("{error:#}"));
     display.finish(problem.as_deref().map_or(Ending::Finished, Ending::Failed));
@@ -106,21 +103,25 @@ fn run_shown(
         exposure: job.exposure,
         also_render: &job.also_render,
     };
-    let identity = identity.of_run()?;
-    if job.resume && is_finished(&job.out, &job.out_name, &identity, |text| display.say(text))? {
-        return Ok(None);
-    }
-    let mut clock = Clock::start();
     let best = planner.best();
-    let mut options = runner_options(&job.cluster, &job.out, method.seed);
-    options.journal = Some(JournalOptions {
-        path: job.out.file(JOURNAL_FILE),
-        identity,
+    let session = Session {
+        cluster: &job.cluster,
+        out: &job.out,
+        out_name: &job.out_name,
+        identity: identity.of_run()?,
         resume: job.resume,
+        seed: method.seed,
+        metrics,
         score: Some(Arc::new(move || best.get())),
         parts: PartLedger::default(),
-    });
-    let (planner, summary) = run_to_end(options, planner, metrics, |event| {
+    };
+    if job.resume && session.is_finished(|text| display.say(text))? {
+        return Ok(None);
+    }
+    let started = PartEvent::Started { number: 0, name: String::new(), best: planner.best() };
+    display.part(&started, PartCount { total: 1, running: 1, ..PartCount::default() });
+    let mut clock = Clock::start();
+    let (planner, summary) = session.run(session.options(), planner, |event| {
         clock.note(event);
         display.event(event);
     })?;
@@ -139,9 +140,8 @@ fn run_shown(
     };
     // Not an error of the input: a full disk may have room later, and the resumed run computes nothing again.
     let pictures = write_results(&job.out, &record(job, method, &outcome, &notes), &timing);
-    let pictures = pictures.context(Exit::ClusterFailed)?;
-    let finished = journal::Finished { outputs: job.out.results().context(Exit::ClusterFailed)? };
-    journal::finish(&job.out.file(JOURNAL_FILE), &finished).map_err(journal_failed)?;
+    let pictures = pictures.context(Exit::RunFailed)?;
+    session.finish(job.out.results().context(Exit::RunFailed)?)?;
     Ok(Some(Done { outcome, pictures, timing, notes }))
 }
 

@@ -138,9 +138,12 @@ impl<'a> Claim<'a> {
             }
             _ => {}
         }
-        let is_link = |fit: &&str| self.out.join(fit).is_symlink();
+        let is_no_folder = |fit: &&str| {
+            let path = self.out.join(fit);
+            is_there(&path) && (path.is_symlink() || !path.is_dir())
+        };
         let mut problems: Vec<String> =
-            self.fits.iter().copied().filter(is_link).map(|fit| self.in_the_way(fit)).collect();
+            self.fits.iter().copied().filter(is_no_folder).map(|fit| self.in_the_way(fit)).collect();
         for fit in self.fits.iter().filter(|_| self.old != OldFiles::Replace) {
             let mark = format!("{fit}/{MARK}");
             let is_taken = is_there(&self.out.join(fit).join(JOURNAL_FILE))
@@ -224,7 +227,7 @@ impl<'a> Claim<'a> {
         let found = [MARK, JOURNAL_FILE].into_iter().map(str::to_owned).chain(self.names());
         let found = found.into_iter().find(|name| is_there(&self.out.join(name))).unwrap_or_default();
         bail!(
-            "{} holds something else than a demo ({found}): choose another folder with --out, or replace it with --force",
+            "{} holds files that are not from a demo ({found}): choose another folder with --out, or replace it with --force",
             self.out.display()
         )
     }
@@ -233,12 +236,9 @@ impl<'a> Claim<'a> {
     fn problem_with(&self, name: &str, ledger: &Ledger, has_journal: bool) -> Option<String> {
         let path = self.out.join(name);
         let draft = draft_of(&path);
-        if is_there(&draft) && !fs::symlink_metadata(&draft).is_ok_and(|it| it.is_dir()) {
-            // A killed process leaves drafts behind.
-            if !is_file(&draft) || !ledger.is_begun() {
-                let name = format!("{name}.partial");
-                return Some(self.in_the_way(&name));
-            }
+        // A killed process leaves drafts behind.
+        if is_there(&draft) && !(is_file(&draft) && ledger.is_begun()) {
+            return Some(self.in_the_way(&format!("{name}.partial")));
         }
         if !is_there(&path) {
             return None;
@@ -265,11 +265,11 @@ impl<'a> Claim<'a> {
             (true, _) => None,
             (false, OldFiles::Resume) if has_journal => Some(changed(name, &self.out.display().to_string())),
             (false, OldFiles::Replace) => Some(format!(
-                "{} holds files that no run here knows of: choose another --out, or move that folder elsewhere",
+                "{} holds files that no run in this folder wrote: choose another --out, or move that folder elsewhere",
                 path.display()
             )),
             (false, OldFiles::Refuse) if !is_folder => Some(format!(
-                "{} is there already, and this run would replace it: choose another --out, move that file elsewhere, or replace \
+                "{} already exists, and this run would replace it: choose another --out, move that file elsewhere, or replace \
                  it with --force",
                 path.display()
             )),

@@ -53,8 +53,9 @@ impl ClaimedFolder {
         let cannot =
             || format!("cannot write results to {}: choose a folder you may write to with --out", path.display());
         fs::create_dir_all(path).with_context(cannot)?;
-        atomic::write_unsynced(&path.join(PROBE), b"").with_context(cannot)?;
-        fs::remove_file(path.join(PROBE)).with_context(cannot)?;
+        let probe = path.join(format!(".lookalike-write-test-{}", std::process::id()));
+        fs::File::create_new(&probe).with_context(cannot)?;
+        fs::remove_file(&probe).with_context(cannot)?;
         let lock = RunLock::take(path)?;
         let ledger = Ledger::read(path)?;
         claim.check_against(&ledger)?;
@@ -82,7 +83,9 @@ impl ClaimedFolder {
             let journal = folder.file(JOURNAL_FILE);
             journal::remove(&journal).with_context(|| cannot(&journal))?;
         }
-        if old != OldFiles::Resume || !folder.root.ledger.is_begun() {
+        // A run of another command that ended before it had a journal is not resumed.
+        let is_continued = folder.file(JOURNAL_FILE).exists() || folder.root.ledger.is_of(command);
+        if old != OldFiles::Resume || !folder.root.ledger.is_begun() || !is_continued {
             folder.root.ledger.begin(command)?;
         }
         Ok(folder)
@@ -117,9 +120,12 @@ impl OutFolder {
     pub(crate) fn sub(&self, name: &str) -> anyhow::Result<Self> {
         let path = self.file(name);
         if path.is_symlink() {
-            bail!("{} is a symbolic link, which is not followed: remove it, then --resume", path.display());
+            bail!(
+                "{} is a symbolic link, which is not followed: remove it and repeat the command with --resume",
+                path.display()
+            );
         }
-        fs::create_dir_all(&path).with_context(|| format!("cannot make the folder {}", path.display()))?;
+        fs::create_dir_all(&path).with_context(|| format!("cannot create the folder {}", path.display()))?;
         Ok(Self { prefix: format!("{}{name}/", self.prefix), root: Arc::clone(&self.root) })
     }
 
@@ -144,6 +150,3 @@ impl OutFolder {
         atomic::write(&path, bytes).with_context(|| format!("cannot write {}: is the disk full?", path.display()))
     }
 }
-
-/// A file that is written and removed to check whether a folder can be written to.
-const PROBE: &str = ".lookalike-write-test";

@@ -42,12 +42,9 @@ fn refused(claim: &Claim<'_>, phrases: &[&str]) {
 fn file_of_the_users_is_refused_by_name_and_forced_away() {
     let folder = folder(&[("candidates.csv", "mine"), ("reference.png", "mine"), ("notes.txt", "mine")]);
     let out = folder.path();
-    refused(
-        &fit(out, OldFiles::Refuse),
-        &["2 problems", "candidates.csv is there already", "reference.png", "--force"],
-    );
+    refused(&fit(out, OldFiles::Refuse), &["2 problems", "candidates.csv already exists", "reference.png", "--force"]);
     refused(&fit(out, OldFiles::Resume), &["candidates.csv is not a file of this run", "choose another --out"]);
-    refused(&demo(out, OldFiles::ReplaceDemo), &["holds something else than a demo (candidates.csv)", "--force"]);
+    refused(&demo(out, OldFiles::ReplaceDemo), &["holds files that are not from a demo (candidates.csv)", "--force"]);
     assert_eq!(fs::read(out.join("reference.png")).unwrap(), b"mine");
     let folder = begin(&fit(out, OldFiles::Replace));
     folder.write("candidates.csv", b"ours").unwrap();
@@ -58,10 +55,10 @@ fn file_of_the_users_is_refused_by_name_and_forced_away() {
 fn demo_replaces_demos_only() {
     for text in [FIT, "no JSON"] {
         let folder = folder(&[("fit.json", text), ("match.exr", "")]);
-        refused(&demo(folder.path(), OldFiles::ReplaceDemo), &["holds something else than a demo (fit.json)"]);
+        refused(&demo(folder.path(), OldFiles::ReplaceDemo), &["holds files that are not from a demo (fit.json)"]);
     }
     let unfinished = folder(&[("run.sqlite", "")]);
-    refused(&demo(unfinished.path(), OldFiles::ReplaceDemo), &["holds something else than a demo (run.sqlite)"]);
+    refused(&demo(unfinished.path(), OldFiles::ReplaceDemo), &["holds files that are not from a demo (run.sqlite)"]);
     // A demo from a version without ledgers.
     let old = folder(&[("fit.json", DEMO), ("strip.png", "old"), ("run.sqlite", "")]);
     let out = begin(&demo(old.path(), OldFiles::ReplaceDemo));
@@ -164,9 +161,33 @@ fn batch_refuses_the_folder_of_another_fit() {
         let phrases = ["3 problems", "/a holds a fit that is not of this run", "/b holds a fit", "c/match.png is "];
         refused(&claim(old), &phrases);
     }
+    let claim_e = |old| Claim { fits: vec!["e"], ..claim(old) };
+    fs::write(folder.path().join("e"), "mine").unwrap();
+    for old in [OldFiles::Refuse, OldFiles::Resume, OldFiles::Replace] {
+        refused(&claim_e(old), &["/e is not a file of this run"]);
+    }
     let out = begin(&claim(OldFiles::Replace));
     out.sub("a").unwrap().write("fit.json", b"{}").unwrap();
     assert!(folder.path().join("b/run.sqlite").exists() && !folder.path().join("c/match.png").exists());
+}
+
+#[test]
+fn folder_in_the_place_of_a_draft_is_found_before_any_work() {
+    let folder = folder(&[("match.exr.partial/mine", "")]);
+    for old in [OldFiles::Refuse, OldFiles::Resume, OldFiles::Replace] {
+        refused(&fit(folder.path(), old), &["match.exr.partial is a folder"]);
+    }
+}
+
+#[test]
+fn fit_begun_where_a_demo_died_is_no_demo() {
+    let folder = folder(&[]);
+    drop(begin(&demo(folder.path(), OldFiles::Refuse)));
+    drop(begin(&fit(folder.path(), OldFiles::Resume)));
+    fs::write(folder.path().join("run.sqlite"), "").unwrap();
+    refused_while_locked(&demo(folder.path(), OldFiles::ReplaceDemo), "run.sqlite");
+    // Its journal is there, so it is the same run.
+    drop(begin(&fit(folder.path(), OldFiles::Resume)));
 }
 
 #[test]
@@ -174,5 +195,5 @@ fn study_refuses_the_cells_of_another() {
     let folder = folder(&[("cells/x.json", "")]);
     let claim = |old| Claim { command: "study", files: Vec::new(), folders: vec!["cells"], ..fit(folder.path(), old) };
     refused(&claim(OldFiles::Refuse), &["cells is a folder, where this run writes"]);
-    refused(&claim(OldFiles::Replace), &["cells holds files that no run here knows of"]);
+    refused(&claim(OldFiles::Replace), &["cells holds files that no run in this folder wrote"]);
 }

@@ -2,7 +2,7 @@
 
 use super::{
     Display, Ending,
-    fits::{FitCount, FitEvent},
+    parts::{PartCount, PartEvent, Shape},
     print_line,
 };
 use lookalike::graph::split_label;
@@ -14,15 +14,24 @@ use std::time::Instant;
 const SCHEMA: &str = "lookalike.progress/1";
 
 pub(super) struct JsonLines {
+    shape: Shape,
     began: Instant,
 }
 
 impl JsonLines {
-    /// Writes the first line, which announces this number of fits.
-    pub(super) fn new(fits: usize) -> Self {
-        let lines = Self { began: Instant::now() };
-        lines.print(json!({ "event": "start", "schema": SCHEMA, "version": env!("CARGO_PKG_VERSION"), "fits": fits }));
+    /// Writes the first line, which announces the number of fits or cells.
+    pub(super) fn new(shape: Shape) -> Self {
+        let lines = Self { shape, began: Instant::now() };
+        let total = if let Shape::Many { total, .. } = shape { total } else { 1 };
+        let mut start = json!({ "event": "start", "schema": SCHEMA, "version": env!("CARGO_PKG_VERSION") });
+        start[format!("{}s", lines.noun())] = json!(total);
+        lines.print(start);
         lines
+    }
+
+    /// The word for a part.
+    fn noun(&self) -> &'static str {
+        if let Shape::Many { noun, .. } = self.shape { noun } else { "fit" }
     }
 
     fn print(&self, mut object: Value) {
@@ -34,15 +43,16 @@ impl JsonLines {
 
 impl Display for JsonLines {
     fn event(&mut self, event: &RunEvent) {
-        if let Some(object) = of_run(event).or_else(|| of_node(event)) {
+        if let Some(object) = of_run(event).or_else(|| of_node(self.noun(), event)) {
             self.print(object);
         }
     }
 
-    fn fit(&mut self, event: &FitEvent, count: FitCount) {
-        let mut object = of_fit(event);
-        let FitCount { total, running, done, missed, failed } = count;
-        object["fits"] = json!({
+    fn part(&mut self, event: &PartEvent, count: PartCount) {
+        let Shape::Many { noun, .. } = self.shape else { return };
+        let mut object = of_part(noun, event);
+        let PartCount { total, running, done, missed, failed } = count;
+        object[format!("{noun}s")] = json!({
             "total": total, "running": running, "done": done, "missed": missed, "failed": failed,
         });
         self.print(object);
@@ -61,17 +71,25 @@ impl Display for JsonLines {
     }
 }
 
-fn of_fit(event: &FitEvent) -> Value {
+fn of_part(noun: &str, event: &PartEvent) -> Value {
+    let (what, number, name) = match event {
+        PartEvent::Started { number, name, .. } => ("started", number, name),
+        PartEvent::Finished { number, name, .. } => ("finished", number, name),
+        PartEvent::Failed { number, name, .. } => ("failed", number, name),
+    };
+    let mut object = json!({ "event": format!("{noun}-{what}"), "number": number });
+    object[noun] = json!(name);
     match event {
-        FitEvent::Started { number, name, .. } => json!({ "event": "fit-started", "fit": name, "number": number }),
-        FitEvent::Finished { number, name, cssim, cssim_object, is_missed, seconds } => json!({
-            "event": "fit-finished", "fit": name, "number": number, "cssim": cssim, "cssim_object": cssim_object,
-            "missed": is_missed, "seconds": seconds,
-        }),
-        FitEvent::Failed { number, name, error } => {
-            json!({ "event": "fit-failed", "fit": name, "number": number, "error": error })
+        PartEvent::Finished { scores: Some(scores), .. } => {
+            object["cssim"] = json!(scores.cssim);
+            object["cssim_object"] = json!(scores.cssim_object);
+            object["missed"] = json!(scores.is_missed);
+            object["seconds"] = json!(scores.seconds);
         }
+        PartEvent::Failed { error, .. } => object["error"] = json!(error),
+        PartEvent::Started { .. } | PartEvent::Finished { scores: None, .. } => {}
     }
+    object
 }
 
 fn of_run(event: &RunEvent) -> Option<Value> {
@@ -97,35 +115,39 @@ fn of_run(event: &RunEvent) -> Option<Value> {
     })
 }
 
-fn of_node(event: &RunEvent) -> Option<Value> {
+fn of_node(noun: &str, event: &RunEvent) -> Option<Value> {
     Some(match event {
-        RunEvent::NodeAdded { name } => node("node-added", name, json!({})),
-        RunEvent::NodeStarted { name, site } => node("node-started", name, json!({ "worker": worker_of(*site) })),
+        RunEvent::NodeAdded { name } => node(noun, "node-added", name, json!({})),
+        RunEvent::NodeStarted { name, site } => node(noun, "node-started", name, json!({ "worker": worker_of(*site) })),
         RunEvent::NodeProgress { node, permille } => {
             json!({ "event": "node-progress", "node": node.0, "permille": permille })
         }
         RunEvent::NodeFinished { name, site, bytes, elapsed } => {
             let rest = json!({ "worker": worker_of(*site), "bytes": bytes, "seconds": elapsed.as_secs_f64() });
-            node("node-finished", name, rest)
+            node(noun, "node-finished", name, rest)
         }
-        RunEvent::NodeRecalled { name, bytes } => node("node-recalled", name, json!({ "bytes": bytes })),
-        RunEvent::NodeSuspected { name, deaths } => node("node-suspected", name, json!({ "deaths": deaths })),
-        RunEvent::NodeSpeculated { name, worker } => node("node-speculated", name, json!({ "worker": worker.0 })),
-        RunEvent::NodeFailed { name, reason } if reason.is_cancellation() => node("node-cancelled", name, json!({})),
-        RunEvent::NodeFailed { name, reason } => node("node-failed", name, json!({ "reason": reason.to_string() })),
+        RunEvent::NodeRecalled { name, bytes } => node(noun, "node-recalled", name, json!({ "bytes": bytes })),
+        RunEvent::NodeSuspected { name, deaths } => node(noun, "node-suspected", name, json!({ "deaths": deaths })),
+        RunEvent::NodeSpeculated { name, worker } => node(noun, "node-speculated", name, json!({ "worker": worker.0 })),
+        RunEvent::NodeFailed { name, reason } if reason.is_cancellation() => {
+            node(noun, "node-cancelled", name, json!({}))
+        }
+        RunEvent::NodeFailed { name, reason } => {
+            node(noun, "node-failed", name, json!({ "reason": reason.to_string() }))
+        }
         RunEvent::NodeRequeued { name, worker, crashes } => {
-            node("node-requeued", name, json!({ "worker": worker.0, "crashes": crashes }))
+            node(noun, "node-requeued", name, json!({ "worker": worker.0, "crashes": crashes }))
         }
         _ => return None,
     })
 }
 
-/// An event of a node: number, kind, label, the fit of a batch, and the rest.
-fn node(event: &str, name: &NodeName, rest: Value) -> Value {
-    let (fit, label) = split_label(&name.label);
+/// An event of a node: number, kind, label, the fit of a batch or the cell of a study, and the rest.
+fn node(noun: &str, event: &str, name: &NodeName, rest: Value) -> Value {
+    let (part, label) = split_label(&name.label);
     let mut object = json!({ "event": event, "node": name.node.0, "kind": name.kind, "label": label });
-    if let Some(fit) = fit {
-        object["fit"] = json!(fit);
+    if let Some(part) = part {
+        object[noun] = json!(part);
     }
     if let (Some(object), Value::Object(rest)) = (object.as_object_mut(), rest) {
         object.extend(rest);

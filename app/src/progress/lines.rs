@@ -1,45 +1,80 @@
-//! Plain lines for logs and pipes: one when a stage is complete, and occasional ones in between.
+//! Plain lines for logs and pipes: one when a stage of the only fit is complete or a fit of many has ended, and one every few
+//! seconds in between.
 
 use super::{
-    Display, Ending, PAUSE, print_line, remark,
-    stage::{Stage, Tally},
+    Display, Ending, PAUSE,
+    parts::{PartCount, PartEvent, Shape},
+    print_line, remark,
+    rows::Rows,
 };
-use lookalike::fit::BestScore;
 use lookalike_coordinator::events::RunEvent;
-use std::{sync::Arc, time::Instant};
+use std::time::Instant;
 
 pub(super) struct Lines {
-    tally: Tally,
-    best: Arc<BestScore>,
+    shape: Shape,
+    count: PartCount,
+    rows: Rows,
     began: Instant,
     told: Instant,
 }
 
 impl Lines {
-    pub(super) fn new(best: Arc<BestScore>) -> Self {
-        Self { tally: Tally::default(), best, began: Instant::now(), told: Instant::now() }
+    pub(super) fn new(shape: Shape) -> Self {
+        let (count, rows, now) = (PartCount::default(), Rows::default(), Instant::now());
+        Self { shape, count, rows, began: now, told: now }
     }
 
-    fn tell(&mut self, stage: Stage, what: &str) {
-        let best = self.best.get().filter(|_| stage >= Stage::Judging);
-        let best = best.map(|score| format!(", best CSSIM so far {score:.4}")).unwrap_or_default();
-        self.say(&format!("{:6.1} s  {}{what}{best}", self.began.elapsed().as_secs_f64(), stage.title()));
+    fn tell(&mut self, text: &str) {
         self.told = Instant::now();
+        self.say(&format!("{:6.1} s  {text}", self.began.elapsed().as_secs_f64()));
+    }
+
+    /// The line about the stage of the only fit that an event belongs to.
+    fn stage(&mut self, event: &RunEvent) {
+        let is_due = self.told.elapsed() >= PAUSE;
+        let Some((_, row, stage, count)) = self.rows.note(event) else { return };
+        let is_end = matches!(event, RunEvent::NodeFinished { .. } | RunEvent::NodeRecalled { .. });
+        let state = match is_end && count.is_complete() {
+            true => " done".to_owned(),
+            false if is_due => format!(": {} %", count.thousandths() / 10),
+            false => return,
+        };
+        let best = row.best_at(stage).map(|score| format!(", best CSSIM so far {score:.4}")).unwrap_or_default();
+        self.tell(&format!("{}{state}{best}", stage.title()));
+    }
+
+    /// The line about all parts.
+    fn counts(&mut self, noun: &str) {
+        let is_over = self.count.done + self.count.failed == self.count.total;
+        if is_over || self.told.elapsed() >= PAUSE {
+            self.tell(&format!("{noun}s: {}, {} running", self.count.text(), self.count.running));
+        }
     }
 }
 
 impl Display for Lines {
     fn event(&mut self, event: &RunEvent) {
-        if let Some((stage, count)) = self.tally.note(event) {
-            let is_end = matches!(event, RunEvent::NodeFinished { .. } | RunEvent::NodeRecalled { .. });
-            if is_end && count.is_complete() {
-                self.tell(stage, " done");
-            } else if self.told.elapsed() >= PAUSE {
-                self.tell(stage, &format!(": {} %", count.thousandths() / 10));
-            }
+        match self.shape {
+            Shape::OneFit => self.stage(event),
+            Shape::Many { noun, .. } if self.count.running > 0 => self.counts(noun),
+            Shape::Many { .. } => {}
         }
-        if let Some(text) = remark(event) {
+        if let Some(text) = remark(event, self.shape) {
             self.say(&text);
+        }
+    }
+
+    fn part(&mut self, event: &PartEvent, count: PartCount) {
+        self.count = count;
+        match self.shape {
+            Shape::OneFit => self.rows.part(event),
+            Shape::Many { noun, total } => match event.line() {
+                Some(line) => {
+                    let width = total.to_string().len();
+                    self.tell(&format!("{:>width$} of {total}  {line}", count.done + count.failed));
+                }
+                None => self.counts(noun),
+            },
         }
     }
 

@@ -1,21 +1,18 @@
 //! Shows a run while it goes on, all on stderr: bars on a terminal, plain lines elsewhere, JSON lines for programs.
 
 mod bars;
-mod fits;
 mod json;
 mod lines;
-mod many_bars;
-mod many_lines;
+mod parts;
+mod rows;
 mod stage;
 
-pub(crate) use fits::{FitCount, FitEvent};
+pub(crate) use parts::{PartCount, PartEvent, PartScores, Shape};
 
 use crate::settings::ProgressKind;
-use lookalike::fit::BestScore;
 use lookalike_coordinator::events::RunEvent;
 use std::{
     io::{self, IsTerminal, Write as _},
-    sync::Arc,
     time::Duration,
 };
 
@@ -38,8 +35,8 @@ pub(crate) trait Display: Send {
     /// Processes an event.
     fn event(&mut self, event: &RunEvent);
 
-    /// Processes an event about a fit of a batch.
-    fn fit(&mut self, _event: &FitEvent, _count: FitCount) {}
+    /// Processes an event about a part.
+    fn part(&mut self, event: &PartEvent, count: PartCount);
 
     /// Prints a line of text, above any bars.
     fn say(&mut self, text: &str);
@@ -53,53 +50,28 @@ fn print_line(text: &str) {
     let _ = writeln!(io::stderr(), "{text}");
 }
 
-/// The display of this kind. `best` holds the best score so far.
-pub(crate) fn display(kind: ProgressKind, best: Arc<BestScore>) -> Box<dyn Display> {
+/// The display of this kind for a run of this shape.
+pub(crate) fn display(kind: ProgressKind, shape: Shape) -> Box<dyn Display> {
     match kind {
-        ProgressKind::Auto if !io::stderr().is_terminal() => Box::new(lines::Lines::new(best)),
+        ProgressKind::Auto if !io::stderr().is_terminal() => Box::new(lines::Lines::new(shape)),
         // Print lines where bars cannot be drawn (a pipe, a dumb terminal).
-        ProgressKind::Bar | ProgressKind::Auto => match bars::Bars::new(Arc::clone(&best)) {
+        ProgressKind::Bar | ProgressKind::Auto => match bars::Bars::new(shape) {
             Some(bars) => Box::new(bars),
-            None => Box::new(lines::Lines::new(best)),
+            None => Box::new(lines::Lines::new(shape)),
         },
-        ProgressKind::Json => Box::new(json::JsonLines::new(1)),
+        ProgressKind::Json => Box::new(json::JsonLines::new(shape)),
         ProgressKind::None => Box::new(Silent),
     }
 }
 
-/// The display of this kind, for a batch with this many fits.
-pub(crate) fn display_of_many(kind: ProgressKind, fits: usize) -> Box<dyn Display> {
-    match kind {
-        ProgressKind::Auto if !io::stderr().is_terminal() => Box::new(many_lines::ManyLines::new()),
-        ProgressKind::Bar | ProgressKind::Auto => match many_bars::ManyBars::new(fits) {
-            Some(bars) => Box::new(bars),
-            None => Box::new(many_lines::ManyLines::new()),
-        },
-        ProgressKind::Json => Box::new(json::JsonLines::new(fits)),
-        ProgressKind::None => Box::new(SilentMany),
-    }
-}
-
+/// Shows failed parts only.
 struct Silent;
 
 impl Display for Silent {
     fn event(&mut self, _event: &RunEvent) {}
 
-    fn say(&mut self, text: &str) {
-        print_line(text);
-    }
-
-    fn finish(&mut self, _ending: Ending<'_>) {}
-}
-
-/// Shows failed fits only.
-struct SilentMany;
-
-impl Display for SilentMany {
-    fn event(&mut self, _event: &RunEvent) {}
-
-    fn fit(&mut self, event: &FitEvent, _count: FitCount) {
-        if let (FitEvent::Failed { .. }, Some(line)) = (event, event.line()) {
+    fn part(&mut self, event: &PartEvent, _count: PartCount) {
+        if let (PartEvent::Failed { .. }, Some(line)) = (event, event.line()) {
             self.say(&line);
         }
     }
@@ -111,15 +83,10 @@ impl Display for SilentMany {
     fn finish(&mut self, _ending: Ending<'_>) {}
 }
 
-/// Like [`remark`], for a batch, which reports a failed node as a failed fit.
-fn remark_of_many(event: &RunEvent) -> Option<String> {
-    if matches!(event, RunEvent::NodeFailed { .. }) { None } else { remark(event) }
-}
-
 /// A line about an unexpected event; `None` for all other events.
-fn remark(event: &RunEvent) -> Option<String> {
+fn remark(event: &RunEvent, shape: Shape) -> Option<String> {
     match event {
-        RunEvent::Resumed { results, .. } => Some(format!("resuming the run: {results} results are there already")),
+        RunEvent::Resumed { results, .. } => Some(format!("resuming the run: its journal holds {results} results")),
         RunEvent::Listening { address, local_workers: 0 } => Some(format!(
             "listening for workers, which connect to {address}; start one with `lookalike worker --access OUT/access.json`"
         )),
@@ -129,7 +96,7 @@ fn remark(event: &RunEvent) -> Option<String> {
             limit.as_secs()
         )),
         RunEvent::LocalWorkerEnded { process, status, restart_after } => {
-            let next = restart_after.map_or("it is not started again", |_| "starting another one");
+            let next = restart_after.map_or("it is not restarted", |_| "starting another one");
             Some(format!("warning: local worker {process} ended ({status}); {next}"))
         }
         RunEvent::WorkerDraining { worker } => {
@@ -149,6 +116,8 @@ fn remark(event: &RunEvent) -> Option<String> {
         }
         RunEvent::NodeRequeued { name, .. } => Some(format!("retrying {} on another worker", name.label)),
         RunEvent::NodeFailed { reason, .. } if reason.is_cancellation() => None,
+        // Reported as a failed part.
+        RunEvent::NodeFailed { .. } if shape != Shape::OneFit => None,
         RunEvent::NodeFailed { name, reason } => Some(format!("error: {} failed: {reason}", name.label)),
         _ => None,
     }

@@ -18,8 +18,6 @@ pub(super) enum Stage {
 }
 
 impl Stage {
-    pub(super) const ALL: [Self; 5] = [Self::Tables, Self::Searches, Self::Judging, Self::Polish, Self::Pictures];
-
     pub(super) fn title(self) -> &'static str {
         match self {
             Self::Tables => "light tables",
@@ -28,6 +26,16 @@ impl Stage {
             Self::Polish => "polishing",
             Self::Pictures => "pictures",
         }
+    }
+
+    /// Its place among the lines of a fit.
+    pub(super) fn place(self) -> u8 {
+        self as u8
+    }
+
+    /// Whether the best score so far is shown with it.
+    pub(super) fn is_scored(self) -> bool {
+        matches!(self, Self::Judging | Self::Polish)
     }
 
     /// The kind of node that completes the stage.
@@ -110,12 +118,12 @@ impl Tally {
         let is_judged = self.counts.get(&Stage::Judging).is_some_and(|count| count.has_ended);
         Some(match name.kind.as_str() {
             // Tables that are added after the candidates were judged are for polish.
-            nodes::TRANSPORT | nodes::TRANSPORT_FULL if is_judged => Stage::Polish,
-            nodes::TRANSPORT => Stage::Tables,
-            nodes::SEARCH => Stage::Searches,
-            nodes::TRANSPORT_FULL | nodes::SELECT => Stage::Judging,
+            nodes::TRANSPORT_FULL if is_judged => Stage::Polish,
+            nodes::TRANSPORT | nodes::TRANSPORT_COARSE => Stage::Tables,
+            nodes::SEARCH | nodes::BRUTE_FORCE => Stage::Searches,
+            nodes::TRANSPORT_FULL | nodes::SELECT | nodes::APPRAISE => Stage::Judging,
             nodes::EXPLORE | nodes::POLISH => Stage::Polish,
-            nodes::REPORT => Stage::Pictures,
+            nodes::REPORT | nodes::RENDER => Stage::Pictures,
             _ => return None,
         })
     }

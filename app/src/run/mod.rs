@@ -3,9 +3,9 @@
 mod clock;
 mod failure;
 mod resume;
-mod running;
+mod session;
 
 pub(crate) use clock::{Clock, cpu_seconds};
 pub(crate) use failure::journal_failed;
-pub(crate) use resume::{is_finished, missing};
-pub(crate) use running::{run_to_end, runner_options};
+pub(crate) use resume::missing;
+pub(crate) use session::Session;

@@ -1,4 +1,4 @@
-//! A batch or a study as a job of Slurm (design section 8, "Beyond one machine"): the job script with the command line in it, and its
+//! A batch or a study as a Slurm job (design section 8, "Beyond one machine"): the job script with the command line in it, and its
 //! submission. Slurm decides where the job runs, with how much and until when; its options are passed on unchanged.
 
 mod command_line;
@@ -8,6 +8,7 @@ pub use command_line::command_line;
 
 use crate::exit::Exit;
 use anyhow::{Context, bail};
+use lookalike_coordinator::atomic;
 use std::{
     fs, io,
     path::{Path, PathBuf},
@@ -75,10 +76,30 @@ impl SlurmJob {
     fn write(&self) -> anyhow::Result<PathBuf> {
         let text = self.script()?;
         let path = self.out.join(SCRIPT_FILE);
+        for path in [path.clone(), atomic::draft_of(&path)] {
+            if !is_free(&path) {
+                bail!(
+                    "{} is not a job script of this program, which would replace it: choose another --out, or move it elsewhere",
+                    path.display()
+                );
+            }
+        }
         let cannot = || format!("cannot write the job script {}", path.display());
         fs::create_dir_all(&self.out).with_context(cannot)?;
-        fs::write(&path, text).with_context(cannot)?;
+        atomic::write(&path, text.as_bytes()).with_context(cannot)?;
         Ok(path)
+    }
+}
+
+/// Whether a job script may be written to this path: nothing is there, or a script that an earlier submission wrote.
+fn is_free(path: &Path) -> bool {
+    let is_ours = |text: &str| {
+        text.is_empty()
+            || (text.starts_with("#!/usr/bin/env bash\n") && text.lines().take(4).any(|it| it.contains("Lookalike")))
+    };
+    match fs::symlink_metadata(path) {
+        Ok(there) => there.is_file() && fs::read_to_string(path).is_ok_and(|text| is_ours(&text)),
+        Err(error) => error.kind() == io::ErrorKind::NotFound,
     }
 }
 
@@ -87,7 +108,7 @@ fn refused(output: &Output, sbatch: &str) -> anyhow::Result<()> {
     let said = String::from_utf8_lossy(&output.stderr).trim().to_owned();
     if !output.status.success() {
         let words = if said.is_empty() { output.status.to_string() } else { said };
-        return Err(anyhow::anyhow!("{sbatch}: {words}").context(Exit::ClusterFailed));
+        return Err(anyhow::anyhow!("{sbatch}: {words}").context(Exit::RunFailed));
     }
     if !said.is_empty() {
         eprintln!("{said}");

@@ -81,6 +81,25 @@ fn submitted_job_has_its_number_and_its_script() {
 }
 
 #[test]
+fn only_job_scripts_of_this_program_are_replaced() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut job = job(&folder.path().join("run"));
+    job.folder = folder.path().to_owned();
+    let sbatch = sbatch(folder.path(), "echo 7");
+    let script = job.submit(&sbatch).unwrap().script;
+    job.command.push("--resume".into());
+    job.submit(&sbatch).unwrap();
+    assert!(fs::read_to_string(&script).unwrap().contains("--resume"));
+    fs::write(&script, "#!/usr/bin/env bash\nmine").unwrap();
+    let error = job.submit(&sbatch).unwrap_err().to_string();
+    assert!(error.contains("lookalike.sbatch is not a job script of this program"), "{error}");
+    fs::remove_file(&script).unwrap();
+    std::os::unix::fs::symlink(&sbatch, &script).unwrap();
+    assert!(job.submit(&sbatch).is_err());
+    assert!(fs::read_to_string(&sbatch).unwrap().ends_with("echo 7\n"));
+}
+
+#[test]
 fn message_of_sbatch_reaches_the_user_with_the_exit_code() {
     let folder = tempfile::tempdir().unwrap();
     let mut job = job(&folder.path().join("run"));
@@ -89,7 +108,7 @@ fn message_of_sbatch_reaches_the_user_with_the_exit_code() {
     let error = job.submit(&refusal).unwrap_err();
     assert!(format!("{error:#}").contains("invalid partition specified: gpu"), "{error:#}");
     assert!(format!("{error:#}").contains("lookalike.sbatch"), "{error:#}");
-    assert_eq!(error.downcast_ref::<Exit>(), Some(&Exit::ClusterFailed));
+    assert_eq!(error.downcast_ref::<Exit>(), Some(&Exit::RunFailed));
     let error = job.submit("no-such-sbatch").unwrap_err();
     assert!(error.to_string().starts_with("cannot find no-such-sbatch"), "{error}");
     assert_eq!(error.downcast_ref::<Exit>(), None);

@@ -126,7 +126,7 @@ impl Plan<'_> {
         }
         if methods {
             for (light, material) in product(probes, &all) {
-                self.rivals(self.scene(material, light))?;
+                self.other_methods(self.scene(material, light))?;
             }
             self.large();
         }
@@ -222,7 +222,7 @@ impl Plan<'_> {
     }
 
     /// The paper's method, and a fit with a single cost (logarithm).
-    fn rivals(&mut self, scene: Scene) -> anyhow::Result<()> {
+    fn other_methods(&mut self, scene: Scene) -> anyhow::Result<()> {
         let paper = Method {
             model: brdf::PAPER_MODEL,
             search: SearchKind::Pattern,

@@ -13,6 +13,7 @@ use lookalike::{
     brdf::{self, flat_names},
     fit::Method,
     metric::auto_exposure,
+    plan::Work,
     render::subset::SampleCount,
 };
 use lookalike_report::measured::{Agreement, DirectCost, Method as MethodName, Photo, Row};
@@ -55,10 +56,9 @@ impl Collector<'_> {
             (Task::Brute { starts, direct }, Content::Survey { minima, .. }) => {
                 let method = if direct.is_some() { MethodName::BruteDirect } else { MethodName::Brute };
                 // All starts read the same table.
-                let table = self.seconds.sum(&record.labels, |node| node.starts_with("transport "));
+                let table = self.seconds.sum(&record.work, |work| work == Work::Table);
                 for (s, ((name, _), minimum)) in starts.iter().zip(minima).enumerate() {
-                    let label = format!("brute-force from start {s}");
-                    let search = self.seconds.sum(&record.labels, |node| node == label);
+                    let search = self.seconds.sum(&record.work, |work| work == Work::Search(s));
                     let cost = search + table / starts.len() as f64;
                     let row = self.row(cell, &self.inputs.study.file.model, method, minimum, cost);
                     self.data.rows.push(Row { start: Some((*name).to_owned()), ..row });
@@ -86,7 +86,7 @@ impl Collector<'_> {
             }
             (Task::Direct { samples, .. }, _) => {
                 let (material, probe) = self.names(cell);
-                let seconds = self.seconds.sum(&record.labels, |_| true);
+                let seconds = self.seconds.sum(&record.work, |_| true);
                 let (model, size, samples_per_pixel) =
                     (self.inputs.study.file.model.clone(), cell.scene.size, *samples);
                 let known =
@@ -178,13 +178,11 @@ impl Collector<'_> {
             seed: task.method.seed,
             ..row
         };
-        let cost = |counts: &dyn Fn(&str) -> bool| self.seconds.sum(&record.labels, counts);
-        let is_subset = |node: &str| node.starts_with("transport of ") && !node.contains("coarse picture");
-        let is_stage_two = |node: &str| node == "select" || node.starts_with("transport in full,");
-        let is_two_stage = |node: &str| is_subset(node) || node.starts_with("search ") || is_stage_two(node);
-        let single = |gamma: f64| cost(&|node: &str| is_subset(node) || node == format!("search gamma {gamma}"));
-        let all = cost(&|node: &str| node != "report");
-        let (two_stages, stage_two) = (cost(&is_two_stage), cost(&is_stage_two));
+        let cost = |counts: &dyn Fn(Work) -> bool| self.seconds.sum(&record.work, counts);
+        let single = |place: usize| cost(&|work| work == Work::Table || work == Work::Search(place));
+        let all = cost(&|work| work != Work::Pictures);
+        let two_stages = cost(&|work| matches!(work, Work::Table | Work::Search(_) | Work::StageTwo));
+        let stage_two = cost(&|work| work == Work::StageTwo);
         let evaluations: u64 = candidates.iter().map(|c| c.evaluations as u64).sum();
         let mut rows = Vec::new();
         let won = candidates.get(*winner).with_context(|| foreign(cell))?;
@@ -195,7 +193,7 @@ impl Collector<'_> {
         };
         if let Some(method) = plain {
             let is_single = method == MethodName::Log;
-            let seconds = if is_single { single(1.0) } else { two_stages };
+            let seconds = if is_single { single(*winner) } else { two_stages };
             let stage_two = (!is_single).then_some(stage_two);
             rows.push(Row { evaluations, stage_two_seconds: stage_two, ..self.row(cell, model, method, won, seconds) });
         }
@@ -205,21 +203,15 @@ impl Collector<'_> {
         }
         let is_main = task.name == MethodName::Ours && task.method.subsets == 1 && !task.is_clamped;
         if task.name == MethodName::Candidate || is_main {
-            for candidate in candidates {
-                rows.push(self.row(
-                    cell,
-                    model,
-                    MethodName::Candidate,
-                    candidate,
-                    single(candidate.gamma.unwrap_or(1.0)),
-                ));
+            for (place, candidate) in candidates.iter().enumerate() {
+                rows.push(self.row(cell, model, MethodName::Candidate, candidate, single(place)));
             }
         }
         let is_default = is_main && polished.is_some() && model == self.inputs.study.file.model;
         if is_default {
             for (method, gamma) in [(MethodName::L2, 1.0), (MethodName::CubeRoot, 3.0)] {
-                let found = candidates.iter().find(|c| c.gamma == Some(gamma));
-                rows.extend(found.map(|found| self.row(cell, model, method, found, single(gamma))));
+                let found = candidates.iter().position(|c| c.gamma == Some(gamma));
+                rows.extend(found.map(|place| self.row(cell, model, method, &candidates[place], single(place))));
             }
         }
         self.data.rows.extend(rows.into_iter().map(of_fit));
@@ -267,7 +259,7 @@ impl Collector<'_> {
             };
             let searched = self.records.get(from);
             let evaluations = searched.and_then(|r| r.content.minimum()).map_or(0, |found| found.evaluations);
-            let cost = searched.map_or(0.0, |r| self.seconds.sum(&r.labels, |node| node != "report"));
+            let cost = searched.map_or(0.0, |r| self.seconds.sum(&r.work, |work| work != Work::Pictures));
             let found = Match {
                 parameters: point.clone(),
                 cssim: appraised.cssim,

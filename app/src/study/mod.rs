@@ -1,4 +1,4 @@
-//! `lookalike study`: runs the paper's experiments and rival methods on measured materials under real light, as one run on the
+//! `lookalike study`: runs the paper's experiments and other methods on measured materials under real light, as one run on the
 //! job graph.
 //!
 //! ```text
@@ -18,7 +18,6 @@ mod file;
 mod inputs;
 mod pictures;
 mod planner;
-mod progress;
 mod record;
 mod seconds;
 mod supply;
@@ -28,10 +27,10 @@ use crate::{
     exit::Exit,
     fit::version,
     inputs::{load_environment, show_warnings},
-    outputs::{Claim, ClaimedFolder, OldFiles, OutFolder, print_result},
-    progress::Ending,
-    run::{journal_failed, run_to_end, runner_options},
-    settings::{EnvironmentSettings, StudySettings},
+    outputs::{Claim, ClaimedFolder, OldFiles, print_result},
+    progress::{Display, Ending, Shape, display},
+    run::Session,
+    settings::{EnvironmentSettings, ProgressKind, StudySettings},
 };
 use anyhow::Context;
 use effort::Effort;
@@ -44,11 +43,9 @@ use lookalike::{
 };
 use lookalike_coordinator::{
     events::RunEvent,
-    journal::{self, Finished, JOURNAL_FILE, JournalOptions, PartLedger, RunIdentity},
-    metrics::Metrics,
+    journal::{JOURNAL_FILE, PartLedger, RunIdentity},
 };
 use lookalike_report::measured::{About, StudyData};
-use progress::Progress;
 use seconds::Seconds;
 use std::{
     fs,
@@ -73,20 +70,32 @@ pub(crate) fn run(settings: StudySettings) -> anyhow::Result<ExitCode> {
     let mut seconds = Seconds::open(&inputs.out)?;
     let supply = Supply::new(Arc::clone(&inputs), Arc::clone(&tally))?;
     let mut effort = Effort::read(&inputs.out);
-    let journal = inputs.out.file(JOURNAL_FILE);
-    if journal.exists() {
-        // Refuses to resume the run of another study, even if nothing is left to compute.
-        journal::finished(&journal, &identity(&inputs)?).map_err(journal_failed)?;
-    }
-    if !supply.is_complete() || !journal.exists() {
-        let workers = run_cells(&settings, &inputs, &tally, (supply, &mut seconds), metrics.as_ref())?;
+    let out_name = settings.out.display().to_string();
+    let session = Session {
+        cluster: &settings.cluster,
+        out: &inputs.out,
+        out_name: &out_name,
+        identity: identity(&inputs)?,
+        resume: settings.resume,
+        seed: inputs.study.file.seed,
+        metrics: metrics.as_ref(),
+        score: None,
+        parts: PartLedger::default(),
+    };
+    // Refuses to resume the run of another study, even if nothing is left to compute.
+    session.finished()?;
+    if !supply.is_complete() || !inputs.out.file(JOURNAL_FILE).exists() {
+        let workers = run_cells(&session, settings.progress, &tally, (supply, &mut seconds))?;
         effort.seconds += began.elapsed().as_secs_f64();
         effort.workers = effort.workers.max(workers);
         effort.write(&inputs.out)?;
     }
     write_report(&settings, &inputs, &seconds, &effort)?;
     let failed = std::mem::take(&mut lock(&tally).failed);
-    end(&inputs.out, failed.len())?;
+    match failed.len() {
+        0 => session.finish(inputs.out.hashes(["results.md", "results.json", "report.html"])?)?,
+        count => session.settle(Some(&format!("{count} cells of the study failed")))?,
+    }
     for cell in &failed {
         eprintln!("failed: {cell}");
     }
@@ -106,35 +115,30 @@ pub(crate) fn check(settings: &StudySettings) -> anyhow::Result<()> {
 
 /// Computes the cells that are not complete. Returns how many workers joined.
 fn run_cells(
-    settings: &StudySettings,
-    inputs: &Arc<Inputs>,
+    session: &Session<'_>,
+    progress: ProgressKind,
     tally: &Arc<Mutex<Tally>>,
     (supply, seconds): (Supply, &mut Seconds),
-    metrics: Option<&Metrics>,
 ) -> anyhow::Result<u32> {
-    // Tables do not end before the run.
-    let ending = inputs.cells.iter().filter(|cell| !matches!(cell.task, cells::Task::Table)).count();
-    let mut progress = Progress::new(settings.progress, ending);
-    progress.complete(lock(tally).complete);
-    let mut options = runner_options(&settings.cluster, &inputs.out, inputs.study.file.seed);
+    let mut display = display(progress, Shape::Many { noun: "cell", total: lock(tally).count.total });
+    let mut options = session.options();
     // The seconds of a node are to be those of one core.
     options.threads_per_worker = std::num::NonZeroUsize::new(1);
-    options.journal = Some(JournalOptions {
-        path: inputs.out.file(JOURNAL_FILE),
-        identity: identity(inputs)?,
-        resume: settings.resume,
-        score: None,
-        parts: PartLedger::default(),
-    });
     let mut workers = 0;
-    let run = run_to_end(options, Many::new(supply), metrics, |event| {
+    let show = |display: &mut dyn Display| {
+        let mut tally = lock(tally);
+        let count = tally.count;
+        tally.news.drain(..).for_each(|event| display.part(&event, count));
+    };
+    let run = session.run(options, Many::new(supply), |event| {
         seconds.note(event);
         workers += u32::from(matches!(event, RunEvent::WorkerJoined { .. }));
-        progress.event(event);
-        progress.complete(lock(tally).complete);
+        show(&mut *display);
+        display.event(event);
     });
+    show(&mut *display);
     let problem = run.as_ref().err().map(|error| format!("{error:#}"));
-    progress.finish(problem.as_deref().map_or(Ending::Finished, Ending::Failed));
+    display.finish(problem.as_deref().map_or(Ending::Finished, Ending::Failed));
     drop(run?);
     Ok(workers)
 }
@@ -153,17 +157,6 @@ fn claim<'a>(settings: &'a StudySettings, study: &'a Study) -> Claim<'a> {
         access: settings.cluster.access.as_deref(),
         ..Claim::of_fit(&settings.out, OldFiles::of(settings.resume, settings.force))
     }
-}
-
-/// Marks the run as ended in the journal.
-fn end(out: &OutFolder, failed: usize) -> anyhow::Result<()> {
-    let path = out.file(JOURNAL_FILE);
-    if failed > 0 {
-        let ended = format!("{failed} cells of the study failed");
-        return journal::settle(&path, &PartLedger::default(), Some(&ended)).map_err(journal_failed);
-    }
-    let names = ["results.md", "results.json", "report.html"];
-    journal::finish(&path, &Finished { outputs: out.hashes(names)? }).map_err(journal_failed)
 }
 
 fn lock(tally: &Mutex<Tally>) -> std::sync::MutexGuard<'_, Tally> {

@@ -1,17 +1,19 @@
-//! The planner of a cell. It records the labels of the cell's nodes, from which the cell's cost is computed.
+//! The planner of a cell. It records what each node of the cell computes, from which the cell's cost is added up.
 
 use lookalike::{
+    fit::BestScore,
     graph::{Blob, GraphEdit, NodeId, NodeSpec, PlanError, Planner},
     image::Image,
-    plan::{FitOutcome, FitPlanner, PhotoPlanner, SurveyOutcome, SurveyPlanner},
+    plan::{FitOutcome, FitPlanner, PhotoPlanner, SurveyOutcome, SurveyPlanner, Work},
 };
-use std::collections::BTreeSet;
+use std::{collections::BTreeMap, sync::Arc};
 
 /// The planner of a cell.
 #[derive(Debug)]
 pub(super) struct CellPlanner {
     inner: Inner,
-    labels: BTreeSet<String>,
+    /// By label.
+    work: BTreeMap<String, Work>,
 }
 
 #[derive(Debug)]
@@ -32,25 +34,30 @@ pub(super) enum Outcome {
 
 impl CellPlanner {
     pub(super) fn photo(planner: PhotoPlanner) -> Self {
-        Self { inner: Inner::Photo(Box::new(planner)), labels: BTreeSet::new() }
+        Self { inner: Inner::Photo(Box::new(planner)), work: BTreeMap::new() }
     }
 
     pub(super) fn fit(planner: FitPlanner) -> Self {
-        Self { inner: Inner::Fit(Box::new(planner)), labels: BTreeSet::new() }
+        Self { inner: Inner::Fit(Box::new(planner)), work: BTreeMap::new() }
     }
 
     pub(super) fn survey(planner: SurveyPlanner) -> Self {
-        Self { inner: Inner::Survey(Box::new(planner)), labels: BTreeSet::new() }
+        Self { inner: Inner::Survey(Box::new(planner)), work: BTreeMap::new() }
     }
 
-    /// The labels of its nodes, and its outcome if all of them are complete.
-    pub(super) fn into_outcome(self) -> (BTreeSet<String>, Option<Outcome>) {
+    /// The work of its nodes, by label, and its outcome if all of them are complete.
+    pub(super) fn into_outcome(self) -> (BTreeMap<String, Work>, Option<Outcome>) {
         let outcome = match self.inner {
             Inner::Photo(planner) => planner.into_photo().map(|(image, noise)| Outcome::Photo(image, noise)),
             Inner::Fit(planner) => planner.into_outcome().map(|outcome| Outcome::Fit(Box::new(outcome))),
             Inner::Survey(planner) => planner.into_outcome().map(|outcome| Outcome::Survey(Box::new(outcome))),
         };
-        (self.labels, outcome)
+        (self.work, outcome)
+    }
+
+    /// The best score of its fit so far.
+    pub(super) fn best(&self) -> Arc<BestScore> {
+        if let Inner::Fit(planner) = &self.inner { planner.best() } else { Arc::default() }
     }
 
     fn inner(&mut self) -> &mut dyn Planner {
@@ -69,7 +76,12 @@ impl Planner for CellPlanner {
 
     fn completed(&mut self, node: NodeId, output: &Blob, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
         if let Some(spec) = graph.spec(node) {
-            self.labels.insert(spec.label.clone());
+            let work = match &self.inner {
+                Inner::Photo(_) => Work::Other,
+                Inner::Fit(planner) => planner.work_of(node, &spec.kind),
+                Inner::Survey(planner) => planner.work_of(node, &spec.kind),
+            };
+            self.work.insert(spec.label.clone(), work);
         }
         self.inner().completed(node, output, graph)
     }

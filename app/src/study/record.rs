@@ -8,16 +8,16 @@ use lookalike::{
     fit::{Judged, Polished},
     image::{Image, decode, openexr, png},
     math::to_f32,
-    plan::FitOutcome,
+    plan::{FitOutcome, Work},
 };
 use serde::{Deserialize, Serialize};
-use std::{collections::BTreeSet, fs};
+use std::{collections::BTreeMap, fs};
 
 /// The numbers of a cell.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct Record {
-    /// Labels of its nodes.
-    pub(super) labels: BTreeSet<String>,
+    /// What its nodes computed, by label.
+    pub(super) work: BTreeMap<String, Work>,
     pub(super) content: Content,
 }
 

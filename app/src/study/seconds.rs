@@ -4,9 +4,10 @@
 
 use crate::outputs::OutFolder;
 use anyhow::Context;
+use lookalike::plan::Work;
 use lookalike_coordinator::events::RunEvent;
 use std::{
-    collections::{BTreeMap, BTreeSet},
+    collections::BTreeMap,
     fs::{self, File, OpenOptions},
     io::Write,
 };
@@ -55,11 +56,10 @@ impl Seconds {
         }
     }
 
-    /// The sum over the labels for which `counts` returns true, which gets each label without the name of its cell.
-    pub(super) fn sum(&self, labels: &BTreeSet<String>, counts: impl Fn(&str) -> bool) -> f64 {
-        let own = |label: &str| counts(lookalike::graph::split_label(label).1);
+    /// The sum over the nodes of a cell whose work counts.
+    pub(super) fn sum(&self, nodes: &BTreeMap<String, Work>, counts: impl Fn(Work) -> bool) -> f64 {
         let known = |label: &String| self.now.get(label).or_else(|| self.before.get(label));
-        labels.iter().filter(|label| own(label)).filter_map(known).sum()
+        nodes.iter().filter(|(_, work)| counts(**work)).filter_map(|(label, _)| known(label)).sum()
     }
 }
 

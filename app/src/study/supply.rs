@@ -7,6 +7,7 @@ use super::{
     planner::{CellPlanner, Outcome},
     record::{self, Content, Match, Record},
 };
+use crate::progress::{PartCount, PartEvent};
 use anyhow::{Context, anyhow};
 use lookalike::{
     brdf,
@@ -24,10 +25,12 @@ use std::{
     sync::{Arc, Mutex, PoisonError},
 };
 
-/// The numbers of cells, of complete ones and of failed ones, for the display.
+/// The numbers of cells in each state, without tables, which do not end before the run; what happened to cells since the display
+/// last heard of it; the cells that failed.
 #[derive(Debug, Default)]
 pub(super) struct Tally {
-    pub(super) complete: usize,
+    pub(super) count: PartCount,
+    pub(super) news: Vec<PartEvent>,
     pub(super) failed: Vec<String>,
 }
 
@@ -78,8 +81,9 @@ impl Supply {
             supply.state[id] = State::Complete;
         }
         supply.settle_tables();
-        let is_kept = |id: &CellId| supply.records.contains_key(id);
-        supply.tell(|tally| tally.complete = (0..inputs.cells.len()).filter(is_kept).count());
+        let ending = || inputs.cells.iter().enumerate().filter(|(_, cell)| !matches!(cell.task, Task::Table));
+        let done = ending().filter(|(id, _)| supply.records.contains_key(id)).count();
+        supply.tell(|tally| tally.count = PartCount { total: ending().count(), done, ..PartCount::default() });
         Ok(supply)
     }
 
@@ -139,10 +143,17 @@ impl Supply {
     }
 
     fn give_up(&mut self, id: CellId, error: &str) {
-        self.state[id] = State::Failed;
-        let name = &self.inputs.cells[id].name;
-        tracing::error!("{name}: {error}");
-        self.tell(|tally| tally.failed.push(format!("{name}: {error}")));
+        let was_active = std::mem::replace(&mut self.state[id], State::Failed) == State::Active;
+        let cell = &self.inputs.cells[id];
+        let (number, name, error) = (number(id), cell.name.clone(), error.to_owned());
+        self.tell(|tally| {
+            tally.failed.push(format!("{name}: {error}"));
+            if !matches!(cell.task, Task::Table) {
+                tally.count.failed += 1;
+                tally.count.running -= usize::from(was_active);
+            }
+            tally.news.push(PartEvent::Failed { number, name, error });
+        });
     }
 
     fn planner(&self, id: CellId) -> anyhow::Result<CellPlanner> {
@@ -252,10 +263,10 @@ impl Supply {
     fn keep(&mut self, id: CellId, planner: CellPlanner) -> anyhow::Result<()> {
         let inputs = Arc::clone(&self.inputs);
         let cell = &inputs.cells[id];
-        let (labels, outcome) = planner.into_outcome();
+        let (work, outcome) = planner.into_outcome();
         let outcome = outcome.context("its nodes ended without a result: please report this")?;
         super::pictures::write(&inputs, cell, &outcome, |scene| self.captures.get(&scene).map_or(1.0, |c| c.1))?;
-        let record = Record { labels, content: Content::of(&outcome, self.points(cell)?) };
+        let record = Record { work, content: Content::of(&outcome, self.points(cell)?) };
         if let (Task::Photo, Outcome::Photo(image, _)) = (&cell.task, outcome) {
             record::write_image(&inputs.out, &cell.name, &image)?;
             self.keep_photo(cell.scene, image)?;
@@ -276,7 +287,14 @@ impl Parts for Supply {
                     self.state[id] = State::Active;
                     let stays = matches!(self.inputs.cells[id].task, Task::Table);
                     self.active += usize::from(!stays);
-                    let (number, name) = (u32::try_from(id).unwrap_or(u32::MAX), self.inputs.cells[id].name.clone());
+                    let (number, name) = (number(id), self.inputs.cells[id].name.clone());
+                    if !stays {
+                        let started = PartEvent::Started { number, name: name.clone(), best: planner.best() };
+                        self.tell(|tally| {
+                            tally.count.running += 1;
+                            tally.news.push(started);
+                        });
+                    }
                     return Ok(Next::Part(Box::new(Part { number, name, planner, stays })));
                 }
                 Err(error) => self.give_up(id, &format!("{error:#}")),
@@ -297,7 +315,11 @@ impl Parts for Supply {
             Ok(()) => {
                 self.state[id] = State::Complete;
                 self.safe.push(part.number);
-                self.tell(|tally| tally.complete += 1);
+                self.tell(|tally| {
+                    tally.count.running -= 1;
+                    tally.count.done += 1;
+                    tally.news.push(PartEvent::Finished { number: part.number, name: part.name, scores: None });
+                });
             }
             Err(error) => self.give_up(id, &format!("{error:#}")),
         }
@@ -329,6 +351,10 @@ fn around(point: &[f64], model: &str) -> anyhow::Result<Vec<Vec<f64>>> {
         (0..point.len()).map(one).collect()
     };
     Ok((0..COUNT).map(moved).collect())
+}
+
+fn number(id: CellId) -> u32 {
+    u32::try_from(id).unwrap_or(u32::MAX)
 }
 
 fn missing(cell: &Cell) -> anyhow::Error {

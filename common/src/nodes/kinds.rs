@@ -1,7 +1,9 @@
 //! The kind of each node type: its name on the wire, in the journal and in logs.
 
-/// Integrates the transport table of pixels of a subset or of the coarse picture.
+/// Integrates the transport table of a subset's pixels.
 pub const TRANSPORT: &str = "transport";
+/// As [`TRANSPORT`], of the coarse picture's table.
+pub const TRANSPORT_COARSE: &str = "transport-coarse";
 /// As [`TRANSPORT`], of the full-resolution table.
 pub const TRANSPORT_FULL: &str = "transport-full";
 /// Searches the parameters at one gamma.

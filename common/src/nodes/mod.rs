@@ -21,7 +21,9 @@ use crate::graph::Registry;
 
 pub(crate) use appraise::{AppraiseParameters, AppraisedWire};
 pub(crate) use brute_force::BruteForceParameters;
-pub use kinds::{APPRAISE, BRUTE_FORCE, EXPLORE, POLISH, RENDER, REPORT, SEARCH, SELECT, TRANSPORT, TRANSPORT_FULL};
+pub use kinds::{
+    APPRAISE, BRUTE_FORCE, EXPLORE, POLISH, RENDER, REPORT, SEARCH, SELECT, TRANSPORT, TRANSPORT_COARSE, TRANSPORT_FULL,
+};
 pub(crate) use polish::PolishParameters;
 pub(crate) use render::{RenderParameters, RenderedWire};
 pub(crate) use report::{ReportParameters, ReportWire};
@@ -35,6 +37,7 @@ pub(crate) use view::{ViewWire, joined};
 pub fn registry() -> Registry {
     Registry::default()
         .with(transport::Transport { kind: TRANSPORT })
+        .with(transport::Transport { kind: TRANSPORT_COARSE })
         .with(transport::Transport { kind: TRANSPORT_FULL })
         .with(search::Search)
         .with(select::Select)

@@ -1,4 +1,4 @@
-//! `transport` and `transport-full`: integrates the transport table of a range of pixels.
+//! `transport`, `transport-coarse` and `transport-full`: integrates the transport table of a range of pixels.
 //!
 //! Inputs: the environment; the list of pixels (an encoded `Vec<Pixel>`); the normal map if the surface has one.
 
@@ -25,7 +25,7 @@ pub(crate) struct TransportParameters {
     pub(crate) range: (u32, u32),
 }
 
-/// The node type, under one of its two kinds.
+/// The node type, under one of its kinds.
 #[derive(Debug)]
 pub(super) struct Transport {
     pub(super) kind: &'static str,

@@ -16,6 +16,7 @@ use super::{
     step::Step,
     tables::{FULL_SHARD, SUBSET_SHARD, stage_one_knots, whole_span},
     verify::{self, SubsetTables},
+    work::Work,
 };
 use crate::{
     fit::{
@@ -157,6 +158,13 @@ impl FitPlanner {
     pub fn judging_on_whole_range(mut self) -> Self {
         self.is_judged_on_whole_range = true;
         self
+    }
+
+    /// What a node of this kind computes for this fit. Ask before [`Planner::completed`] hears of the node.
+    #[must_use]
+    pub fn work_of(&self, node: NodeId, kind: &str) -> Work {
+        let is_judged = !matches!(self.step, Step::Searching | Step::Selecting(_));
+        self.searches.get(&node).map_or_else(|| Work::of_fit(kind, is_judged), |place| Work::Search(*place))
     }
 
     fn add_searches(&mut self, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {

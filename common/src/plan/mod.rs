@@ -14,6 +14,7 @@ mod step;
 mod survey;
 mod tables;
 mod verify;
+mod work;
 
 pub use appraisal::Appraisal;
 pub use encode::encode_light;
@@ -21,6 +22,7 @@ pub use fit::{FitOutcome, FitPlanner};
 pub use limits::FitError;
 pub use photo::{PhotoPlanner, Subject};
 pub use survey::{SurveyOutcome, SurveyPlanner, SurveyRequest};
+pub use work::Work;
 
 #[cfg(test)]
 mod tests;

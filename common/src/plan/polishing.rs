@@ -90,8 +90,13 @@ impl Polishing {
         let list = add(graph, "list of pixels", &pixels)?;
         let knots = Knots::covering(low, high, COARSE_PER_OCTAVE);
         let list = (list, pixels.len(), COARSE_SHARD);
-        let table =
-            scene.add_transport(graph, (nodes::TRANSPORT, "of the coarse picture"), list, knots, Accuracy::COARSE)?;
+        let table = scene.add_transport(
+            graph,
+            (nodes::TRANSPORT_COARSE, "of the coarse picture"),
+            list,
+            knots,
+            Accuracy::COARSE,
+        )?;
         self.coarse = Some((view, table));
         Ok(())
     }

@@ -13,6 +13,7 @@ use super::{
     scene_tables::SceneTables,
     tables::whole_span,
     verify,
+    work::Work,
 };
 use crate::{
     brdf::flat_len,
@@ -99,6 +100,12 @@ impl SurveyPlanner {
     #[must_use]
     pub fn into_outcome(self) -> Option<SurveyOutcome> {
         self.outcome
+    }
+
+    /// What a node of this kind computes for this survey. Ask before [`Planner::completed`] hears of the node.
+    #[must_use]
+    pub fn work_of(&self, node: NodeId, kind: &str) -> Work {
+        self.searches.get(&node).map_or_else(|| Work::of_survey(kind), |start| Work::Search(*start))
     }
 
     fn add_brute_force(&mut self, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {

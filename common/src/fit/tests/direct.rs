@@ -60,7 +60,7 @@ fn results_of_direct_searches_are_checked_by_the_direct_integrator() {
         let method = Method { integration: Integration::Direct { samples }, ..method.clone() };
         FitPlanner::new(capture("ggx", &GGX, 0.0), method, 1.0).unwrap()
     };
-    let mut bench = Bench::default();
+    let bench = Bench::default();
     let claim = RefCell::new(None);
     let keep = |spec: &NodeSpec, output: Blob| {
         if spec.kind == "search" {

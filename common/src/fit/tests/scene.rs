@@ -11,7 +11,6 @@ use crate::{
     light::Environment,
     math::to_f32,
     nodes,
-    plan::FitPlanner,
     render::{
         knots::{Knots, PER_OCTAVE},
         pyramid::LightPyramid,
@@ -21,7 +20,10 @@ use crate::{
     },
     scene::{Camera, Capture, CaptureInput, Circle, Geometry},
 };
-use std::{collections::BTreeMap, sync::Arc};
+use std::{
+    collections::BTreeMap,
+    sync::{Arc, Mutex},
+};
 
 const SIZE: usize = 24;
 
@@ -104,27 +106,29 @@ pub(crate) fn method(name: &str) -> Method {
     Method { model: model(name).unwrap(), gammas, samples: SampleCount::Draws(48), ..Method::default() }
 }
 
-/// Runs graphs one node at a time. Outputs are cached: a node is a pure function, so a second run takes no time.
+/// The outputs of nodes, by kind, parameters and inputs. A node is a pure function, so the tests of this process share them.
+static KNOWN: Mutex<BTreeMap<(String, Vec<u8>, Vec<BlobHash>), Blob>> = Mutex::new(BTreeMap::new());
+
+/// Runs graphs one node at a time.
 pub(crate) struct Bench {
-    known: BTreeMap<(String, Vec<u8>, Vec<BlobHash>), Blob>,
     context: RunContext,
 }
 
 impl Default for Bench {
     fn default() -> Self {
-        Self { known: BTreeMap::new(), context: RunContext::new(Arc::new(DecodedCache::new(1 << 26))) }
+        Self { context: RunContext::new(Arc::new(DecodedCache::new(1 << 26))) }
     }
 }
 
 impl Bench {
     /// Runs a planner to its end. `pick` chooses among the given number of ready nodes; `change` may alter an output before the planner
     /// receives it.
-    pub(crate) fn run(
-        &mut self,
-        mut planner: FitPlanner,
+    pub(crate) fn run<P: Planner>(
+        &self,
+        mut planner: P,
         mut pick: impl FnMut(usize) -> usize,
         change: impl Fn(&NodeSpec, Blob) -> Blob,
-    ) -> Result<FitPlanner, PlanError> {
+    ) -> Result<P, PlanError> {
         let mut graph = Graph::new();
         let mut ready: Vec<NodeId> = Vec::new();
         planner.start(&mut GraphEdit::new(&mut graph))?;
@@ -153,10 +157,13 @@ impl Bench {
         }
     }
 
-    fn output(&mut self, spec: &NodeSpec, inputs: &[Blob]) -> Blob {
+    fn output(&self, spec: &NodeSpec, inputs: &[Blob]) -> Blob {
         let key = (spec.kind.clone(), spec.parameters.clone(), inputs.iter().map(Blob::hash).collect());
-        let context = &self.context;
-        let compute = || nodes::registry().run(&spec.kind, &spec.parameters, inputs, context).unwrap();
-        self.known.entry(key).or_insert_with(compute).clone()
+        if let Some(known) = KNOWN.lock().unwrap().get(&key) {
+            return known.clone();
+        }
+        // Not under the lock: other tests go on meanwhile.
+        let output = nodes::registry().run(&spec.kind, &spec.parameters, inputs, &self.context).unwrap();
+        KNOWN.lock().unwrap().entry(key).or_insert(output).clone()
     }
 }

@@ -76,9 +76,12 @@ fn default_cid(first: &Picture, second: &Picture) -> f64 {
 }
 
 #[test]
-fn every_variant_agrees_with_the_authors_program_on_every_pair_with_their_table() {
+fn every_variant_agrees_with_the_authors_program_with_their_table() {
     let Some(space) = table() else { return };
-    for expected in &EXPECTED {
+    // Each kind of picture, and the sizes at which a variant has no score or no second scale.
+    let default = ["noise_0.02", "hue_20deg", "small30x34_noise", "odd97x131_blur", "sphere_alpha.20_.22"];
+    let is_tested = |expected: &&vectors::Expected| cfg!(feature = "slow") || default.contains(&expected.name);
+    for expected in EXPECTED.iter().filter(is_tested) {
         let (first, second) = pair(expected.name);
         for ((found, expected_score), variant) in
             scores(&first, &second, &space).iter().zip(expected.scores).zip(VARIANTS)

@@ -107,8 +107,8 @@ fn a_table_other_than_the_requested_one_is_refused() {
 
 #[test]
 fn the_outcome_does_not_depend_on_the_order_in_which_nodes_finish() {
-    let mut bench = Bench::default();
-    let mut outcome = |pick: &mut dyn FnMut(usize) -> usize| {
+    let bench = Bench::default();
+    let outcome = |pick: &mut dyn FnMut(usize) -> usize| {
         let outcome = bench.run(planner(2), pick, unchanged).unwrap().into_outcome().unwrap();
         format!("{outcome:?}")
     };

@@ -4,9 +4,9 @@ use crate::{
     brdf::Material,
     fit::{
         Method,
-        tests::scene::{capture, method, room},
+        tests::scene::{Bench, capture, method, room},
     },
-    graph::{Blob, Execution, Graph, GraphEdit, NodeSpec, PlanError, Planner, run_in_process},
+    graph::{Blob, Execution, NodeSpec, PlanError, Planner, run_in_process},
     light::LightDistribution,
     nodes,
     plan::{FitError, PhotoPlanner, Subject, SurveyOutcome, SurveyPlanner, SurveyRequest, encode_light},
@@ -24,7 +24,7 @@ fn planner(request: SurveyRequest) -> Result<SurveyPlanner, FitError> {
 
 fn survey(request: SurveyRequest) -> SurveyOutcome {
     let planner = planner(request).unwrap();
-    run_in_process(planner, &nodes::registry(), Execution::Parallel).unwrap().into_outcome().unwrap()
+    Bench::default().run(planner, |_| 0, |_, output| output).unwrap().into_outcome().unwrap()
 }
 
 #[test]
@@ -63,37 +63,15 @@ fn points_outside_the_model_are_refused_before_any_work() {
 }
 
 /// The planner's error when `change` has altered the outputs; `None` if it accepts them.
-fn told_wrong(mut planner: impl Planner, change: impl Fn(&NodeSpec, Vec<u8>) -> Vec<u8>) -> Option<PlanError> {
-    let context = crate::graph::RunContext::new(Arc::new(crate::graph::DecodedCache::new(1 << 26)));
-    let mut graph = Graph::new();
-    planner.start(&mut GraphEdit::new(&mut graph)).unwrap();
-    let mut ready = Vec::new();
-    loop {
-        while let Some(change) = graph.next_change() {
-            match change {
-                crate::graph::Change::Ready(node) => ready.push(node),
-                crate::graph::Change::Completed(node) => {
-                    let output = graph.output(node).cloned().unwrap();
-                    if let Err(error) = planner.completed(node, &output, &mut GraphEdit::new(&mut graph)) {
-                        return Some(error);
-                    }
-                }
-                _ => {}
-            }
-        }
-        let node = ready.pop()?;
-        let spec = graph.spec(node).cloned().unwrap();
-        let inputs = graph.input_blobs(node).unwrap();
-        let output = nodes::registry().run(&spec.kind, &spec.parameters, &inputs, &context).unwrap();
-        graph.complete(node, Blob::new(change(&spec, output.to_vec())));
-    }
+fn told_wrong(planner: impl Planner, change: impl Fn(&NodeSpec, Blob) -> Blob) -> Option<PlanError> {
+    Bench::default().run(planner, |ready| ready - 1, change).err()
 }
 
 #[test]
 fn appraisals_of_another_number_or_without_costs_are_refused() {
     let request = || SurveyRequest { points: vec![START.to_vec()], gammas: vec![1.0, 2.0], ..Default::default() };
     let instead = |costs: Vec<f64>, score: f64| {
-        let wrong = crate::protocol::encode(&vec![(score, 0.1, costs)]).unwrap();
+        let wrong = Blob::new(crate::protocol::encode(&vec![(score, 0.1, costs)]).unwrap());
         told_wrong(
             planner(request()).unwrap(),
             move |spec, output| {

@@ -1,0 +1,105 @@
+//! Events about the parts of a run, in addition to those about their nodes: the fits of a batch, the cells of a study.
+
+use lookalike::fit::BestScore;
+use std::sync::Arc;
+
+/// The shape of a run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Shape {
+    /// One fit, whose stages are shown.
+    OneFit,
+    /// Many parts, each of which is shown as a whole.
+    Many {
+        /// The word for one of them: `fit` or `cell`.
+        noun: &'static str,
+        /// Their number.
+        total: usize,
+    },
+}
+
+/// An event about a part.
+#[derive(Debug, Clone)]
+pub(crate) enum PartEvent {
+    /// Its inputs are loaded; its first nodes follow.
+    Started {
+        /// Its place in the run, from 0.
+        number: u32,
+        /// Its name; empty if it is the only one.
+        name: String,
+        /// Its best score so far.
+        best: Arc<BestScore>,
+    },
+    /// Its results are written.
+    Finished {
+        /// Its place in the run, from 0.
+        number: u32,
+        /// Its name.
+        name: String,
+        /// Its scores, if it is a fit.
+        scores: Option<PartScores>,
+    },
+    /// It failed.
+    Failed {
+        /// Its place in the run, from 0.
+        number: u32,
+        /// Its name.
+        name: String,
+        /// The error.
+        error: String,
+    },
+}
+
+/// How a fit has ended.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct PartScores {
+    /// Its final score of the whole image.
+    pub(crate) cssim: f64,
+    /// Its final score of the object.
+    pub(crate) cssim_object: f64,
+    /// Whether its score lies above its `max-cssim`.
+    pub(crate) is_missed: bool,
+    /// From its start until its last file was written.
+    pub(crate) seconds: f64,
+}
+
+/// The number of parts in each state.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(crate) struct PartCount {
+    /// All of them.
+    pub(crate) total: usize,
+    /// Those that are running.
+    pub(crate) running: usize,
+    /// Those with results, including those that missed their score.
+    pub(crate) done: usize,
+    /// Those with results and a score above their `max-cssim`.
+    pub(crate) missed: usize,
+    /// Those that failed.
+    pub(crate) failed: usize,
+}
+
+impl PartCount {
+    /// `5 of 12 done`, followed by the numbers of missed and failed parts.
+    pub(crate) fn text(&self) -> String {
+        let mut text = format!("{} of {} done", self.done, self.total);
+        for (count, what) in [(self.missed, "missed"), (self.failed, "failed")] {
+            if count > 0 {
+                text.push_str(&format!(", {count} {what}"));
+            }
+        }
+        text
+    }
+}
+
+impl PartEvent {
+    /// The line that reports the end of a fit or a failure; `None` for everything else.
+    pub(super) fn line(&self) -> Option<String> {
+        match self {
+            Self::Started { .. } | Self::Finished { scores: None, .. } => None,
+            Self::Finished { name, scores: Some(scores), .. } => {
+                let missed = if scores.is_missed { ", above its max-cssim" } else { "" };
+                Some(format!("{name}: CSSIM {:.4}{missed} ({:.1} s)", scores.cssim, scores.seconds))
+            }
+            Self::Failed { name, error, .. } => Some(format!("{name}: failed: {error}")),
+        }
+    }
+}

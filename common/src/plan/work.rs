@@ -1,0 +1,46 @@
+//! What a node computes for its fit or survey, so that costs can be added up.
+
+use serde::{Deserialize, Serialize};
+
+use crate::nodes;
+
+/// What a node computes for a fit or a survey.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[non_exhaustive]
+pub enum Work {
+    /// A shard of the table that searches read: that of a subset, or a survey's table.
+    Table,
+    /// One search: the place of its result among the candidates of a fit or the minima of a survey.
+    Search(usize),
+    /// Judging the candidates, and the table for it.
+    StageTwo,
+    /// Exploring and polishing, and the tables for them.
+    StageThree,
+    /// The pictures at the end.
+    Pictures,
+    /// Anything else: the photo, the scores of given points.
+    Other,
+}
+
+impl Work {
+    /// The work of a node of a fit that is no search. `is_judged` tells whether stage two is over.
+    pub(super) fn of_fit(kind: &str, is_judged: bool) -> Self {
+        match kind {
+            nodes::TRANSPORT => Self::Table,
+            nodes::TRANSPORT_FULL if is_judged => Self::StageThree,
+            nodes::TRANSPORT_FULL | nodes::SELECT => Self::StageTwo,
+            nodes::TRANSPORT_COARSE | nodes::EXPLORE | nodes::POLISH => Self::StageThree,
+            nodes::REPORT => Self::Pictures,
+            _ => Self::Other,
+        }
+    }
+
+    /// The work of a node of a survey that is no search.
+    pub(super) fn of_survey(kind: &str) -> Self {
+        match kind {
+            nodes::TRANSPORT_FULL => Self::Table,
+            nodes::REPORT => Self::Pictures,
+            _ => Self::Other,
+        }
+    }
+}
