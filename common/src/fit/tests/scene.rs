@@ -106,8 +106,11 @@ pub(crate) fn method(name: &str) -> Method {
     Method { model: model(name).unwrap(), gammas, samples: SampleCount::Draws(48), ..Method::default() }
 }
 
-/// The outputs of nodes, by kind, parameters and inputs. A node is a pure function, so the tests of this process share them.
-static KNOWN: Mutex<BTreeMap<(String, Vec<u8>, Vec<BlobHash>), Blob>> = Mutex::new(BTreeMap::new());
+/// The outputs of nodes. A node is a pure function, so the tests of this process share them.
+static KNOWN: Mutex<BTreeMap<Key, Blob>> = Mutex::new(BTreeMap::new());
+
+/// Kind, parameters and inputs of a node.
+type Key = (String, Vec<u8>, Vec<BlobHash>);
 
 /// Runs graphs one node at a time.
 pub(crate) struct Bench {
