@@ -30,7 +30,7 @@ use crate::{
     outputs::{BATCH_MARK, Claim, ClaimedFolder, FIT_FILES, OldFiles, OutFolder, print_result},
     progress::{Ending, Shape, display},
     run::Session,
-    settings::{BatchFit, BatchSettings, OnFailure},
+    settings::{BatchFit, BatchSettings, OnFailure, ProgressKind},
 };
 use anyhow::Context;
 use board::{Board, Watchers};
@@ -57,8 +57,16 @@ pub(crate) fn run(settings: BatchSettings) -> anyhow::Result<ExitCode> {
     let open: Vec<u32> =
         (0..).zip(&complete).filter(|(_, complete)| complete.is_none()).map(|(number, _)| number).collect();
     let fits: Arc<[_]> = settings.fits.into();
-    let mut display = display(settings.progress, Shape::Many { noun: "fit", total: fits.len() });
-    checked.warnings.iter().for_each(|text| display.say(&format!("warning: {text}")));
+    let is_stream = settings.progress == ProgressKind::Json;
+    if !is_stream {
+        // Before bars are drawn.
+        show_warnings(&checked.warnings);
+    }
+    let done = fits.len() - open.len();
+    let mut display = display(settings.progress, Shape::Many { noun: "fit", total: fits.len(), done });
+    if is_stream {
+        checked.warnings.iter().for_each(|text| display.say(&format!("warning: {text}")));
+    }
     remark.iter().for_each(|text| display.say(text));
     metrics.iter().for_each(|metrics| display.say(&format!("metrics at {}", metrics.url())));
     let ledger = PartLedger::default();

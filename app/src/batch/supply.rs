@@ -1,4 +1,4 @@
-//! The fits as parts of the run: takes them from the loader, and passes ended ones to the writers of results.
+//! The fits as parts of the run: the supply takes them from the loader, and passes those that have ended to the writers of results.
 
 use super::{
     backlog::Load,

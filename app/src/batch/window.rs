@@ -102,7 +102,7 @@ mod tests {
         assert!(has_room(&window, 1, 15, 0, 0) && !has_room(&window, 1, 16, 0, 0));
         assert!(has_room(&window, 15, 0, 0, 0) && !has_room(&window, 16, 0, 0, 0));
         window.demand.note(&RunEvent::WorkerLeft { worker: WorkerId(1), departure: Departure::Lost });
-        assert!(has_room(&window, 1, 1, 0, 0) && !has_room(&window, 1, 2, 0, 0), "the expected fit is not dropped");
+        assert!(has_room(&window, 1, 1, 0, 0) && !has_room(&window, 1, 2, 0, 0), "the expected worker still counts");
     }
 
     #[test]

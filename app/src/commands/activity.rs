@@ -3,7 +3,7 @@
 use std::{
     io::{self, Write as _},
     sync::mpsc::{RecvTimeoutError, Sender, channel},
-    thread,
+    thread::{self, JoinHandle},
     time::{Duration, Instant},
 };
 
@@ -17,14 +17,15 @@ const PAUSE: Duration = Duration::from_secs(10);
 #[derive(Debug)]
 pub(super) struct Activity {
     /// Dropping it ends the thread.
-    _end: Sender<()>,
+    end: Option<Sender<()>>,
+    thread: Option<JoinHandle<()>>,
 }
 
 impl Activity {
     /// The work begins. `what` says what is done, as of now.
     pub(super) fn new(what: impl Fn() -> String + Send + 'static) -> Self {
         let (end, ended) = channel();
-        thread::spawn(move || {
+        let thread = thread::spawn(move || {
             let began = Instant::now();
             let mut pause = FIRST;
             while ended.recv_timeout(pause) == Err(RecvTimeoutError::Timeout) {
@@ -33,7 +34,15 @@ impl Activity {
                 pause = PAUSE;
             }
         });
-        Self { _end: end }
+        Self { end: Some(end), thread: Some(thread) }
+    }
+}
+
+impl Drop for Activity {
+    fn drop(&mut self) {
+        self.end = None;
+        // So that no line follows.
+        let _ = self.thread.take().map(JoinHandle::join);
     }
 }
 

@@ -14,6 +14,7 @@ use std::{
     io::ErrorKind,
     path::{Path, PathBuf},
     sync::Arc,
+    time::SystemTime,
 };
 
 /// A locked OUT folder whose old files are still there.
@@ -53,7 +54,9 @@ impl ClaimedFolder {
         let cannot =
             || format!("cannot write results to {}: choose a folder you may write to with --out", path.display());
         fs::create_dir_all(path).with_context(cannot)?;
-        let probe = path.join(format!(".lookalike-write-test-{}", std::process::id()));
+        // A name that no other process has, on this machine or another.
+        let now = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
+        let probe = path.join(format!(".lookalike-write-test-{}-{}", std::process::id(), now.as_nanos()));
         fs::File::create_new(&probe).with_context(cannot)?;
         fs::remove_file(&probe).with_context(cannot)?;
         let lock = RunLock::take(path)?;

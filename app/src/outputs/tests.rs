@@ -158,7 +158,7 @@ fn batch_refuses_the_folder_of_another_fit() {
         ..fit(folder.path(), old)
     };
     for old in [OldFiles::Refuse, OldFiles::Resume] {
-        let phrases = ["3 problems", "/a holds a fit that is not of this run", "/b holds a fit", "c/match.png is "];
+        let phrases = ["3 problems", "/a holds a fit that is not of this run", "/b holds a fit", "c/match.png"];
         refused(&claim(old), &phrases);
     }
     let claim_e = |old| Claim { fits: vec!["e"], ..claim(old) };

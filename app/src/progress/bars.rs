@@ -38,11 +38,12 @@ impl Bars {
         }
         let total = match shape {
             Shape::OneFit => None,
-            Shape::Many { noun, total } => {
+            Shape::Many { noun, total, done } => {
                 let bar = all.add(ProgressBar::new(total as u64));
                 bar.set_style(style("{prefix:<30} {msg:<34} {elapsed:>4} {percent:>3}% {wide_bar:.green/blue}"));
                 bar.set_prefix(format!("{noun}s"));
-                bar.set_message(PartCount { total, ..PartCount::default() }.text());
+                bar.set_message(PartCount { total, done, ..PartCount::default() }.text());
+                bar.set_position(done as u64);
                 bar.enable_steady_tick(Duration::from_millis(200));
                 let more = all.add(ProgressBar::no_length());
                 more.set_style(style("{msg}"));
@@ -67,7 +68,7 @@ impl Bars {
         let Some((total, more)) = &self.total else { return };
         let height = usize::from(console::Term::stderr().size().0);
         let most = MOST_ROWS.min(height.saturating_sub(OTHER_LINES)).max(1);
-        // Parts begin in order, so a new row goes last.
+        // A new row goes last.
         for (number, row) in &self.rows.running {
             if self.bars.len() >= most {
                 break;

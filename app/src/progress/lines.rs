@@ -68,7 +68,7 @@ impl Display for Lines {
         self.count = count;
         match self.shape {
             Shape::OneFit => self.rows.part(event),
-            Shape::Many { noun, total } => match event.line() {
+            Shape::Many { noun, total, .. } => match event.line() {
                 Some(line) => {
                     let width = total.to_string().len();
                     self.tell(&format!("{:>width$} of {total}  {line}", count.done + count.failed));

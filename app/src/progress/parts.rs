@@ -14,6 +14,8 @@ pub(crate) enum Shape {
         noun: &'static str,
         /// Their number.
         total: usize,
+        /// How many of them an earlier process has completed.
+        done: usize,
     },
 }
 

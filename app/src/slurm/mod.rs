@@ -77,7 +77,7 @@ impl SlurmJob {
         let text = self.script()?;
         let path = self.out.join(SCRIPT_FILE);
         for path in [path.clone(), atomic::draft_of(&path)] {
-            if !is_free(&path) {
+            if !is_free(&path).with_context(|| format!("cannot read {}", path.display()))? {
                 bail!(
                     "{} is not a job script of this program, which would replace it: choose another --out, or move it elsewhere",
                     path.display()
@@ -92,14 +92,15 @@ impl SlurmJob {
 }
 
 /// Whether a job script may be written to this path: nothing is there, or a script that an earlier submission wrote.
-fn is_free(path: &Path) -> bool {
+fn is_free(path: &Path) -> io::Result<bool> {
     let is_ours = |text: &str| {
         text.is_empty()
             || (text.starts_with("#!/usr/bin/env bash\n") && text.lines().take(4).any(|it| it.contains("Lookalike")))
     };
     match fs::symlink_metadata(path) {
-        Ok(there) => there.is_file() && fs::read_to_string(path).is_ok_and(|text| is_ours(&text)),
-        Err(error) => error.kind() == io::ErrorKind::NotFound,
+        Ok(there) => Ok(there.is_file() && is_ours(&String::from_utf8_lossy(&fs::read(path)?))),
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(true),
+        Err(error) => Err(error),
     }
 }
 

@@ -4,7 +4,7 @@ use super::{
     cells::{Cell, FitTask, Task, What},
     inputs::{Inputs, geometry},
     pictures::base,
-    record::{self, Content, Match, Record},
+    record::{self, Content, Cost, Match, Record},
     seconds::Seconds,
     variants,
 };
@@ -13,7 +13,6 @@ use lookalike::{
     brdf::{self, flat_names},
     fit::Method,
     metric::auto_exposure,
-    plan::Work,
     render::subset::SampleCount,
 };
 use lookalike_report::measured::{Agreement, DirectCost, Method as MethodName, Photo, Row};
@@ -56,9 +55,9 @@ impl Collector<'_> {
             (Task::Brute { starts, direct }, Content::Survey { minima, .. }) => {
                 let method = if direct.is_some() { MethodName::BruteDirect } else { MethodName::Brute };
                 // All starts read the same table.
-                let table = self.seconds.sum(&record.work, |work| work == Work::Table);
+                let table = self.seconds.sum(&record.work, |work| work == Cost::Table);
                 for (s, ((name, _), minimum)) in starts.iter().zip(minima).enumerate() {
-                    let search = self.seconds.sum(&record.work, |work| work == Work::Search(s));
+                    let search = self.seconds.sum(&record.work, |work| work == Cost::Search(s));
                     let cost = search + table / starts.len() as f64;
                     let row = self.row(cell, &self.inputs.study.file.model, method, minimum, cost);
                     self.data.rows.push(Row { start: Some((*name).to_owned()), ..row });
@@ -178,11 +177,11 @@ impl Collector<'_> {
             seed: task.method.seed,
             ..row
         };
-        let cost = |counts: &dyn Fn(Work) -> bool| self.seconds.sum(&record.work, counts);
-        let single = |place: usize| cost(&|work| work == Work::Table || work == Work::Search(place));
-        let all = cost(&|work| work != Work::Pictures);
-        let two_stages = cost(&|work| matches!(work, Work::Table | Work::Search(_) | Work::StageTwo));
-        let stage_two = cost(&|work| work == Work::StageTwo);
+        let cost = |counts: &dyn Fn(Cost) -> bool| self.seconds.sum(&record.work, counts);
+        let single = |place: usize| cost(&|work| work == Cost::Table || work == Cost::Search(place));
+        let all = cost(&|work| work != Cost::Pictures);
+        let two_stages = cost(&|work| matches!(work, Cost::Table | Cost::Search(_) | Cost::StageTwo));
+        let stage_two = cost(&|work| work == Cost::StageTwo);
         let evaluations: u64 = candidates.iter().map(|c| c.evaluations as u64).sum();
         let mut rows = Vec::new();
         let won = candidates.get(*winner).with_context(|| foreign(cell))?;
@@ -259,7 +258,7 @@ impl Collector<'_> {
             };
             let searched = self.records.get(from);
             let evaluations = searched.and_then(|r| r.content.minimum()).map_or(0, |found| found.evaluations);
-            let cost = searched.map_or(0.0, |r| self.seconds.sum(&r.work, |work| work != Work::Pictures));
+            let cost = searched.map_or(0.0, |r| self.seconds.sum(&r.work, |work| work != Cost::Pictures));
             let found = Match {
                 parameters: point.clone(),
                 cssim: appraised.cssim,

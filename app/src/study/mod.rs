@@ -28,9 +28,9 @@ use crate::{
     fit::version,
     inputs::{load_environment, show_warnings},
     outputs::{Claim, ClaimedFolder, OldFiles, print_result},
-    progress::{Display, Ending, Shape, display},
+    progress::{Display, Ending, PartCount, Shape, display},
     run::Session,
-    settings::{EnvironmentSettings, ProgressKind, StudySettings},
+    settings::{EnvironmentSettings, StudySettings},
 };
 use anyhow::Context;
 use effort::Effort;
@@ -84,18 +84,27 @@ pub(crate) fn run(settings: StudySettings) -> anyhow::Result<ExitCode> {
     };
     // Refuses to resume the run of another study, even if nothing is left to compute.
     session.finished()?;
-    if !supply.is_complete() || !inputs.out.file(JOURNAL_FILE).exists() {
-        let workers = run_cells(&session, settings.progress, &tally, (supply, &mut seconds))?;
-        effort.seconds += began.elapsed().as_secs_f64();
-        effort.workers = effort.workers.max(workers);
-        effort.write(&inputs.out)?;
-    }
-    write_report(&settings, &inputs, &seconds, &effort)?;
-    let failed = std::mem::take(&mut lock(&tally).failed);
-    match failed.len() {
-        0 => session.finish(inputs.out.hashes(["results.md", "results.json", "report.html"])?)?,
-        count => session.settle(Some(&format!("{count} cells of the study failed")))?,
-    }
+    let PartCount { total, done, .. } = lock(&tally).count;
+    let mut display = display(settings.progress, Shape::Many { noun: "cell", total, done });
+    let run = || -> anyhow::Result<Vec<String>> {
+        if !supply.is_complete() || !inputs.out.file(JOURNAL_FILE).exists() {
+            let workers = run_cells(&session, &mut *display, &tally, (supply, &mut seconds))?;
+            effort.seconds += began.elapsed().as_secs_f64();
+            effort.workers = effort.workers.max(workers);
+            effort.write(&inputs.out)?;
+        }
+        write_report(&settings, &inputs, &seconds, &effort)?;
+        let failed = std::mem::take(&mut lock(&tally).failed);
+        match failed.len() {
+            0 => session.finish(inputs.out.hashes(["results.md", "results.json", "report.html"])?)?,
+            count => session.settle(Some(&format!("{count} cells of the study failed")))?,
+        }
+        Ok(failed)
+    };
+    let failed = run();
+    let problem = failed.as_ref().err().map(|error| format!("{error:#}"));
+    display.finish(problem.as_deref().map_or(Ending::Finished, Ending::Failed));
+    let failed = failed?;
     for cell in &failed {
         eprintln!("failed: {cell}");
     }
@@ -116,29 +125,24 @@ pub(crate) fn check(settings: &StudySettings) -> anyhow::Result<()> {
 /// Computes the cells that are not complete. Returns how many workers joined.
 fn run_cells(
     session: &Session<'_>,
-    progress: ProgressKind,
+    display: &mut dyn Display,
     tally: &Arc<Mutex<Tally>>,
     (supply, seconds): (Supply, &mut Seconds),
 ) -> anyhow::Result<u32> {
-    let mut display = display(progress, Shape::Many { noun: "cell", total: lock(tally).count.total });
     let mut options = session.options();
     // The seconds of a node are to be those of one core.
     options.threads_per_worker = std::num::NonZeroUsize::new(1);
     let mut workers = 0;
     let show = |display: &mut dyn Display| {
-        let mut tally = lock(tally);
-        let count = tally.count;
-        tally.news.drain(..).for_each(|event| display.part(&event, count));
+        lock(tally).news.drain(..).for_each(|(event, count)| display.part(&event, count));
     };
     let run = session.run(options, Many::new(supply), |event| {
         seconds.note(event);
         workers += u32::from(matches!(event, RunEvent::WorkerJoined { .. }));
-        show(&mut *display);
+        show(display);
         display.event(event);
     });
-    show(&mut *display);
-    let problem = run.as_ref().err().map(|error| format!("{error:#}"));
-    display.finish(problem.as_deref().map_or(Ending::Finished, Ending::Failed));
+    show(display);
     drop(run?);
     Ok(workers)
 }

@@ -17,7 +17,7 @@ use std::{collections::BTreeMap, fs};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct Record {
     /// What its nodes computed, by label.
-    pub(super) work: BTreeMap<String, Work>,
+    pub(super) work: BTreeMap<String, Cost>,
     pub(super) content: Content,
 }
 
@@ -42,6 +42,32 @@ pub(super) enum Content {
         /// The points that were appraised.
         points: Vec<Vec<f64>>,
     },
+}
+
+/// What a node's seconds count for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub(super) enum Cost {
+    Table,
+    /// The search of the candidate or minimum at this place.
+    Search(usize),
+    StageTwo,
+    StageThree,
+    Pictures,
+    Other,
+}
+
+impl From<Work> for Cost {
+    fn from(work: Work) -> Self {
+        match work {
+            Work::Table => Self::Table,
+            Work::Search(place) => Self::Search(place),
+            Work::StageTwo => Self::StageTwo,
+            Work::StageThree => Self::StageThree,
+            Work::Pictures => Self::Pictures,
+            Work::Other => Self::Other,
+        }
+    }
 }
 
 /// A match.

@@ -2,9 +2,9 @@
 //! thread per core, so these are seconds of one core. They are kept in a file, so that a resumed run includes earlier
 //! processes.
 
+use super::record::Cost;
 use crate::outputs::OutFolder;
 use anyhow::Context;
-use lookalike::plan::Work;
 use lookalike_coordinator::events::RunEvent;
 use std::{
     collections::BTreeMap,
@@ -57,7 +57,7 @@ impl Seconds {
     }
 
     /// The sum over the nodes of a cell whose work counts.
-    pub(super) fn sum(&self, nodes: &BTreeMap<String, Work>, counts: impl Fn(Work) -> bool) -> f64 {
+    pub(super) fn sum(&self, nodes: &BTreeMap<String, Cost>, counts: impl Fn(Cost) -> bool) -> f64 {
         let known = |label: &String| self.now.get(label).or_else(|| self.before.get(label));
         nodes.iter().filter(|(_, work)| counts(**work)).filter_map(|(label, _)| known(label)).sum()
     }

@@ -25,13 +25,21 @@ use std::{
     sync::{Arc, Mutex, PoisonError},
 };
 
-/// The numbers of cells in each state, without tables, which do not end before the run; what happened to cells since the display
-/// last heard of it; the cells that failed.
+/// The state of the cells, for the display and for the end of the run.
 #[derive(Debug, Default)]
 pub(super) struct Tally {
+    /// The number of cells in each state, without tables, which do not end before the run.
     pub(super) count: PartCount,
-    pub(super) news: Vec<PartEvent>,
+    /// Events that the display has not seen yet, each with the count after it.
+    pub(super) news: Vec<(PartEvent, PartCount)>,
+    /// The cells that failed, each with its error.
     pub(super) failed: Vec<String>,
+}
+
+impl Tally {
+    fn note(&mut self, event: PartEvent) {
+        self.news.push((event, self.count));
+    }
 }
 
 /// The cells of a study as the parts of its run.
@@ -148,11 +156,12 @@ impl Supply {
         let (number, name, error) = (number(id), cell.name.clone(), error.to_owned());
         self.tell(|tally| {
             tally.failed.push(format!("{name}: {error}"));
+            // The cells that need a table fail by name.
             if !matches!(cell.task, Task::Table) {
                 tally.count.failed += 1;
                 tally.count.running -= usize::from(was_active);
+                tally.note(PartEvent::Failed { number, name, error });
             }
-            tally.news.push(PartEvent::Failed { number, name, error });
         });
     }
 
@@ -266,7 +275,10 @@ impl Supply {
         let (work, outcome) = planner.into_outcome();
         let outcome = outcome.context("its nodes ended without a result: please report this")?;
         super::pictures::write(&inputs, cell, &outcome, |scene| self.captures.get(&scene).map_or(1.0, |c| c.1))?;
-        let record = Record { work, content: Content::of(&outcome, self.points(cell)?) };
+        let record = Record {
+            work: work.into_iter().map(|(label, work)| (label, work.into())).collect(),
+            content: Content::of(&outcome, self.points(cell)?),
+        };
         if let (Task::Photo, Outcome::Photo(image, _)) = (&cell.task, outcome) {
             record::write_image(&inputs.out, &cell.name, &image)?;
             self.keep_photo(cell.scene, image)?;
@@ -292,7 +304,7 @@ impl Parts for Supply {
                         let started = PartEvent::Started { number, name: name.clone(), best: planner.best() };
                         self.tell(|tally| {
                             tally.count.running += 1;
-                            tally.news.push(started);
+                            tally.note(started);
                         });
                     }
                     return Ok(Next::Part(Box::new(Part { number, name, planner, stays })));
@@ -318,7 +330,7 @@ impl Parts for Supply {
                 self.tell(|tally| {
                     tally.count.running -= 1;
                     tally.count.done += 1;
-                    tally.news.push(PartEvent::Finished { number: part.number, name: part.name, scores: None });
+                    tally.note(PartEvent::Finished { number: part.number, name: part.name, scores: None });
                 });
             }
             Err(error) => self.give_up(id, &format!("{error:#}")),

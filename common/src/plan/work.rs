@@ -1,12 +1,9 @@
 //! What a node computes for its fit or survey, so that costs can be added up.
 
-use serde::{Deserialize, Serialize};
-
 use crate::nodes;
 
 /// What a node computes for a fit or a survey.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[non_exhaustive]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Work {
     /// A shard of the table that searches read: that of a subset, or a survey's table.
     Table,

@@ -80,7 +80,7 @@ impl Writer {
                 Ok(Command::Wait(done)) => _ = done.send(()),
                 Ok(Command::Die) => return Ok(()),
                 Ok(Command::Close(ended)) => return self.close(ended.as_deref()),
-                // A journal says how it ends before it is dropped.
+                // `Journal` sends `Close` or `Die` before its sender is gone.
                 Err(RecvTimeoutError::Disconnected) => return Ok(()),
                 // Nothing has happened, but the coordinator is alive.
                 Err(RecvTimeoutError::Timeout) => self.is_news = true,

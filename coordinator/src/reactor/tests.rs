@@ -180,7 +180,7 @@ fn line(action: &Action) -> Option<String> {
         Action::Acknowledge { worker, node, attempt } => format!("{worker} is thanked for {}.{attempt}", node.0),
         Action::SendBlob { worker, blob } => format!("{worker} gets {} bytes", blob.len()),
         Action::ForgoBlob { worker } => format!("{worker} gets nothing"),
-        Action::Drop { worker } => format!("{worker} is thrown out"),
+        Action::Drop { worker } => format!("{worker} is disconnected"),
         Action::Keep { node, output } => format!("keep {} bytes of {}", output.len(), node.0),
         Action::CancelHere { node } => format!("stop {} here", node.0),
         Action::RunHere { node, attempt } => format!("run {}.{attempt} here", node.0),
@@ -315,12 +315,12 @@ fn late_result_removes_its_node_from_the_queue() {
 fn answer_without_a_lease_ends_the_membership() {
     let mut bench = Bench::new(independent(4));
     bench.join(A, 1);
-    assert_eq!(bench.finish(A, 3, 1, 0)[0], "worker 1 is thrown out");
+    assert_eq!(bench.finish(A, 3, 1, 0)[0], "worker 1 is disconnected");
     bench.join(B, 1);
-    assert_eq!(bench.finish(B, 0, 9, 0)[0], "worker 2 is thrown out");
+    assert_eq!(bench.finish(B, 0, 9, 0)[0], "worker 2 is disconnected");
     bench.join(C, 1);
     let unknown = Event::BlobRequested { worker: C, hash: BlobHash::of(b"unknown") };
-    assert_eq!(bench.handle(unknown)[0], "worker 3 is thrown out");
+    assert_eq!(bench.handle(unknown)[0], "worker 3 is disconnected");
 }
 
 #[test]
@@ -348,7 +348,7 @@ fn blob_is_sent_only_to_workers_whose_nodes_read_it() {
     for worker in [A, B] {
         assert_eq!(bench.handle(Event::BlobRequested { worker, hash }), [format!("{worker} gets 40 bytes")]);
     }
-    assert_eq!(bench.handle(Event::BlobRequested { worker: C, hash })[0], "worker 3 is thrown out");
+    assert_eq!(bench.handle(Event::BlobRequested { worker: C, hash })[0], "worker 3 is disconnected");
 }
 
 #[test]
@@ -411,7 +411,7 @@ fn silent_worker_is_lost_after_its_lease_and_any_message_renews_the_lease() {
     });
     assert_eq!(bench.core.next_deadline(), Some(Duration::from_secs(9)));
     assert!(bench.pass_time(4).unwrap().is_empty());
-    assert_eq!(bench.pass_time(1).unwrap(), ["worker 1 is thrown out", "n0 requeued, 0"]);
+    assert_eq!(bench.pass_time(1).unwrap(), ["worker 1 is disconnected", "n0 requeued, 0"]);
 }
 
 #[test]
@@ -528,5 +528,5 @@ fn request_for_a_released_blob_is_not_a_violation() {
     bench.finish(A, 0, 1, 0);
     assert_eq!(bench.handle(Event::BlobRequested { worker: A, hash }), ["worker 1 gets nothing"]);
     let unknown = Event::BlobRequested { worker: A, hash: BlobHash::of(b"unknown") };
-    assert_eq!(bench.handle(unknown)[0], "worker 1 is thrown out");
+    assert_eq!(bench.handle(unknown)[0], "worker 1 is disconnected");
 }

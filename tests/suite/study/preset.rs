@@ -26,10 +26,30 @@ const CELL: &str = if cfg!(feature = "slow") {
     "paint-room-16-log-ggx-256-importance-1-seed0-to1.json"
 };
 
+/// Checks the stream of progress: each cell begins and ends once, every count is right, and the last event is the end.
+fn check_stream(stderr: &str) {
+    let events: Vec<Value> = stderr.lines().filter_map(|line| serde_json::from_str(line).ok()).collect();
+    let total = events[0]["cells"].as_u64().unwrap();
+    assert!(events[0]["event"] == "start" && total > 3, "{}", events[0]);
+    let names = |event: &str| {
+        let of = events.iter().filter(|e| e["event"] == event);
+        of.map(|e| e["cell"].as_str().unwrap().to_owned()).collect::<BTreeSet<_>>()
+    };
+    assert_eq!(names("cell-started").len() as u64, total);
+    assert_eq!(names("cell-started"), names("cell-finished"));
+    let ends: Vec<&Value> = events.iter().filter(|e| e["event"] == "cell-finished").collect();
+    let done: Vec<u64> = ends.iter().map(|e| e["cells"]["done"].as_u64().unwrap()).collect();
+    assert_eq!(done, (1..=total).collect::<Vec<_>>());
+    assert_eq!(ends.last().unwrap()["cells"]["running"], 0);
+    assert!(events.iter().any(|e| e["event"] == "node-finished" && e["cell"].is_string()));
+    assert_eq!(events.last().unwrap()["event"], "finished");
+}
+
 #[test]
 fn small_preset_gives_stored_results_and_finished_study_only_rewrites_its_report() {
     let folder = folder(&preset());
-    let answer = study(folder.path(), "--workers 2").done();
+    let answer = study(folder.path(), "--workers 2 --progress json").done();
+    check_stream(&answer.stderr);
     assert!(answer.stdout.trim_end().ends_with("report.html"), "{}", answer.stdout);
     let found = results(folder.path());
     if std::env::var_os("LOOKALIKE_BLESS").is_some() {

@@ -32,9 +32,10 @@ pub(crate) fn folder(study: &str) -> TempDir {
     folder
 }
 
-/// Runs the study of a folder into its `out`.
+/// Runs the study of a folder into its `out`, without a display unless `more` asks for one.
 pub(crate) fn study(folder: &Path, more: &str) -> Answer {
-    lookalike(folder, &format!("study STUDY.toml --out out --progress none {more}"))
+    let display = if more.contains("--progress") { "" } else { "--progress none" };
+    lookalike(folder, &format!("study STUDY.toml --out out {display} {more}"))
 }
 
 /// The rows of `results.json`, without fields that differ from run to run.

@@ -165,7 +165,7 @@ impl Bench {
         if let Some(known) = KNOWN.lock().unwrap().get(&key) {
             return known.clone();
         }
-        // Not under the lock: other tests go on meanwhile.
+        // Not under the lock, so that other tests continue.
         let output = nodes::registry().run(&spec.kind, &spec.parameters, inputs, &self.context).unwrap();
         KNOWN.lock().unwrap().entry(key).or_insert(output).clone()
     }

@@ -5,13 +5,13 @@ use crate::{
         Candidate,
         tests::scene::{Bench, capture, method},
     },
-    graph::{Blob, NodeSpec, PlanError},
+    graph::{Blob, GraphEdit, NodeId, NodeSpec, PlanError, Planner},
     math::{cell, sampling},
     nodes::{
         self,
         wire::{CandidateWire, TableWire, read, write},
     },
-    plan::FitPlanner,
+    plan::{FitPlanner, Work},
     render::{knots::Knots, table::TransportTable},
     scene::Capture,
 };
@@ -122,4 +122,44 @@ fn the_outcome_does_not_depend_on_the_order_in_which_nodes_finish() {
         };
         assert_eq!(in_order, outcome(&mut random), "order {seed}");
     }
+}
+
+/// A planner that notes what its nodes compute, by kind.
+struct Noting {
+    inner: FitPlanner,
+    seen: Vec<(String, Work)>,
+}
+
+impl Planner for Noting {
+    fn start(&mut self, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
+        self.inner.start(graph)
+    }
+
+    fn completed(&mut self, node: NodeId, output: &Blob, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
+        let kind = graph.spec(node).unwrap().kind.clone();
+        self.seen.push((kind.clone(), self.inner.work_of(node, &kind)));
+        self.inner.completed(node, output, graph)
+    }
+}
+
+#[test]
+fn every_node_of_a_fit_is_work_of_its_stage() {
+    let run = Bench::default().run(Noting { inner: planner(2), seen: Vec::new() }, first, unchanged).unwrap();
+    let of = |kind: &str| run.seen.iter().filter(|(of, _)| of == kind).map(|(_, work)| *work).collect::<Vec<_>>();
+    assert!(of(nodes::TRANSPORT).iter().all(|work| *work == Work::Table) && !of(nodes::TRANSPORT).is_empty());
+    let mut places: Vec<usize> = Vec::new();
+    for work in of(nodes::SEARCH) {
+        let Work::Search(place) = work else { panic!("{work:?}") };
+        places.push(place);
+    }
+    places.sort_unstable();
+    let outcome = run.inner.into_outcome().unwrap();
+    assert_eq!(places, (0..outcome.judged.len()).collect::<Vec<_>>());
+    assert_eq!(of(nodes::SELECT), [Work::StageTwo]);
+    assert!(of(nodes::POLISH).iter().all(|work| *work == Work::StageThree) && !of(nodes::POLISH).is_empty());
+    // The table that the candidates are judged on comes before that of polish.
+    let full = of(nodes::TRANSPORT_FULL);
+    assert_eq!(full.first(), Some(&Work::StageTwo));
+    assert!(full.is_sorted_by_key(|work| *work == Work::StageThree), "{full:?}");
+    assert!(of(nodes::REPORT).iter().all(|work| *work == Work::Pictures));
 }
