@@ -72,12 +72,16 @@ impl Display for JsonLines {
 }
 
 fn of_part(noun: &str, event: &PartEvent) -> Value {
-    let (what, number, name) = match event {
-        PartEvent::Started { number, name, .. } => ("started", number, name),
-        PartEvent::Finished { number, name, .. } => ("finished", number, name),
-        PartEvent::Failed { number, name, .. } => ("failed", number, name),
+    let names = match noun {
+        "cell" => ["cell-started", "cell-finished", "cell-failed"],
+        _ => ["fit-started", "fit-finished", "fit-failed"],
     };
-    let mut object = json!({ "event": format!("{noun}-{what}"), "number": number });
+    let (event_name, number, name) = match event {
+        PartEvent::Started { number, name, .. } => (names[0], number, name),
+        PartEvent::Finished { number, name, .. } => (names[1], number, name),
+        PartEvent::Failed { number, name, .. } => (names[2], number, name),
+    };
+    let mut object = json!({ "event": event_name, "number": number });
     object[noun] = json!(name);
     match event {
         PartEvent::Finished { scores: Some(scores), .. } => {
