@@ -111,7 +111,7 @@ fn bad_usage_is_code_two_and_lists_what_is_possible() {
         (format!("{fit} --env-rotation east"), &["--env-rotation", "a finite number"]),
         (format!("{fit} --log lookalike=loud"), &["--log"]),
         ("compare a.exr".into(), &["required arguments", "<IMAGE>"]),
-        ("compare a.exr b.exr --metric psnr".into(), &["'psnr'", "[possible values: cssim, icid]"]),
+        ("compare a.exr b.exr --metric no-such-metric".into(), &["'no-such-metric'", "[possible values: cssim, icid]"]),
         ("render --env g.hdr -o a.exr".into(), &["no material"]),
         ("render --env g.hdr -o a.exr --model ggx --params alpha=x".into(), &["alpha must be a number"]),
         ("worker".into(), &["--access <FILE>"]),
@@ -126,9 +126,10 @@ fn bad_usage_is_code_two_and_lists_what_is_possible() {
 fn commands_and_flags_that_do_not_exist_are_refused_with_the_usage() {
     let fit = "fit ball.exr --env garden.hdr --out run";
     for (arguments, phrases) in [
-        ("check ball.exr --env garden.hdr".to_owned(), &["unrecognized subcommand 'check'", "try '--help'"][..]),
-        ("export run -o m.mtlx".into(), &["unrecognized subcommand 'export'", "Usage: lookalike"]),
-        ("report run".into(), &["unrecognized subcommand 'report'", "Usage: lookalike"]),
+        (
+            "no-such-command run".to_owned(),
+            &["unrecognized subcommand 'no-such-command'", "Usage: lookalike", "try '--help'"][..],
+        ),
         (format!("{fit} --exposure-gain rgb"), &["unexpected argument '--exposure-gain'", "'--help'"]),
     ] {
         refused(&lookalike(&arguments), phrases);

@@ -25,7 +25,7 @@ const MAY_IMPORT: [(&str, &[&str]); 14] = [
     ("light", &["choice", "image", "math"]),
     ("scene", &["image", "light", "math"]),
     ("render", &["brdf", "choice", "image", "light", "math", "scene"]),
-    ("metric", &["image", "math"]),
+    ("metric", &["choice", "image", "math"]),
     ("search", &["math"]),
     ("fit", &["brdf", "choice", "image", "light", "math", "metric", "render", "scene", "search"]),
     ("nodes", &["brdf", "fit", "graph", "image", "light", "math", "metric", "protocol", "render", "scene", "search"]),

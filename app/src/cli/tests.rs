@@ -1,11 +1,12 @@
 //! Precedence, settings files and presets: argument lists in, settings or messages out.
 
 use super::{args::Command, parse};
-use crate::settings::{CompareSettings, DisplayExposure, FitSettings, MetricKind, Workers};
+use crate::settings::{CompareSettings, DisplayExposure, FitSettings, Workers};
 use clap::CommandFactory;
 use lookalike::{
     brdf::DEFAULT_MODEL,
     fit::{Compress, Gammas, Method, SearchKind, Start},
+    metric::MetricKind,
     render::subset::SampleCount,
     scene::Camera,
 };

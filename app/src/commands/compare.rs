@@ -10,16 +10,16 @@ use super::{
 use crate::{
     exit::Exit,
     inputs::{LoadedPhoto, load_image, load_mask, resolve_display_exposure, show_warnings},
-    settings::{CompareSettings, MetricKind},
+    settings::CompareSettings,
     wrap::wrap,
 };
 use anyhow::{Context, bail};
 use coverage::Coverage;
 use lookalike::{
     image::{Encoding, metadata as keys, png},
-    metric::{DisplayImage, ErrorMap, IcidOptions, Judge, JudgeOptions, MetricError, Score, icid},
+    metric::{ErrorMap, MetricError},
 };
-use report::{Outcome, Report};
+use report::Report;
 use std::{path::Path, process::ExitCode};
 
 /// Measures the difference of two images.
@@ -43,12 +43,12 @@ pub(crate) fn run(settings: CompareSettings) -> anyhow::Result<ExitCode> {
     show_warnings(&warnings);
     drop(activity);
 
-    let pair = Pair { reference: &reference, image: &image, coverage: &coverage.judged, exposure };
+    let how = (&coverage.judged[..], exposure);
     let _activity = Activity::new(move || format!("comparing {files}"));
-    let scored = pair.score(settings.metric, settings.map.is_some());
-    let (outcome, map) = scored.with_context(|| format!("cannot compare {} and {}", name(&reference), name(&image)))?;
-    if let (Some(path), Some(map)) = (&settings.map, map) {
-        write_map(path, &map, &settings)?;
+    let measured = settings.metric.difference(&reference.image, &image.image, how, settings.map.is_some());
+    let difference = measured.with_context(|| format!("cannot compare {} and {}", name(&reference), name(&image)))?;
+    if let (Some(path), Some(map)) = (&settings.map, &difference.map) {
+        write_map(path, map, &settings)?;
     }
     let report = Report {
         settings: &settings,
@@ -57,41 +57,10 @@ pub(crate) fn run(settings: CompareSettings) -> anyhow::Result<ExitCode> {
         mask: mask.as_ref(),
         coverage: &coverage,
         exposure,
-        outcome,
+        difference: &difference,
     };
     report.print()?;
     Ok(Exit::Done.into())
-}
-
-/// Two images that are ready to be compared.
-struct Pair<'a> {
-    reference: &'a LoadedPhoto,
-    image: &'a LoadedPhoto,
-    coverage: &'a [f32],
-    exposure: f64,
-}
-
-impl Pair<'_> {
-    /// The score and, if wanted, the error of every window.
-    fn score(&self, metric: MetricKind, with_map: bool) -> Result<(Outcome, Option<ErrorMap>), MetricError> {
-        let Self { reference, image, coverage, exposure } = *self;
-        match metric {
-            MetricKind::Cssim => {
-                let judge = Judge::new(&reference.image, coverage, exposure, &JudgeOptions::default())?;
-                let Score { cssim, cssim_object, features, features_object } = judge.score(&image.image)?;
-                let map = with_map.then(|| judge.error_map(&image.image)).transpose()?;
-                let outcome =
-                    Outcome { score: cssim, score_object: cssim_object, features: Some([features, features_object]) };
-                Ok((outcome, map))
-            }
-            MetricKind::Icid => {
-                let shown = |photo: &LoadedPhoto| DisplayImage::from_linear(&photo.image, coverage, exposure);
-                let score = icid(&shown(reference)?, &shown(image)?, coverage, &IcidOptions::default())?;
-                let outcome = Outcome { score: score.icid, score_object: score.icid_object, features: None };
-                Ok((outcome, with_map.then_some(score.error)))
-            }
-        }
-    }
 }
 
 fn check_sizes(settings: &CompareSettings, reference: &LoadedPhoto, image: &LoadedPhoto) -> anyhow::Result<()> {

@@ -1,10 +1,7 @@
 //! The identity of a fit: the inputs and settings that may not change when its run is resumed.
 
 use anyhow::Context;
-use lookalike::{
-    fit::{Gammas, Method},
-    scene::Capture,
-};
+use lookalike::{fit::Method, scene::Capture};
 use lookalike_coordinator::journal::RunIdentity;
 use serde_json::Value;
 
@@ -44,25 +41,12 @@ impl FitIdentity<'_> {
             }
         }
         let geometry = serde_json::to_string(&self.capture.geometry().spec()).context("the geometry")?;
-        let method = self.method;
-        let gammas = Gammas::of_values(&method.gammas).map_or_else(String::new, |gammas| gammas.to_string());
         parts.extend([
             ("the place of the object (--sphere, --camera)", geometry),
             ("--display-exposure", self.exposure.to_string()),
-            ("--model", method.model.name().to_owned()),
-            ("--gammas", gammas),
-            ("--samples", method.samples.to_string()),
-            ("--sampling", method.sampling.to_string()),
-            ("--subsets", method.subsets.to_string()),
-            ("--search", method.search.to_string()),
-            ("--integrator", method.integration.to_string()),
-            ("the start of the searches (--preset)", format!("{:?}", method.start).to_lowercase()),
-            ("compression at zero (--preset)", format!("{:?}", method.compress).to_lowercase()),
-            ("--polish", if method.polish { "on" } else { "off" }.to_owned()),
-            ("--judge", method.judge.to_string()),
-            ("--seed", method.seed.to_string()),
-            ("the gammas that are shown", format!("{:?}", self.also_render)),
         ]);
+        parts.extend(self.method.settings().into_iter().map(|setting| (setting.flag, setting.text)));
+        parts.push(("the gammas that are shown", format!("{:?}", self.also_render)));
         Ok(parts)
     }
 }

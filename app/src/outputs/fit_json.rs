@@ -8,7 +8,6 @@ use lookalike::{
     brdf::{Channels, Model},
     fit::{Judged, Method, Uncertainty},
     plan::FitOutcome,
-    render::subset::SampleCount,
     scene::Capture,
 };
 use serde_json::{Map, Value, json};
@@ -78,23 +77,11 @@ impl FitRecord<'_> {
             entry
         });
         let counts = self.capture.counts();
-        json!({
-            "schema": SCHEMA,
-            "software": { "name": "lookalike", "version": env!("CARGO_PKG_VERSION") },
-            "model": model.name(),
-            "samples": match self.method.samples {
-                SampleCount::Draws(draws) => json!(draws),
-                SampleCount::Full => json!("full"),
-            },
-            "sampling": self.method.sampling.to_string(),
-            "subsets": self.method.subsets,
-            "seed": self.method.seed,
-            "search": self.method.search.to_string(),
-            "integrator": self.method.integration.to_string(),
-            "start": format!("{:?}", self.method.start).to_lowercase(),
-            "at_zero": format!("{:?}", self.method.compress).to_lowercase(),
-            "gammas": self.method.gammas,
-            "judge": self.method.judge.to_string(),
+        let software = json!({ "name": "lookalike", "version": env!("CARGO_PKG_VERSION") });
+        let mut document = json!({ "schema": SCHEMA, "software": software });
+        let settings = self.method.settings().into_iter().filter_map(|setting| setting.field);
+        merge(&mut document, settings.map(|(name, value)| (name.to_owned(), value)).collect());
+        let rest = json!({
             "display_exposure": self.display_exposure,
             "inputs": self.inputs,
             "geometry": self.capture.geometry().spec(),
@@ -113,7 +100,9 @@ impl FitRecord<'_> {
             "polished": polished,
             "notes": self.notes,
             "timing": timing.json(),
-        })
+        });
+        merge(&mut document, rest);
+        document
     }
 }
 

@@ -2,16 +2,6 @@
 
 use clap::ValueEnum;
 
-/// A colour-image-difference metric.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
-pub enum MetricKind {
-    /// CSSIM, single scale, five features, as in the paper
-    #[default]
-    Cssim,
-    /// iCID (Preiss et al. 2014), a later metric of CSSIM's authors
-    Icid,
-}
-
 /// A named bundle of settings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Preset {

@@ -1,6 +1,7 @@
 //! The settings of `lookalike compare`.
 
-use super::{DisplayExposure, MetricKind};
+use super::DisplayExposure;
+use lookalike::metric::MetricKind;
 use std::path::PathBuf;
 
 /// Two images and how to measure their difference.

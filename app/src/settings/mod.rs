@@ -23,7 +23,7 @@ mod study;
 
 pub use access::AccessSettings;
 pub use batch::{BatchFit, BatchSettings, JobSettings, OnFailure, StageTwo};
-pub use choices::{MetricKind, Preset, ProgressKind};
+pub use choices::{Preset, ProgressKind};
 pub use cluster::{Advertise, ClusterSettings, Workers};
 pub use compare::CompareSettings;
 pub use demo::DemoSettings;

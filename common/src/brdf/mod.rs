@@ -6,7 +6,7 @@
 //! `f(wi, wo) cos(theta_i) = sum_t weight_t(parameters) * basis_t(wi, wo; width)`
 //!
 //! A [`Model`] therefore declares its [`Parameter`]s, its [`BasisLobe`]s, and the map (with derivative) from parameters to
-//! weights of lobes. A new model is one file and one line in [`MODELS`]; help, tests of physics, agreement and recovery iterate
+//! weights of lobes. A new model is one file and its three lines here; help, tests of physics, agreement and recovery iterate
 //! [`MODELS`].
 //!
 //! Conventions: directions point away from the surface; `f` is in 1/sr; `alpha` is the microfacet width, not an artist's

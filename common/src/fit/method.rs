@@ -6,6 +6,7 @@ use crate::{
     choice::choice,
     render::subset::{SampleCount, Sampling},
 };
+use serde_json::{Value, json};
 use std::{fmt, str::FromStr};
 use thiserror::Error;
 
@@ -233,6 +234,67 @@ impl Method {
             return Err(MethodError::TooManySearches { found: searches });
         }
         Ok(())
+    }
+}
+
+/// One setting of a method, as outputs name it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Setting {
+    /// Its flag, or in words what decides it. It is part of the identity of a run, which `--resume` compares.
+    pub flag: &'static str,
+    /// Its value in words.
+    pub text: String,
+    /// Its name and value in `fit.json`, if it is there.
+    pub field: Option<(&'static str, Value)>,
+}
+
+impl Setting {
+    fn new(flag: &'static str, field: &'static str, value: Value) -> Self {
+        let text = value.as_str().map_or_else(|| value.to_string(), str::to_owned);
+        Self { flag, text, field: Some((field, value)) }
+    }
+}
+
+impl Method {
+    /// Every setting, in the order of `fit.json`: the one list for `fit.json` and for the identity of a run.
+    #[must_use]
+    pub fn settings(&self) -> Vec<Setting> {
+        // Without `..`: a new field has to be listed.
+        let Self {
+            model,
+            gammas,
+            samples,
+            sampling,
+            subsets,
+            search,
+            integration,
+            start,
+            compress,
+            polish,
+            judge,
+            seed,
+        } = self;
+        let samples = match samples {
+            SampleCount::Draws(draws) => json!(draws),
+            SampleCount::Full => json!("full"),
+        };
+        let sequence = Gammas::of_values(gammas).map_or_else(String::new, |gammas| gammas.to_string());
+        let polish = if *polish { "on" } else { "off" };
+        let named = |choice: &dyn fmt::Debug| json!(format!("{choice:?}").to_lowercase());
+        vec![
+            Setting::new("--model", "model", json!(model.name())),
+            Setting::new("--samples", "samples", samples),
+            Setting::new("--sampling", "sampling", json!(sampling.to_string())),
+            Setting::new("--subsets", "subsets", json!(subsets)),
+            Setting::new("--seed", "seed", json!(seed)),
+            Setting::new("--search", "search", json!(search.to_string())),
+            Setting::new("--integrator", "integrator", json!(integration.to_string())),
+            Setting::new("the start of the searches (--preset)", "start", named(start)),
+            Setting::new("compression at zero (--preset)", "at_zero", named(compress)),
+            Setting { text: sequence, ..Setting::new("--gammas", "gammas", json!(gammas)) },
+            Setting { flag: "--polish", text: polish.to_owned(), field: None },
+            Setting::new("--judge", "judge", json!(judge.to_string())),
+        ]
     }
 }
 

@@ -27,8 +27,8 @@ pub use candidate::{Candidate, SAME, distinct, needed_span};
 pub use direct::DirectPixels;
 pub use gammas::{Gammas, GammasError};
 pub use method::{
-    Compress, Integration, JudgedBy, MOST_SEARCHES, Method, MethodError, SearchKind, Start, UnknownIntegration,
-    gamma_range,
+    Compress, Integration, JudgedBy, MOST_SEARCHES, Method, MethodError, SearchKind, Setting, Start,
+    UnknownIntegration, gamma_range,
 };
 pub use objective::Objective;
 pub use polish::{MAX_EVALUATIONS, Polished, polish};

@@ -1,7 +1,7 @@
 //! The difference between two images: the per-pixel cost of stage one and the perceptual error CSSIM of stage two.
 //!
 //! Selection and polishing use [`Judge`]: CSSIM against a prepared reference. [`cid`] is the same measure on two
-//! displayed images, with the authors' variants; [`icid`] is its successor. [`DisplayImage`] and [`auto_exposure`] are
+//! displayed images, with the authors' variants; [`icid`] is its successor. [`MetricKind`] has them by name. [`DisplayImage`] and [`auto_exposure`] are
 //! the display transform before them. The pipeline, in the order of the files: `display`, `colour` and `scielab` (or
 //! `icam`) under `working`, `lab2000hl`, `window`, `features`, then `cssim`, `cid` or `icid`, and `maps` for pictures.
 //!
@@ -18,6 +18,7 @@ mod error;
 mod features;
 mod icam;
 mod icid;
+mod kind;
 mod lab2000hl;
 mod maps;
 mod planes;
@@ -36,6 +37,7 @@ pub use dispatch::Lanes;
 pub use display::{DisplayImage, auto_exposure, decode_srgb, encode_srgb};
 pub use error::MetricError;
 pub use icid::{IcidOptions, IcidScore, Intent, icid};
+pub use kind::{Difference, MetricKind};
 pub use lab2000hl::Lab2000hl;
 pub use maps::{ErrorMap, Maps};
 pub use working::SpatialFilter;

@@ -27,7 +27,7 @@ pub use kinds::{
 pub(crate) use polish::PolishParameters;
 pub(crate) use render::{RenderParameters, RenderedWire};
 pub(crate) use report::{ReportParameters, ReportWire};
-pub(crate) use search::{CompressWire, DirectWire, SearchParameters};
+pub(crate) use search::{DirectWire, SearchParameters};
 pub(crate) use select::SelectParameters;
 pub(crate) use transport::TransportParameters;
 pub(crate) use view::{ViewWire, joined};

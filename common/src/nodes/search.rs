@@ -5,7 +5,7 @@
 
 use super::view::concatenated;
 use crate::{
-    brdf,
+    brdf::{self, Model},
     fit::{Compress, DirectPixels, Method, SearchKind, Start, search_gamma},
     graph::{Blob, NodeFailure, NodeType, RunContext},
     light::LightDistribution,
@@ -25,13 +25,61 @@ pub(crate) struct SearchParameters {
     pub(crate) mean_radiance: f64,
     pub(crate) pattern: bool,
     pub(crate) paper_start: bool,
-    pub(crate) compress: CompressWire,
+    compress: CompressWire,
     pub(crate) direct: Option<DirectWire>,
+}
+
+impl SearchParameters {
+    /// What a worker has to know of `method` to search one gamma on one subset.
+    pub(crate) fn of(
+        method: &Method,
+        (gamma, subset): (f64, u32),
+        mean_radiance: f64,
+        direct: Option<DirectWire>,
+    ) -> Self {
+        // Without `..`: a new field of the method has to be named here, and passed on if searches depend on it. The direct
+        // integrator is in `direct`, the pixels are in the subset.
+        let Method {
+            model,
+            search,
+            start,
+            compress,
+            gammas: _,
+            samples: _,
+            sampling: _,
+            subsets: _,
+            integration: _,
+            polish: _,
+            judge: _,
+            seed: _,
+        } = method;
+        Self {
+            model: model.name().to_owned(),
+            gamma,
+            subset,
+            mean_radiance,
+            pattern: *search == SearchKind::Pattern,
+            paper_start: *start == Start::Paper,
+            compress: CompressWire::of(*compress),
+            direct,
+        }
+    }
+
+    /// The method as far as a search depends on it.
+    fn method(&self, model: &'static dyn Model) -> Result<Method, NodeFailure> {
+        Ok(Method {
+            model,
+            search: if self.pattern { SearchKind::Pattern } else { SearchKind::LeastSquares },
+            start: if self.paper_start { Start::Paper } else { Start::Scan },
+            compress: self.compress.compress()?,
+            ..Method::default()
+        })
+    }
 }
 
 /// The wire form of [`Compress`].
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub(crate) enum CompressWire {
+enum CompressWire {
     Tangent,
     Clamp,
     ClampTo(f64),
@@ -39,7 +87,7 @@ pub(crate) enum CompressWire {
 }
 
 impl CompressWire {
-    pub(crate) fn of(compress: Compress) -> Self {
+    fn of(compress: Compress) -> Self {
         match compress {
             Compress::Tangent => Self::Tangent,
             Compress::Clamp => Self::Clamp,
@@ -137,13 +185,7 @@ impl NodeType for Search {
             let (gamma, mean) = (parameters.gamma, parameters.mean_radiance);
             return Err(NodeFailure::new(format!("gamma {gamma} and mean radiance {mean} must be positive")));
         }
-        let method = Method {
-            model,
-            search: if parameters.pattern { SearchKind::Pattern } else { SearchKind::LeastSquares },
-            start: if parameters.paper_start { Start::Paper } else { Start::Scan },
-            compress: parameters.compress.compress()?,
-            ..Method::default()
-        };
+        let method = parameters.method(model)?;
         let mean = parameters.mean_radiance;
         let direct = scene.as_ref().map(|scene| scene.pixels(&subset.pixels)).transpose()?;
         let mut candidate = search_gamma(&method, parameters.gamma, &table, &subset, &subset_wire.photo, mean, direct)?;

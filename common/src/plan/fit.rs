@@ -20,7 +20,7 @@ use super::{
 };
 use crate::{
     fit::{
-        BestScore, Candidate, Judged, Method, Objective, Polished, SearchKind, Start, needed_span,
+        BestScore, Candidate, Judged, Method, Objective, Polished, needed_span,
         stage_one::objective_of,
         uncertainty::{Uncertainty, uncertainties},
         winner,
@@ -29,7 +29,7 @@ use crate::{
     image::Image,
     metric::ErrorMap,
     nodes::{
-        self, CompressWire, ReportParameters, SearchParameters, SelectParameters,
+        self, ReportParameters, SearchParameters, SelectParameters,
         wire::{CandidateWire, SubsetWire, read},
     },
     render::{subset::PixelSubset, transport::Accuracy},
@@ -168,7 +168,6 @@ impl FitPlanner {
     }
 
     fn add_searches(&mut self, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
-        let model = self.scene.method.model;
         let (direct, of_scene) = self.scene.direct_searches(graph)?;
         for (s, subset) in self.subsets.clone().into_iter().enumerate() {
             let list = add(graph, "list of pixels", &subset.pixels)?;
@@ -188,16 +187,8 @@ impl FitPlanner {
             )?);
             inputs.extend(of_scene.iter().copied());
             for (g, &gamma) in self.scene.method.gammas.iter().enumerate() {
-                let parameters = SearchParameters {
-                    model: model.name().to_owned(),
-                    gamma,
-                    subset: index(s),
-                    mean_radiance: self.scene.mean_radiance,
-                    pattern: self.scene.method.search == SearchKind::Pattern,
-                    paper_start: self.scene.method.start == Start::Paper,
-                    compress: CompressWire::of(self.scene.method.compress),
-                    direct: direct.clone(),
-                };
+                let (method, mean) = (&self.scene.method, self.scene.mean_radiance);
+                let parameters = SearchParameters::of(method, (gamma, index(s)), mean, direct.clone());
                 let of_subset = if self.subsets.len() == 1 { String::new() } else { format!(", subset {s}") };
                 let node = graph.add_node(NodeSpec {
                     kind: nodes::SEARCH.to_owned(),

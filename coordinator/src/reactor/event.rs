@@ -29,6 +29,11 @@ pub enum Event {
         /// The worker.
         worker: WorkerId,
     },
+    /// A worker lives: bytes of it have arrived that are no event yet, such as a part of an output.
+    Alive {
+        /// The worker.
+        worker: WorkerId,
+    },
     /// A heartbeat of a worker, with the nodes that it executes.
     Heartbeat {
         /// The worker.

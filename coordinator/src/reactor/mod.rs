@@ -69,6 +69,7 @@ pub fn handle_arrived(
         }
         Event::WorkerLeft { worker, departure } => membership::leave(core, worker, &departure, now, outbox),
         Event::WorkerDrains { worker } => membership::drain(core, worker, now, outbox),
+        Event::Alive { worker } => leases::renew(core, worker, now),
         Event::Heartbeat { worker, executing } => {
             leases::renew(core, worker, now);
             for Executing { node, attempt, permille } in executing {

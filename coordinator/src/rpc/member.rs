@@ -246,7 +246,7 @@ impl<R: AsyncRead + Unpin> Reader<R> {
     }
 
     fn life(&self) -> Event {
-        Event::Heartbeat { worker: self.worker, executing: Vec::new() }
+        Event::Alive { worker: self.worker }
     }
 
     /// Before receiving a large output, ask the reactor whether its lease was given out. The answer also implies that earlier
@@ -343,7 +343,7 @@ mod tests {
         let (mut signs, mut finished) = (0, 0);
         while let Some(event) = events.recv().await {
             match event {
-                Inbound::Event(Event::Heartbeat { .. }) => signs += 1,
+                Inbound::Event(Event::Alive { .. }) => signs += 1,
                 Inbound::Timed { event: Event::Finished { .. }, .. } => finished += 1,
                 other => panic!("{other:?}"),
             }

@@ -1,6 +1,6 @@
 //! The files and output of a fit, as specified in design section 10.
 
-use super::scene::{POLISHED, QUICK, SIZE, fit, fit_json, folder, number, picture};
+use super::scene::{POLISHED, QUICK, QUICK_FIT, SIZE, fit, fit_json, folder, number, picture};
 use crate::program::lookalike;
 use lookalike::image::{Encoding, content_hash, metadata as keys};
 use serde_json::{Value, json};
@@ -80,6 +80,17 @@ fn fit_json_has_the_documented_fields() {
     for phrase in ["gamma", "stage two", "polished", "alpha", "seconds: inputs", "results: out"] {
         assert!(answer.stdout.contains(phrase), "{}", answer.stdout);
     }
+}
+
+/// The page has the settings of the method in the order of `Method::settings`.
+#[test]
+fn fit_json_has_the_fields_of_its_page_in_their_order() {
+    let page = include_str!("../../../docs/fit-json.md");
+    let table = page.lines().skip_while(|line| !line.starts_with("| field |")).skip(2);
+    let rows = table.map_while(|row| row.strip_prefix("| `")?.split('`').next());
+    let json = QUICK_FIT.json();
+    let fields = json.as_object().unwrap().keys().map(String::as_str);
+    assert_eq!(rows.collect::<Vec<_>>(), fields.collect::<Vec<_>>());
 }
 
 #[test]

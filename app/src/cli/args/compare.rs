@@ -1,7 +1,9 @@
 //! `lookalike compare`.
 
-use crate::settings::{CompareSettings, DisplayExposure, MetricKind};
+use super::choice::choice;
+use crate::settings::{CompareSettings, DisplayExposure};
 use clap::Args;
+use lookalike::metric::MetricKind;
 use std::path::PathBuf;
 
 #[derive(Debug, Args)]
@@ -17,7 +19,7 @@ pub(crate) struct CompareArgs {
     #[arg(long, value_name = "FILE", help_heading = "Input")]
     mask: Option<PathBuf>,
     /// Metric of the difference; 0 is equal, larger is worse
-    #[arg(long, value_name = "METRIC", value_enum, default_value_t, help_heading = "Method")]
+    #[arg(long, value_name = "METRIC", value_parser = choice::<MetricKind>(), default_value_t, help_heading = "Method")]
     metric: MetricKind,
     /// Exposure of both images before the metric: auto (the 97th percentile of the reference's largest channel becomes 0.9),
     /// a factor, or from:FILE with the fit.json or an image of an earlier run

@@ -3,23 +3,13 @@
 use super::coverage::{Coverage, Object};
 use crate::{
     inputs::{LoadedMask, LoadedPhoto},
-    settings::{CompareSettings, DisplayExposure, MetricKind},
+    settings::{CompareSettings, DisplayExposure},
     wrap::wrap,
 };
 use anyhow::Context;
+use lookalike::metric::Difference;
 use serde_json::{Map, Value, json};
 use std::io::{self, ErrorKind, Write};
-
-/// The scores.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Outcome {
-    /// Over the whole image.
-    pub(super) score: f64,
-    /// Over the windows centred on the object.
-    pub(super) score_object: f64,
-    /// Means of l_L, c_L, s_L, l_C, l_H over the image and over the object; CSSIM only.
-    pub(super) features: Option<[[f64; 5]; 2]>,
-}
 
 /// Everything that the report shows.
 #[derive(Debug)]
@@ -30,7 +20,7 @@ pub(super) struct Report<'a> {
     pub(super) mask: Option<&'a LoadedMask>,
     pub(super) coverage: &'a Coverage,
     pub(super) exposure: f64,
-    pub(super) outcome: Outcome,
+    pub(super) difference: &'a Difference,
 }
 
 impl Report<'_> {
@@ -45,12 +35,12 @@ impl Report<'_> {
     }
 
     fn json(&self) -> Value {
-        let Outcome { score, score_object, features } = self.outcome;
+        let Difference { score, score_object, features, .. } = *self.difference;
         let by_name = |values: [f64; 5]| -> Map<String, Value> {
             FEATURES.iter().zip(values).map(|(name, value)| ((*name).to_owned(), json!(value))).collect()
         };
         json!({
-            "metric": self.metric(),
+            "metric": self.settings.metric.to_string(),
             "score": score,
             "score_object": score_object,
             "features": features.map(|[image, _]| by_name(image)),
@@ -67,17 +57,17 @@ impl Report<'_> {
     }
 
     fn table(&self) -> String {
-        let Outcome { score, score_object, features } = self.outcome;
+        let Difference { score, score_object, features, .. } = *self.difference;
         let object = match self.coverage.object {
             Object::Mask => "what the mask covers",
             Object::Alpha => "what the alpha channel covers",
             Object::Image => "the whole image: no mask, no alpha channel over black",
         };
-        let metric = self.metric();
+        let metric = self.settings.metric.to_string();
         let (reference, image) = (self.settings.reference.display(), self.settings.image.display());
         let mut text = wrap(&format!("{metric} of {image} against {reference}: 0 is equal, larger is worse")) + "\n\n";
         let mut row = |name: &str, [a, b]: [f64; 2]| text.push_str(&format!("{name:<10} {a:>10.6} {b:>10.6}\n"));
-        row(metric, [score, score_object]);
+        row(&metric, [score, score_object]);
         if let Some([image, object]) = features {
             for (i, name) in FEATURES.iter().enumerate() {
                 row(name, [image[i], object[i]]);
@@ -91,13 +81,6 @@ impl Report<'_> {
         }
         let source = exposure_source(&self.settings.display_exposure);
         text + &wrap(&format!("display exposure: {} ({source})\n", self.exposure))
-    }
-
-    fn metric(&self) -> &'static str {
-        match self.settings.metric {
-            MetricKind::Cssim => "cssim",
-            MetricKind::Icid => "icid",
-        }
     }
 }
 
