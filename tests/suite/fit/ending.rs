@@ -38,11 +38,19 @@ fn finished_event_is_sent_when_all_is_written() {
 #[test]
 fn unwritable_results_are_code_three_and_are_written_on_resume() {
     let folder = folder();
+    // Before the run it would be refused.
     let blocked = folder.path().join("out/match.exr.partial");
-    fs::create_dir_all(&blocked).unwrap();
-    let answer = fit(folder.path(), "out", QUICK);
-    assert_eq!(answer.code, Some(3), "{}", answer.stderr);
-    assert!(answer.stderr.contains("cannot write out/match.exr: is the disk full?"), "{}", answer.stderr);
+    let mut command = Command::new(env!("CARGO_BIN_EXE_lookalike-under-test"));
+    let line = format!("fit photo.exr --env map.exr --out out {QUICK} --progress json");
+    let process = Process::start(command.args(line.split_whitespace()).current_dir(folder.path()));
+    let (output, events) = process.watch_stderr(|events| {
+        if events.last().is_some_and(|event| event["event"] == "node-started") {
+            fs::create_dir_all(&blocked).unwrap();
+        }
+    });
+    assert_eq!(output.status.code(), Some(3), "{events:?}");
+    let told = "cannot write out/match.exr: is the disk full?";
+    assert!(events.iter().any(|event| event.as_str().is_some_and(|line| line.contains(told))), "{events:?}");
     fs::remove_dir(blocked).unwrap();
     fit(folder.path(), "out", &format!("{QUICK} --resume")).done();
     assert!(folder.path().join("out/fit.json").exists());
