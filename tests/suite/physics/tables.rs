@@ -33,7 +33,7 @@ pub(super) struct Comparison {
     pub(super) live: usize,
 }
 
-pub(super) static ROOM: Comparison = Comparison { build: room, stored: 12, live: 24 };
+pub(super) static ROOM: Comparison = Comparison { build: room, stored: 24, live: 24 };
 pub(super) static SUN: Comparison = Comparison { build: sun, stored: 24, live: 64 };
 pub(super) static PERSPECTIVE: Comparison = Comparison { build: perspective, stored: 12, live: 24 };
 
@@ -49,9 +49,7 @@ impl Comparison {
 
 fn room(pixels: usize, rigour: Rigour) -> Case {
     let scene = Scene::sphere(256, Camera::Orthographic, synthetic::room(128)).unwrap();
-    // The stored pixels are too few for models of many lobes, some of which differ from 0 on a part of the sphere only.
-    let is_compared = |model: &&&dyn Model| cfg!(feature = "slow") || model.lobes().len() <= 3;
-    let (models, alphas) = (MODELS.iter().filter(is_compared).copied().collect(), &[0.01, 0.4]);
+    let (models, alphas) = (MODELS.to_vec(), &[0.01, 0.4]);
     Case { name: "room", scene, models, alphas, pixels, accuracies: SUBSET, rigour }
 }
 
