@@ -88,7 +88,7 @@ fn process_that_reconnects_before_its_loss_is_noticed_has_one_membership() {
     bench.join_as(A, 1, process(LONG));
     bench.start(A, 0, 1);
     let said = bench.join_as(B, 1, process(LONG));
-    assert_eq!(said, ["worker 1 is thrown out", "n0 requeued, 0", "worker 2 gets 0.2"]);
+    assert_eq!(said, ["worker 1 is disconnected", "n0 requeued, 0", "worker 2 gets 0.2"]);
     assert!(bench.core.members.get(A).is_none());
 }
 
