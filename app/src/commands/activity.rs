@@ -1,7 +1,7 @@
 //! Lines on stderr that say what a slow command does, where there is no other display: one after 2 s, then one every 10 s.
 
+use crate::progress::print_line;
 use std::{
-    io::{self, Write as _},
     sync::mpsc::{RecvTimeoutError, Sender, channel},
     thread::{self, JoinHandle},
     time::{Duration, Instant},
@@ -29,8 +29,7 @@ impl Activity {
             let began = Instant::now();
             let mut pause = FIRST;
             while ended.recv_timeout(pause) == Err(RecvTimeoutError::Timeout) {
-                // A closed stderr does not stop the work.
-                let _ = writeln!(io::stderr(), "{} ({} s)", what(), began.elapsed().as_secs());
+                print_line(&format!("{} ({} s)", what(), began.elapsed().as_secs()));
                 pause = PAUSE;
             }
         });

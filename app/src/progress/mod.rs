@@ -45,9 +45,9 @@ pub(crate) trait Display: Send {
     fn finish(&mut self, ending: Ending<'_>);
 }
 
-/// Prints a line on stderr. A closed stderr does not stop the run.
-fn print_line(text: &str) {
-    let _ = writeln!(io::stderr(), "{text}");
+/// Prints a line on stderr, in one piece: workers and scripts write there too. A closed stderr does not stop the run.
+pub(crate) fn print_line(text: &str) {
+    let _ = io::stderr().write_all(format!("{text}\n").as_bytes());
 }
 
 /// The display of this kind for a run of this shape.
