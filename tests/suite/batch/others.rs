@@ -2,7 +2,10 @@
 
 use super::{QUICK, batch, folder, scene, states, summary};
 use crate::program::lookalike;
-use lookalike_tests::{journal::JournalView, process::Process};
+use lookalike_tests::{
+    journal::JournalView,
+    process::{Process, signal},
+};
 use std::{fs, path::Path, process::Command};
 use tempfile::TempDir;
 
@@ -27,10 +30,16 @@ fn killed_after_a_fit(folder: &TempDir) -> [&'static str; 2] {
     let line = "batch batch.toml --out out --resume --workers 1 --progress json";
     let mut process = Process::start(command.args(line.split(' ')).current_dir(folder.path()).env_remove("RUST_LOG"));
     let written = "SELECT name FROM fits WHERE outputs IS NOT NULL";
-    let mut has_finished = false;
+    let (mut worker, mut has_finished) = (None, false);
     let found = process.stderr_until(|event| {
-        // The journal is opened only after `fit-finished`: opening it at every event would be too slow to see the fit in time.
-        has_finished |= event["event"] == "fit-finished";
+        if event["event"] == "worker-joined" {
+            worker = event["process"].as_u64().and_then(|process| u32::try_from(process).ok());
+        }
+        if event["event"] == "fit-finished" && !has_finished {
+            has_finished = true;
+            // The other fit gets no further until the journal has this one.
+            signal(worker.expect("a worker that joined"), "STOP");
+        }
         let journal = || JournalView::of(&folder.path().join("out"));
         has_finished.then(|| journal().column::<String>(written)).filter(|names| !names.is_empty())
     });

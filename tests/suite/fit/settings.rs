@@ -36,7 +36,7 @@ fn gammas_are_those_requested() {
 
 #[test]
 fn samples_full_uses_every_usable_pixel() {
-    let folder = folder_of_size(20);
+    let folder = folder_of_size(14);
     let fitted = |out: &str, flags: &str| {
         fit(folder.path(), out, &format!("{QUICK} --gammas 1 {flags}")).done();
         fit_json(&folder.path().join(out))

@@ -65,7 +65,7 @@ fn polish_returns_to_the_winner_if_the_explored_lobe_ends_worse() {
             Blob::new(write("polish", &PolishedWire::of(polished)).unwrap())
         };
         match spec.kind.as_str() {
-            "explore" => changed(&|found| found.parameters = vec![0.0, 0.0, 0.0, 0.9, 0.9, 0.9, 0.02]),
+            "explore" => changed(&|found| found.parameters = vec![0.0, 0.0, 0.0, 0.9, 0.9, 0.9, 0.06]),
             "polish" => {
                 rounds.borrow_mut().push(spec.inputs.clone());
                 if rounds.borrow().len() > 1 {

@@ -92,11 +92,16 @@ impl StageOne {
         let knots = Knots::covering(lower, upper, PER_OCTAVE);
         let plan = TransportPlan { model, knots, accuracy: Accuracy::FULL };
         let table = plan.integrate(&geometry, &LightPyramid::new(room()), &pixels);
-        let mut planes = table.planes();
-        table.radiance(model, parameters, &mut planes);
-        let photo = (0..pixels.len()).map(|p| [0, 1, 2].map(|c| to_f32(planes[c][p]))).collect();
         let subset = PixelSubset { weights: vec![1.0; pixels.len()], pixels };
-        Self { table, subset, photo }
+        Self { table, subset, photo: Vec::new() }.photographed(model, parameters)
+    }
+
+    /// The same pixels with another material.
+    pub(super) fn photographed(&self, model: &dyn Model, parameters: &[f64]) -> Self {
+        let mut planes = self.table.planes();
+        self.table.radiance(model, parameters, &mut planes);
+        let photo = (0..self.table.pixels).map(|p| [0, 1, 2].map(|c| to_f32(planes[c][p]))).collect();
+        Self { table: self.table.clone(), subset: self.subset.clone(), photo }
     }
 }
 
