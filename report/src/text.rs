@@ -7,7 +7,7 @@ pub(super) fn score(score: Option<f64>) -> String {
     fixed(score, 4)
 }
 
-/// A number with this many decimals; a dash if there is none.
+/// A number with this many decimals; a dash for `None`.
 pub(super) fn fixed(number: Option<f64>, decimals: usize) -> String {
     match number.filter(|number| number.is_finite()) {
         Some(number) => without_negative_zero(format!("{number:.decimals$}")).replace('-', "−"),
@@ -26,7 +26,7 @@ pub(super) fn signed(difference: Option<f64>) -> String {
     }
 }
 
-/// A number of a table in a form for programs: with a hyphen as minus, empty if there is none.
+/// A number of a table in a form for programs: with a hyphen as minus, empty for `None`.
 pub(super) fn plain(shown: &str) -> String {
     match shown.strip_prefix('−') {
         Some(digits) => format!("-{digits}"),
@@ -73,7 +73,7 @@ pub(super) const fn minimised(method: Method) -> &'static str {
     }
 }
 
-/// A number for a CSV: the shortest text that reads back as the same number; empty if there is none.
+/// A number for a CSV: the shortest text that reads back as the same number; empty for `None`.
 pub(super) fn exact(number: Option<f64>) -> String {
     number.filter(|number| number.is_finite()).map_or_else(String::new, |number| number.to_string())
 }

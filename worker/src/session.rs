@@ -416,7 +416,7 @@ async fn write(
     Ok(())
 }
 
-/// Wait until a time; for ever if there is none.
+/// Wait until a time; for ever without one.
 async fn sleep_until_some(then: Option<Instant>) {
     match then {
         Some(then) => sleep_until(then).await,

@@ -125,7 +125,7 @@ fn write_map(path: &Path, map: &ErrorMap, settings: &CompareSettings) -> anyhow:
     Ok(())
 }
 
-/// The smallest of 0.1, 0.2, 0.5, 1 and 2 that no window exceeds; 2 if there is none. A difference below 0.1 is invisible, so a
+/// The smallest of 0.1, 0.2, 0.5, 1 and 2 that no window exceeds; 2 if all are exceeded. A difference below 0.1 is invisible, so a
 /// smaller scale would exaggerate noise.
 fn full_scale(map: &ErrorMap) -> f64 {
     let largest = map.error.iter().copied().fold(0.0, f64::max);

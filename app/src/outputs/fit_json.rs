@@ -149,7 +149,7 @@ fn by_name(model: &dyn Model, entries: &[Value]) -> Value {
     Value::Object(object)
 }
 
-/// How well the photo determines each parameter: the standard error relative to the value (`null` if there is none), and
+/// How well the photo determines each parameter: the standard error relative to the value (`null` if it is unknown), and
 /// whether the value is `determined`, held `at-bound`, or `undetermined`.
 fn uncertainty_json(model: &dyn Model, parameters: &[f64], uncertainty: &[Uncertainty]) -> Value {
     let relative = parameters.iter().zip(uncertainty).map(|(value, known)| match known {

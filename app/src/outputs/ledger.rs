@@ -30,7 +30,7 @@ struct State {
 }
 
 impl Ledger {
-    /// The ledger of a folder; empty if there is none.
+    /// The ledger of a folder; empty if the folder has no ledger.
     pub(super) fn read(folder: &Path) -> anyhow::Result<Self> {
         let path = folder.join(LEDGER);
         let text = match fs::read_to_string(&path) {

@@ -187,7 +187,7 @@ impl Study {
     fn check(&self) -> anyhow::Result<()> {
         let known = |what: &str, name: &String, list: &[(String, PathBuf)]| {
             let names: Vec<&str> = list.iter().map(|(name, _)| &**name).collect();
-            ensure!(names.contains(&&**name), "{what}: {name:?} is none of {}", names.join(", "));
+            ensure!(names.contains(&&**name), "{what}: {name:?} is not one of {}", names.join(", "));
             Ok(())
         };
         let pairs = self.file.large_cells.iter();
@@ -331,8 +331,8 @@ mod tests {
         let base = "materials = ['*.binary']\nprobes = ['grace.hdr']\n";
         for (text, phrase) in [
             ("materials = ['*.exr']\nprobes = ['grace.hdr']", "no file matches \"*.exr\""),
-            (&format!("{base}six = ['tin']"), "\"tin\" is none of gold, nickel"),
-            (&format!("{base}repeat-probe = 'uffizi'"), "\"uffizi\" is none of grace"),
+            (&format!("{base}six = ['tin']"), "\"tin\" is not one of gold, nickel"),
+            (&format!("{base}repeat-probe = 'uffizi'"), "\"uffizi\" is not one of grace"),
             (&format!("{base}model = 'phong'"), "unknown model 'phong'"),
             (&format!("{base}size = 8"), "between 16 and 512"),
             (&format!("{base}six = ['gold', 'gold']"), "six names a material twice"),

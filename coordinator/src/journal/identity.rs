@@ -17,9 +17,9 @@ pub struct RunIdentity {
 pub struct Difference {
     /// The flag or the input that differs.
     pub name: String,
-    /// Its value in the existing run; `None` if there was none.
+    /// Its value in the existing run; `None` if it had no value.
     pub there: Option<String>,
-    /// Its value in this run; `None` if there is none.
+    /// Its value in this run; `None` if it has no value.
     pub here: Option<String>,
 }
 
@@ -61,8 +61,8 @@ impl RunIdentity {
 
 impl fmt::Display for Difference {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let or_none = |value: &Option<String>| value.clone().unwrap_or_else(|| "none".into());
-        write!(formatter, "{} is {} there and {} here", self.name, or_none(&self.there), or_none(&self.here))
+        let or_not_given = |value: &Option<String>| value.clone().unwrap_or_else(|| "not given".into());
+        write!(formatter, "{} is {} there and {} here", self.name, or_not_given(&self.there), or_not_given(&self.here))
     }
 }
 
@@ -77,8 +77,8 @@ mod tests {
         let told: Vec<_> = here.differences(&there).iter().map(ToString::to_string).collect();
         let expected = [
             "photo is 12ab there and 34cd here",
-            "--normals is none there and 99 here",
-            "--mask is 77 there and none here",
+            "--normals is not given there and 99 here",
+            "--mask is 77 there and not given here",
         ];
         assert_eq!(told, expected);
         assert_eq!(here.differences(&here.clone()), []);

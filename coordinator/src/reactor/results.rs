@@ -10,7 +10,7 @@ use crate::actions::{Action, Outbox};
 use crate::events::{RunEvent, Site};
 use crate::state::{Candidate, Core, Place};
 
-/// Accept the output of a node that waits for its verification without verifying it; `false` if there is none.
+/// Accept the output of a node that waits for its verification without verifying it; `false` if no node waits.
 pub(super) fn accept_candidate(core: &mut Core, node: NodeId, now: Duration, outbox: &mut Outbox) -> bool {
     let candidate = core.record(node).and_then(|record| record.candidate.take());
     // The node is open, so there is no other output that could differ.

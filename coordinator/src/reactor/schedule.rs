@@ -30,7 +30,7 @@ pub(super) fn schedule(core: &mut Core, now: Duration, outbox: &mut Outbox) {
 }
 
 /// Give every suspect a worker without other nodes: one that has executed nothing or, after a while, any that holds no lease. If
-/// there is none, free one worker at a time: it gets no more leases until it holds none.
+/// no worker is idle, free one at a time: it gets no more leases until it holds no lease.
 fn isolate_suspects(core: &mut Core, now: Duration, outbox: &mut Outbox) {
     core.next_patience = None;
     while let Some((since, node)) = core.waiting.suspect() {
@@ -57,7 +57,7 @@ fn cleared(core: &Core) -> Option<WorkerId> {
     core.clearing.filter(|worker| core.members.get(*worker).is_some_and(|member| member.leases.is_empty()))
 }
 
-/// Begin to free a worker; `false` if there is none.
+/// Begin to free a worker; `false` if no worker can be freed.
 fn clear_one(core: &mut Core, now: Duration, outbox: &mut Outbox) -> bool {
     let Some(worker) = core.members.least_busy() else { return false };
     core.clearing = Some(worker);

@@ -62,7 +62,7 @@ impl Memory {
         None
     }
 
-    /// Wait for the next committed group; for ever if there is none.
+    /// Wait for the next committed group; for ever if no group is outstanding.
     pub(super) async fn written(&mut self) -> Result<Group, RunError> {
         let (Some(journal), false) = (&mut self.journal, self.waiting.is_empty()) else {
             return std::future::pending().await;

@@ -112,7 +112,7 @@ fn changed_settings_inputs_and_fits_are_refused_and_named() {
     refused("", "out/summary.json says that a batch was run there already: resume it with --resume");
     let manifest = fs::read_to_string(folder.path().join("batch.toml")).unwrap();
     fs::write(folder.path().join("batch.toml"), manifest.replace("'red.exr'", "'tiny.exr'")).unwrap();
-    refused("--resume", "tiny-map-ggx: the photo is none there and");
+    refused("--resume", "tiny-map-ggx: the photo is not given there and");
     fs::write(folder.path().join("batch.toml"), manifest).unwrap();
     fs::copy(folder.path().join("photo.exr"), folder.path().join("red.exr")).unwrap();
     refused("--resume", "red-map-ggx: the photo is ");

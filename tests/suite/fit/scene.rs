@@ -107,7 +107,7 @@ impl Finished {
 
     fn run(&self) -> Vec<(String, Vec<u8>, Permissions)> {
         let folder = folder();
-        // `--resume` starts a run where there is none to resume.
+        // `--resume` starts a run where no run can be resumed.
         fit(folder.path(), "out", &format!("{} --resume", self.flags)).done();
         let entries = fs::read_dir(folder.path().join("out")).unwrap().map(Result::unwrap);
         let file = |entry: fs::DirEntry| {

@@ -30,7 +30,7 @@ pub(super) struct Web {
     roots: Vec<NodeId>,
     blobs: Vec<BlobHash>,
     fringe: Option<NodeId>,
-    /// The hash of the output, or the reason why there is none.
+    /// The hash of the output, or the reason for its absence.
     pub(super) results: BTreeMap<String, String>,
 }
 

@@ -11,7 +11,7 @@ fn mistakes_are_named_with_their_file() {
         ("materials = ['paint.binary']\nprobes = ['attic.hdr']".to_owned(), &["environment map", "attic.hdr"]),
         ("materials = ['room.exr']\nprobes = ['room.exr']".to_owned(), &["room.exr"]),
         (format!("{base}size = 8"), &["STUDY.toml", "between 16 and 512"]),
-        (format!("{base}large-cells = [['tin', 'room']]"), &["STUDY.toml", "\"tin\" is none of paint"]),
+        (format!("{base}large-cells = [['tin', 'room']]"), &["STUDY.toml", "\"tin\" is not one of paint"]),
         (format!("{base}models = ['phong']"), &["STUDY.toml", "unknown model 'phong'"]),
         (format!("{base}sizes = [8]"), &["STUDY.toml", "unknown field `sizes`"]),
     ] {

@@ -35,7 +35,7 @@ pub(crate) struct BatchArgs {
     #[arg(long, overrides_with = "keep_going", help_heading = "Output")]
     fail_fast: bool,
     /// Resume the run in the folder: complete fits are kept, acknowledged results are not computed again, failed fits are
-    /// retried. Starts a run if there is none
+    /// retried. Starts a run if the folder has no run
     #[arg(long, help_heading = "Output")]
     resume: bool,
     /// Replace files with our names in the folder, never an input and never through a symbolic link

@@ -30,7 +30,7 @@ struct OutputArgs {
     /// Exit with code 1 if the final CSSIM is above X, for example 0.05; 0 is a perfect match
     #[arg(long, value_name = "X", value_parser = score, allow_negative_numbers = true)]
     max_cssim: Option<f64>,
-    /// Resume the run in the folder without computing its acknowledged results again. Starts a run if there is none; only
+    /// Resume the run in the folder without computing its acknowledged results again. Starts a run if the folder has no run; only
     /// checks the results of a finished one
     #[arg(long)]
     resume: bool,

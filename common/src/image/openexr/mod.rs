@@ -3,7 +3,7 @@
 //!
 //! - The image is the display window. The data window is placed in it. Pixels outside the data window are 0, and pixels
 //!   outside the display window are dropped; both are warnings.
-//! - The first part with `R G B` is read, its unnamed layer before named ones. If there is none, the first `Y` is read
+//! - The first part with `R G B` is read, its unnamed layer before named ones. If no part has them, the first `Y` is read
 //!   as grey.
 //! - `chromaticities` other than Rec. 709 are converted.
 //! - Colours with alpha are premultiplied, as the format requires, and are kept so.
