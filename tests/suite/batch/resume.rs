@@ -1,10 +1,7 @@
 //! A resumed batch: complete fits stay, acknowledged nodes are not computed again, and the results are those of an undisturbed run.
 
 use super::{QUICK, batch, folder, scene, states, summary};
-use lookalike_tests::{
-    journal::JournalView,
-    process::{Process, signal},
-};
+use lookalike_tests::{journal::JournalView, process::Process};
 use serde_json::Value;
 use std::{fs, process::Command};
 use tempfile::TempDir;
@@ -86,19 +83,12 @@ fn killed_batch_resumes_and_ends_with_the_same_results() {
 }
 
 #[test]
-fn outputs_of_written_fits_are_deleted_from_the_journal_during_the_batch() {
-    let folder = four();
-    // The first two fits are complete, and a node has finished after that.
-    let mut process = start(&folder, "--workers 1");
-    let coordinator = process.id();
-    let mut complete = 0;
-    let found = process.stderr_until(|event| {
-        complete += usize::from(event["event"] == "fit-finished");
-        (complete >= 2 && event["event"] == "node-finished").then_some(())
-    });
-    assert!(found.is_some());
-    signal(coordinator, "INT");
-    assert_eq!(process.output().status.code(), Some(130));
+fn outputs_of_written_fits_are_deleted_from_the_journal_of_an_unfinished_batch() {
+    // The second fit fails, so the batch is not finished and its journal stays open for a resume.
+    let photos = "photos = ['photo.exr', 'tiny.exr']\nenvironments = 'map.exr'\n";
+    let folder = folder(&format!("{photos}[defaults]\n{QUICK}"));
+    assert_eq!(batch(&folder, "out", "--workers 1").code, Some(4));
+    assert_eq!(written(&folder), ["photo-map-ggx"]);
     let journal = JournalView::of(&folder.path().join("out"));
     assert!(journal.number("SELECT count(*) FROM results WHERE bytes IS NULL") > 0, "nothing was released");
 }
