@@ -6,6 +6,7 @@ pub mod arctangent;
 pub(crate) mod chi_square;
 pub mod elementary;
 pub mod frame;
+pub mod hermite;
 pub mod sampling;
 pub mod simd;
 pub mod warp;

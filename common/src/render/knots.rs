@@ -1,16 +1,14 @@
 //! The grid of lobe widths of a transport table, and interpolation on it.
 //!
-//! Knots are equally spaced in the logarithm of the width. Between them: cubic Hermite pieces whose slopes are fourth-order
-//! finite differences (six knots in all), so the interpolant is continuously differentiable and its error is
-//! `h^4/384 f''''`, nine times less than that of four-point Lagrange interpolation.
+//! Knots are equally spaced in the logarithm of the width; between them, see [`hermite`].
 
 use crate::{
     brdf::{Model, Width},
-    math::elementary::{exp, ln},
+    math::{
+        elementary::{exp, ln},
+        hermite::{self, STENCIL, Stencil},
+    },
 };
-
-/// Knots of the widest stencil.
-pub const STENCIL: usize = 6;
 
 /// Knots per factor of two of width in tables of stage one.
 ///
@@ -28,17 +26,6 @@ pub struct Knots {
     first_ln: f64,
     step_ln: f64,
     count: usize,
-}
-
-/// The knots around a width, with their weights for the value and the derivative.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Stencil {
-    /// First knot of six.
-    pub first: usize,
-    /// Weights of the value.
-    pub value: [f64; STENCIL],
-    /// Weights of the derivative with respect to the logarithm of the width.
-    pub slope: [f64; STENCIL],
 }
 
 impl Knots {
@@ -94,42 +81,12 @@ impl Knots {
         (sized && ends.iter().all(|ln| ln.is_finite() && ln.abs() < LARGEST_LN)).then_some(knots)
     }
 
-    /// Interpolation weights at a width; a width outside the span is clamped to it.
+    /// Interpolation weights at a width, those of the slope per unit of its logarithm; a width outside the span is clamped to it.
     #[must_use]
     pub fn stencil(&self, width: f64) -> Stencil {
-        let position = ((ln(width) - self.first_ln) / self.step_ln).clamp(0.0, (self.count - 1) as f64);
-        let left = crate::math::cell(position, self.count - 1);
-        let s = position - left as f64;
-        let first = left.saturating_sub(2).min(self.count - STENCIL);
-        let (mut value, mut slope) = ([0.0; STENCIL], [0.0; STENCIL]);
-        let (s2, s3) = (s * s, s * s * s);
-        // Hermite basis: values at both ends, then slopes at both ends; and their derivatives.
-        value[left - first] += 2.0 * s3 - 3.0 * s2 + 1.0;
-        value[left + 1 - first] += 3.0 * s2 - 2.0 * s3;
-        slope[left - first] += 6.0 * s2 - 6.0 * s;
-        slope[left + 1 - first] += 6.0 * s - 6.0 * s2;
-        let ends = [(left, s3 - 2.0 * s2 + s, 3.0 * s2 - 4.0 * s + 1.0), (left + 1, s3 - s2, 3.0 * s2 - 2.0 * s)];
-        for (knot, basis, basis_slope) in ends {
-            let (from, weights) = self.difference(knot);
-            for (k, w) in weights.iter().enumerate() {
-                value[from + k - first] += basis * w / 12.0;
-                slope[from + k - first] += basis_slope * w / 12.0;
-            }
-        }
-        slope.iter_mut().for_each(|w| *w /= self.step_ln);
-        Stencil { first, value, slope }
-    }
-
-    /// Fourth-order first difference at a knot, times 12: first knot of five and the weights.
-    fn difference(&self, knot: usize) -> (usize, [f64; 5]) {
-        let last = self.count - 1;
-        match knot {
-            0 => (0, [-25.0, 48.0, -36.0, 16.0, -3.0]),
-            1 => (0, [-3.0, -10.0, 18.0, -6.0, 1.0]),
-            k if k == last => (last - 4, [3.0, -16.0, 36.0, -48.0, 25.0]),
-            k if k + 1 == last => (last - 4, [-1.0, 6.0, -18.0, 10.0, 3.0]),
-            k => (k - 2, [1.0, -8.0, 0.0, 8.0, -1.0]),
-        }
+        let mut stencil = hermite::stencil((ln(width) - self.first_ln) / self.step_ln, self.count);
+        stencil.slope.iter_mut().for_each(|w| *w /= self.step_ln);
+        stencil
     }
 }
 
