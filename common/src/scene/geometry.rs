@@ -2,8 +2,9 @@
 
 use super::coverage::pixel_coverage;
 use super::limits::LEAST_SIDE;
-use super::{Camera, Circle, NormalMap, SceneError, Sphere, SurfacePoint};
+use super::{Camera, Circle, NormalMap, SceneError, Sphere, SurfacePoint, Viewpoint};
 use crate::image::Image;
+use crate::math::Vec3;
 use crate::math::arctangent::angle;
 
 /// An object in a photo of a given size.
@@ -79,6 +80,15 @@ impl Geometry {
         match &self.surface {
             Surface::Sphere(_) => None,
             Surface::Normals(map) => Some(map),
+        }
+    }
+
+    /// The camera, as seen from the surface; `None` if equal normals are seen from different directions.
+    #[must_use]
+    pub fn viewpoint(&self) -> Option<Viewpoint> {
+        match &self.surface {
+            Surface::Sphere(sphere) => Some(sphere.viewpoint()),
+            Surface::Normals(_) => (self.camera == Camera::Orthographic).then_some(Viewpoint::Distant(Vec3::Z)),
         }
     }
 

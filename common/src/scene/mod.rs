@@ -22,6 +22,7 @@ mod placement;
 mod spec;
 mod sphere;
 mod surface;
+mod viewpoint;
 
 pub use camera::Camera;
 pub use capture::{Capture, CaptureInput};
@@ -36,3 +37,4 @@ pub use placement::{CircleSource, Placement};
 pub use spec::{CameraSpec, GeometrySpec, SurfaceSpec};
 pub use sphere::Sphere;
 pub use surface::SurfacePoint;
+pub use viewpoint::Viewpoint;

@@ -10,7 +10,7 @@
 //! inside it. In the middle of the photo ellipse and circle are the same.
 
 use super::camera::Pinhole;
-use super::{Camera, Circle, SceneError, SurfacePoint};
+use super::{Camera, Circle, SceneError, SurfacePoint, Viewpoint};
 use crate::math::Vec3;
 use crate::math::arctangent::angle;
 use crate::math::elementary::sin_cos;
@@ -51,6 +51,15 @@ impl Sphere {
     #[must_use]
     pub fn circle(&self) -> Circle {
         self.circle
+    }
+
+    /// The camera, as seen from the sphere.
+    #[must_use]
+    pub fn viewpoint(&self) -> Viewpoint {
+        match self.view {
+            View::Orthographic { .. } => Viewpoint::Distant(Vec3::Z),
+            View::Perspective { position, .. } => Viewpoint::OfSphere(position),
+        }
     }
 
     /// The surface at the point (x, y) of the photo, in pixels; `None` outside the sphere. The normal always faces the
