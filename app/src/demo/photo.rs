@@ -26,7 +26,7 @@ use rayon::prelude::*;
 use std::f64::consts::TAU;
 
 /// Largest error of a node of the light, in units of the mean radiance, for a lobe of albedo 1.
-const TOLERANCE: f64 = 3e-4;
+const TOLERANCE: f64 = 3e-3;
 /// Camera noise: photon noise at mean radiance, and read noise, as shares of the mean radiance.
 const PHOTON_NOISE: f64 = 0.004;
 const READ_NOISE: f64 = 0.001;
@@ -39,10 +39,13 @@ pub fn take(geometry: &Geometry, light: &Environment) -> Image {
     let (width, height) = (geometry.width(), geometry.height());
     let radiance: Vec<Rgb> = (0..width * height)
         .into_par_iter()
-        .map_init(Cut::default, |cut, i| {
-            let (column, row) = (i % width, i / width);
-            radiance_at(geometry, &pyramid, column, row, cut) * f64::from(geometry.coverage(column, row))
-        })
+        .map_init(
+            || Cut::new(&pyramid),
+            |cut, i| {
+                let (column, row) = (i % width, i / width);
+                radiance_at(geometry, column, row, cut) * f64::from(geometry.coverage(column, row))
+            },
+        )
         .collect();
     let lit = radiance.iter().filter(|r| r.max_element() > 0.0);
     let mean = lit.clone().sum::<Rgb>().element_sum() / (3.0 * lit.count().max(1) as f64);
@@ -51,7 +54,7 @@ pub fn take(geometry: &Geometry, light: &Environment) -> Image {
 }
 
 /// Radiance at the centre of a pixel or, if that misses the object, at the first of a few positions that hit it.
-fn radiance_at(geometry: &Geometry, pyramid: &LightPyramid, column: usize, row: usize, cut: &mut Cut) -> Rgb {
+fn radiance_at(geometry: &Geometry, column: usize, row: usize, cut: &mut Cut<'_>) -> Rgb {
     let positions = [(0.5, 0.5), (0.2, 0.2), (0.8, 0.2), (0.2, 0.8), (0.8, 0.8)];
     let see = |(x, y)| geometry.point(column as f64 + x, row as f64 + y);
     let Some(point) = positions.into_iter().find_map(see).and_then(|p| Point::new(p.normal, p.view)) else {
@@ -59,7 +62,7 @@ fn radiance_at(geometry: &Geometry, pyramid: &LightPyramid, column: usize, row: 
     };
     let alphas = Target.sampling_alphas();
     let sharpest = alphas.iter().fold(1.0_f64, |least, a| least.min(*a));
-    cut.refine(pyramid, &point, 0.0, Band::Glossy(sharpest, 1.0, Tail::Short), TOLERANCE * pyramid.mean_radiance());
+    cut.refine(&point, 0.0, Band::Glossy(sharpest, 1.0, Tail::Short), TOLERANCE);
     let frame = Frame::from_normal(point.normal);
     let wo = frame.to_local(point.view);
     let reflected = cut

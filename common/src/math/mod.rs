@@ -7,6 +7,7 @@ pub(crate) mod chi_square;
 pub mod elementary;
 pub mod frame;
 pub mod hermite;
+pub(crate) mod lanes;
 pub mod sampling;
 pub mod simd;
 pub mod warp;

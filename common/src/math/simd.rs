@@ -5,7 +5,7 @@
 //! order, without contraction; only the width of the vectors differs. A test uses the switch to check this: it runs one fit
 //! at both levels.
 
-use pulp::{Arch, NullaryFnOnce};
+use pulp::{Arch, Scalar, WithSimd};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// The instructions that `dispatch` uses.
@@ -40,9 +40,9 @@ pub fn has_levels() -> bool {
 /// Runs a loop at the current level. The loop and the functions it calls should be `#[inline(always)]`: code that is not
 /// inlined is compiled for the baseline.
 #[inline(always)]
-pub(crate) fn dispatch<Op: NullaryFnOnce>(op: Op) -> Op::Output {
+pub(crate) fn dispatch<Op: WithSimd>(op: Op) -> Op::Output {
     match level() {
         Level::Detected => Arch::new().dispatch(op),
-        Level::Baseline => op.call(),
+        Level::Baseline => op.with_simd(Scalar),
     }
 }

@@ -12,67 +12,187 @@
 //! The means of both follow from three quadratic forms of `S`.
 
 use super::{point::Point, pyramid::Node};
-use crate::{
-    brdf::{Angles, Spread},
-    math::{Vec3, frame::Frame, widen},
+use crate::math::{
+    Vec3,
+    lanes::{Lanes, Lanes3, cross, dot},
+    simd::dispatch,
 };
+use pulp::{Simd, WithSimd};
 
 /// Lower limit of `v.h`: as light approaches the direction opposite to the view, a small step of it turns the half vector without
 /// bound.
 pub(super) const LEAST_COS_D: f64 = 0.05;
 
-/// The angles of a node's light at a surface point, and the effect of its spread on them; `None` if all of it is below the horizon.
-#[inline]
-pub(super) fn seen_from(node: &Node, point: &Point) -> Option<(Angles, Spread)> {
-    let centroid = widen(node.centroid);
-    let cos_i = point.normal.dot(centroid);
-    let radius = f64::from(node.radius);
-    if cos_i <= -radius {
-        return None;
-    }
-    let tangents = Frame::from_normal(centroid);
-    let [a, b, c] = node.covariance.map(f64::from);
-    let flat = |w: Vec3| (w.dot(tangents.tangent), w.dot(tangents.bitangent));
-    let form = |(x, y): (f64, f64), (z, w): (f64, f64)| a * x * z + b * (x * w + y * z) + c * y * w;
+/// Nodes as one list for each of their numbers, padded to whole registers.
+#[derive(Debug, Default)]
+pub(super) struct NodeLists {
+    centroid: [Vec<f64>; 3],
+    covariance: [Vec<f64>; 3],
+    radius: Vec<f64>,
+}
 
-    let mut angles = Angles::new(point.normal, centroid, point.view);
-    let (normal, view) = (flat(point.normal), flat(point.view));
-    let light2 = a + c;
-    if cos_i < radius {
-        angles.cos_i = above_horizon(cos_i, form(normal, normal), radius);
-        if angles.cos_i <= 0.0 {
-            return None;
+/// How a surface point sees them: their angles and the effect of their spread, one list each.
+#[derive(Debug, Default)]
+pub(super) struct SeenLists {
+    /// 0 for a node that is below the horizon.
+    pub(super) cos_i: Vec<f64>,
+    pub(super) cos_h: Vec<f64>,
+    pub(super) sin2_h: Vec<f64>,
+    pub(super) cos_d: Vec<f64>,
+    pub(super) du: Vec<f64>,
+    pub(super) du2: Vec<f64>,
+}
+
+impl NodeLists {
+    /// Replaces the nodes.
+    pub(super) fn set(&mut self, nodes: &[Node]) {
+        let padded = nodes.len().next_multiple_of(LONGEST_REGISTER);
+        let fill = |list: &mut Vec<f64>, of: &dyn Fn(&Node) -> f32| {
+            list.clear();
+            list.extend(nodes.iter().map(|node| f64::from(of(node))));
+            list.resize(padded, 0.0);
+        };
+        for axis in 0..3 {
+            fill(&mut self.centroid[axis], &|node| node.centroid[axis]);
+            fill(&mut self.covariance[axis], &|node| node.covariance[axis]);
+        }
+        fill(&mut self.radius, &|node| node.radius);
+    }
+
+    /// The nodes as light at a surface point.
+    pub(super) fn seen_from(&self, point: &Point, seen: &mut SeenLists) {
+        let SeenLists { cos_i, cos_h, sin2_h, cos_d, du, du2 } = seen;
+        for list in [cos_i, cos_h, sin2_h, cos_d, du, du2] {
+            list.resize(self.radius.len(), 0.0);
+        }
+        dispatch(Pass { nodes: self, point, seen });
+    }
+}
+
+/// `f64` lanes of the longest register of any processor.
+const LONGEST_REGISTER: usize = 8;
+
+struct Pass<'a> {
+    nodes: &'a NodeLists,
+    point: &'a Point,
+    seen: &'a mut SeenLists,
+}
+
+impl WithSimd for Pass<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        let NodeLists { centroid, covariance, radius } = self.nodes;
+        let [x, y, z] = centroid.each_ref().map(|list| S::as_simd_f64s(list).0);
+        let [a, b, c] = covariance.each_ref().map(|list| S::as_simd_f64s(list).0);
+        let radius = S::as_simd_f64s(radius).0;
+        let SeenLists { cos_i, cos_h, sin2_h, cos_d, du, du2 } = self.seen;
+        let [cos_i, cos_h, sin2_h, cos_d, du, du2] =
+            [cos_i, cos_h, sin2_h, cos_d, du, du2].map(|list| S::as_mut_simd_f64s(list).0);
+        let (normal, view) = (splat(simd, self.point.normal), splat(simd, self.point.view));
+        for k in 0..radius.len() {
+            let node = Block {
+                centroid: [Lanes::new(simd, x[k]), Lanes::new(simd, y[k]), Lanes::new(simd, z[k])],
+                covariance: [Lanes::new(simd, a[k]), Lanes::new(simd, b[k]), Lanes::new(simd, c[k])],
+                radius: Lanes::new(simd, radius[k]),
+            };
+            let seen = node.seen_from(normal, view);
+            cos_i[k] = seen[0].value;
+            cos_h[k] = seen[1].value;
+            sin2_h[k] = seen[2].value;
+            cos_d[k] = seen[3].value;
+            du[k] = seen[4].value;
+            du2[k] = seen[5].value;
         }
     }
-    // The mean of the node's directions is shorter than 1 by exactly half their mean square chord from the centroid.
-    angles.cos_i *= 1.0 - 0.5 * light2;
-    // `h` and `q` in the tangent plane, in which the centroid has no component. Light opposite to the view has no half vector.
-    let length = 2.0 * angles.cos_d.max(1e-9);
-    let half = (view.0 / length, view.1 / length);
-    let offset = (normal.0 - angles.cos_h * half.0, normal.1 - angles.cos_h * half.1);
-    let scale = 0.5 / angles.cos_d.max(LEAST_COS_D);
-    let scale2 = scale * scale;
-    let along2 = form(offset, offset) * scale2;
-    let step2 = (light2 - form(half, half)) * scale2;
-    let bend = 0.5 * (cos_i - angles.cos_h * angles.cos_d) * light2 * scale + form(offset, half) * scale2;
-    let cos2 = 1.0 - angles.sin2_h;
-    let du = 2.0 * angles.cos_h * bend + cos2 * step2 - along2;
-    Some((angles, Spread { du, du2: 4.0 * cos2 * along2 }))
+}
+
+#[inline(always)]
+fn splat<S: Simd>(simd: S, v: Vec3) -> Lanes3<S> {
+    [Lanes::splat(simd, v.x), Lanes::splat(simd, v.y), Lanes::splat(simd, v.z)]
+}
+
+/// As many nodes as a register has lanes.
+struct Block<S: Simd> {
+    centroid: Lanes3<S>,
+    covariance: Lanes3<S>,
+    radius: Lanes<S>,
+}
+
+impl<S: Simd> Block<S> {
+    /// `cos_i`, `cos_h`, `sin2_h`, `cos_d`, `du` and `du2` at a surface point.
+    #[inline(always)]
+    fn seen_from(&self, normal: Lanes3<S>, view: Lanes3<S>) -> [Lanes<S>; 6] {
+        let centre = self.centroid;
+        let half = [centre[0] + view[0], centre[1] + view[1], centre[2] + view[2]];
+        let length2 = dot(half, half).max(f64::MIN_POSITIVE);
+        // `1/|l + v|`, which is also `1/(2 v.h)`.
+        let inverse = length2.sqrt().inverse();
+        let across = cross(normal, half);
+        let centroid_cos_i = dot(normal, centre);
+        let cos_h = dot(normal, half) * inverse;
+        let sin2_h = dot(across, across) * (inverse * inverse);
+        let cos_d = length2 * inverse * 0.5;
+
+        let tangents = tangents(centre);
+        let (normal, view) = (flat(normal, tangents), flat(view, tangents));
+        let spread = self.covariance;
+        let light2 = spread[0] + spread[2];
+        // The mean of the node's directions is shorter than 1 by exactly half their mean square chord from the centroid.
+        let shorter = Lanes::splat_like(light2, 1.0) - light2 * 0.5;
+        let cos_i = above_horizon(centroid_cos_i, form(spread, normal, normal), self.radius) * shorter;
+        // `h` and `q` in the tangent plane, in which the centroid has no component. Light opposite to the view has no half vector.
+        let inverse_length = inverse.min(Lanes::splat_like(light2, 1.0 / LEAST_LENGTH));
+        let half = [view[0] * inverse_length, view[1] * inverse_length];
+        let offset = [normal[0] - cos_h * half[0], normal[1] - cos_h * half[1]];
+        let scale = inverse.min(Lanes::splat_like(light2, 0.5 / LEAST_COS_D));
+        let scale2 = scale * scale;
+        let along2 = form(spread, offset, offset) * scale2;
+        let step2 = (light2 - form(spread, half, half)) * scale2;
+        let bend = (centroid_cos_i - cos_h * cos_d) * 0.5 * light2 * scale + form(spread, offset, half) * scale2;
+        let cos2 = Lanes::splat_like(light2, 1.0) - sin2_h;
+        let du = cos_h * bend * 2.0 + cos2 * step2 - along2;
+        [cos_i, cos_h, sin2_h, cos_d, du, cos2 * along2 * 4.0]
+    }
+}
+
+/// Lower limit of `2 v.h` for the place of the half vector in the tangent plane.
+const LEAST_LENGTH: f64 = 2e-9;
+
+/// A vector along two tangents.
+#[inline(always)]
+fn flat<S: Simd>(v: Lanes3<S>, tangents: [Lanes3<S>; 2]) -> [Lanes<S>; 2] {
+    [dot(v, tangents[0]), dot(v, tangents[1])]
+}
+
+/// The bilinear form of a covariance.
+#[inline(always)]
+fn form<S: Simd>([a, b, c]: Lanes3<S>, v: [Lanes<S>; 2], w: [Lanes<S>; 2]) -> Lanes<S> {
+    a * v[0] * w[0] + b * (v[0] * w[1] + v[1] * w[0]) + c * v[1] * w[1]
+}
+
+/// The tangents of [`Frame::from_normal`](crate::math::frame::Frame::from_normal).
+#[inline(always)]
+fn tangents<S: Simd>([x, y, z]: Lanes3<S>) -> [Lanes3<S>; 2] {
+    let sign = z.signum();
+    let minus_a = (sign + z).inverse();
+    let zero = sign - sign;
+    let b = zero - x * y * minus_a;
+    let one = Lanes::splat_like(x, 1.0);
+    [[one - sign * x * x * minus_a, sign * b, zero - sign * x], [b, sign - y * y * minus_a, zero - y]]
 }
 
 /// Mean of `max(0, n.l)` over light of mean cosine `cos_i` and variance `variance`. The cosine is taken as uniformly distributed, no
 /// farther than `radius` from its mean. Every lobe vanishes linearly at the horizon; without this mean, a node that crosses the horizon
 /// would count fully or not at all.
-fn above_horizon(cos_i: f64, variance: f64, radius: f64) -> f64 {
+#[inline(always)]
+fn above_horizon<S: Simd>(cos_i: Lanes<S>, variance: Lanes<S>, radius: Lanes<S>) -> Lanes<S> {
     // Rounding may make a variance of 0 negative.
-    let reach = (3.0 * variance.max(0.0)).sqrt().min(radius);
-    if cos_i >= reach {
-        cos_i
-    } else if cos_i <= -reach {
-        0.0
-    } else {
-        (cos_i + reach) * (cos_i + reach) / (4.0 * reach)
-    }
+    let reach = (variance.max(0.0) * 3.0).sqrt().min(radius);
+    let (zero, above) = (reach - reach, cos_i + reach);
+    let partly = above * above / (reach.max(f64::MIN_POSITIVE) * 4.0);
+    zero.if_less(above, cos_i.if_less(reach, partly, cos_i), zero)
 }
 
 #[cfg(test)]

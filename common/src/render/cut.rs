@@ -6,12 +6,12 @@
 //! pixels get similar cuts, so the error varies smoothly instead of as noise.
 
 use super::{
-    blur::{LEAST_COS_D, seen_from},
+    blur::{LEAST_COS_D, NodeLists, SeenLists},
     point::Point,
     pyramid::{Cell, LightPyramid, Node, strongest},
 };
 use crate::{
-    brdf::{Incident, Tail},
+    brdf::{Angles, Incident, Spread, Tail},
     math::{Rgb, Vec3, elementary::ln, widen},
 };
 use std::f64::consts::PI;
@@ -36,31 +36,50 @@ impl Band {
     }
 }
 
-/// Reusable storage for cuts.
-#[derive(Debug, Default)]
-pub struct Cut {
+/// Cuts through one pyramid, one at a time; storage is used again.
+#[derive(Debug)]
+pub struct Cut<'a> {
+    pyramid: &'a LightPyramid,
     stack: Vec<Cell>,
     nodes: Vec<Node>,
+    recent: Recent,
+    lists: NodeLists,
+    seen: SeenLists,
     lights: Vec<Incident>,
 }
 
-impl Cut {
-    /// Refines the pyramid until no node's error in radiance, for a lobe of unit weight, exceeds `tolerance` (for glossy lobes times
-    /// `n.v`, and less for wide ones). The bound holds at every surface point whose normal and view lie within `reach` of those of
-    /// `point` (the sum of both chords of the unit sphere); `point.cos_o` must be the lowest of all these points.
-    pub fn refine(&mut self, pyramid: &LightPyramid, point: &Point, reach: f64, band: Band, tolerance: f64) {
+impl<'a> Cut<'a> {
+    /// No cut yet.
+    #[must_use]
+    pub fn new(pyramid: &'a LightPyramid) -> Self {
+        Self {
+            pyramid,
+            stack: Vec::new(),
+            nodes: Vec::new(),
+            recent: Recent(vec![None; RECENT]),
+            lists: NodeLists::default(),
+            seen: SeenLists::default(),
+            lights: Vec::new(),
+        }
+    }
+
+    /// Refines the pyramid until no node's error, for a lobe of unit weight, exceeds `tolerance` in units of the light's mean radiance (for
+    /// glossy lobes times `n.v`, and less for wide ones). The bound holds at every surface point whose normal and view lie within `reach`
+    /// of those of `point` (the sum of both chords of the unit sphere); `point.cos_o` must be the lowest of all these points.
+    pub fn refine(&mut self, point: &Point, reach: f64, band: Band, tolerance: f64) {
         let bound = Bound::new(point, reach, band);
         // The `F5` part of a lobe has a twentieth of the lobe's mean radiance, nearly all of it near the rim, where n.v is small: with
         // the same tolerance everywhere, its relative error would be twenty times that of the lobe.
+        let tolerance = tolerance * self.pyramid.mean_radiance();
         let tolerance = match band {
             Band::Diffuse(_) => tolerance,
             Band::Glossy(sharpest, ..) => tolerance * point.cos_o.max(LEAST_COS_D) * (EVEN / sharpest).min(1.0),
         };
         self.nodes.clear();
         self.stack.clear();
-        self.stack.extend(pyramid.roots());
+        self.stack.extend(self.pyramid.roots());
         while let Some(cell) = self.stack.pop() {
-            let node = pyramid.node(cell);
+            let node = self.recent.node(self.pyramid, cell);
             let centroid = widen(node.centroid);
             let cos_i = point.normal.dot(centroid);
             if cos_i < -(f64::from(node.radius) + reach) || strongest(node.energy) == 0.0 {
@@ -68,23 +87,33 @@ impl Cut {
             }
             if bound.error(&node, centroid, cos_i) > tolerance {
                 let before = self.stack.len();
-                self.stack.extend(pyramid.children(cell));
+                self.stack.extend(self.pyramid.children(cell));
                 if self.stack.len() > before {
                     continue;
                 }
             }
             self.nodes.push(node);
         }
+        self.lists.set(&self.nodes);
     }
 
     /// The nodes of the cut as light that falls on a surface point, their energies times `share`.
     pub fn lights(&mut self, point: &Point, share: f64) -> &[Incident] {
+        self.lists.seen_from(point, &mut self.seen);
+        let SeenLists { cos_i, cos_h, sin2_h, cos_d, du, du2 } = &self.seen;
         self.lights.clear();
-        for node in &self.nodes {
-            if let Some((angles, spread)) = seen_from(node, point) {
-                let energy = node.energy.map(|e| f64::from(e) * share);
-                self.lights.push(Incident { angles, energy, spread });
-            }
+        for (k, node) in self.nodes.iter().enumerate().filter(|&(k, _)| cos_i[k] > 0.0) {
+            self.lights.push(Incident {
+                angles: Angles {
+                    cos_i: cos_i[k],
+                    cos_o: point.cos_o,
+                    cos_h: cos_h[k],
+                    sin2_h: sin2_h[k],
+                    cos_d: cos_d[k],
+                },
+                energy: node.energy.map(|e| f64::from(e) * share),
+                spread: Spread { du: du[k], du2: du2[k] },
+            });
         }
         &self.lights
     }
@@ -95,6 +124,29 @@ impl Cut {
         self.nodes.iter().map(|node| (widen(node.centroid), widen(node.energy)))
     }
 }
+
+/// Cells finer than a texel that were looked at last. They are computed on demand, and neighbouring points look at the same ones.
+/// By their [`Cell::slot`].
+#[derive(Debug)]
+struct Recent(Vec<Option<(Cell, Node)>>);
+
+impl Recent {
+    /// The light of a cell.
+    #[inline]
+    fn node(&mut self, pyramid: &LightPyramid, cell: Cell) -> Node {
+        if cell.is_at_least_a_texel() {
+            return pyramid.node(cell);
+        }
+        let slot = &mut self.0[cell.slot(RECENT)];
+        match slot {
+            Some((found, node)) if *found == cell => *node,
+            _ => slot.insert((cell, pyramid.node(cell))).1,
+        }
+    }
+}
+
+/// Number of cells that are kept: they fit into the second-level cache.
+const RECENT: usize = 4096;
 
 /// Bounds the error of taking a node as a point, for a band and the surface points around a given one.
 struct Bound<'a> {

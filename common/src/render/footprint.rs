@@ -22,21 +22,17 @@ pub fn positions(spread_rad: f64, alpha: f64) -> Vec<Position> {
     tensor(order(spread_rad, alpha))
 }
 
-/// Positions for a pixel that the silhouette cuts: the first 32 points of a low-discrepancy sequence at which `hit(x, y)` holds, so
+/// Positions for a pixel that the silhouette cuts: the first `count` points of a low-discrepancy sequence at which `hit(x, y)` holds, so
 /// that a barely covered pixel gets as many as one that is almost full. Empty if no point hits.
 #[must_use]
-pub fn on_object(hit: impl Fn(f64, f64) -> bool) -> Vec<Position> {
+pub fn on_object(count: usize, hit: impl Fn(f64, f64) -> bool) -> Vec<Position> {
     let stream = PointStream::new(SILHOUETTE_STREAM);
     let points = (0..SILHOUETTE_TRIES).map(|index| stream.point(index)).filter(|&[x, y, ..]| hit(x, y));
-    let mut positions: Vec<Position> =
-        points.take(SILHOUETTE_POSITIONS).map(|[x, y, ..]| Position { x, y, weight: 1.0 }).collect();
+    let mut positions: Vec<Position> = points.take(count).map(|[x, y, ..]| Position { x, y, weight: 1.0 }).collect();
     let weight = 1.0 / positions.len() as f64;
     positions.iter_mut().for_each(|p| p.weight = weight);
     positions
 }
-
-/// Positions in a pixel that the silhouette cuts.
-const SILHOUETTE_POSITIONS: usize = 32;
 
 /// Points of the pixel that are tried: enough to find an object that covers a 256th of the pixel.
 const SILHOUETTE_TRIES: u32 = 1024;

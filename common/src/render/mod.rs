@@ -9,6 +9,7 @@
 mod blur;
 pub mod cut;
 pub mod footprint;
+mod grid;
 pub mod image;
 pub mod integrator;
 pub mod knots;

@@ -66,6 +66,21 @@ pub struct Cell {
     column: u32,
 }
 
+impl Cell {
+    /// Whether its light is stored, not computed on demand.
+    #[inline]
+    pub(super) fn is_at_least_a_texel(self) -> bool {
+        self.level >= 0
+    }
+
+    /// Its place in a list of `count` recent cells.
+    #[inline]
+    pub(super) fn slot(self, count: usize) -> usize {
+        let place = (self.row as usize).wrapping_mul(61) + self.column as usize;
+        (place + 977 * usize::from(self.level.unsigned_abs())) % count
+    }
+}
+
 #[derive(Debug)]
 struct Level {
     rows: u32,

@@ -1,15 +1,25 @@
 use super::*;
 use crate::{
-    brdf::{self, Incident, MODELS, Tail, lobe_terms},
+    brdf::{self, Angles, Incident, MODELS, Spread, Tail, lobe_terms},
     image::Image,
     light::Environment,
-    math::to_f32,
+    math::{frame::Frame, to_f32},
     render::{
         cut::{Band, Cut},
         pyramid::LightPyramid,
     },
 };
 use glam::DMat3;
+
+/// The angles of a node's light at a surface point, and the effect of its spread on them; `None` if all of it is below the horizon.
+fn seen_from(node: &Node, point: &Point) -> Option<(Angles, Spread)> {
+    let (mut nodes, mut seen) = (NodeLists::default(), SeenLists::default());
+    nodes.set(&[*node]);
+    nodes.seen_from(point, &mut seen);
+    let SeenLists { cos_i, cos_h, sin2_h, cos_d, du, du2 } = seen;
+    let angles = Angles { cos_i: cos_i[0], cos_o: point.cos_o, cos_h: cos_h[0], sin2_h: sin2_h[0], cos_d: cos_d[0] };
+    (angles.cos_i > 0.0).then_some((angles, Spread { du: du[0], du2: du2[0] }))
+}
 
 /// Directions on a skew grid of `size` (chord) around a direction, all of the same energy.
 fn grid(centre: Vec3, size: f64) -> Vec<Vec3> {
@@ -144,8 +154,8 @@ fn grazing_views_reflect_the_albedo_of_the_lobe() {
     for (alpha, cos_o, expected) in EXPECTED {
         let normal = Vec3::new((1.0_f64 - cos_o * cos_o).sqrt(), 0.0, cos_o);
         let point = Point::new(normal, Vec3::Z).unwrap();
-        let (mut cut, mut sums) = (Cut::default(), [0.0; 6]);
-        cut.refine(&pyramid, &point, 0.0, Band::Glossy(alpha, 2.0 * alpha, Tail::Short), 1e-3);
+        let (mut cut, mut sums) = (Cut::new(&pyramid), [0.0; 6]);
+        cut.refine(&point, 0.0, Band::Glossy(alpha, 2.0 * alpha, Tail::Short), 1e-3);
         lobe.accumulate(cut.lights(&point, 1.0), cos_o, &[alpha], &mut sums);
         let found = sums[0] + sums[3];
         assert!((found - expected).abs() < TOLERANCE, "alpha {alpha} cos_o {cos_o}: {found} {expected}");
