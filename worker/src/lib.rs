@@ -93,17 +93,20 @@ pub fn run_and_report(options: &WorkerOptions, registry: Registry) -> ExitCode {
         && let Some(address) = session::address(options)
     {
         let patience = humantime::format_duration(options.reconnect_for);
-        // Its reader may be gone.
-        let _ = writeln!(std::io::stderr(), "connecting to the coordinator at {address}, for at most {patience}");
+        print_line(&format!("connecting to the coordinator at {address}, for at most {patience}"));
     }
     match run(options, registry) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            // The reader of stderr may have closed it.
-            let _ = writeln!(std::io::stderr(), "error: {}", error.with_causes());
+            print_line(&format!("error: {}", error.with_causes()));
             ExitCode::from(error.exit_code())
         }
     }
+}
+
+/// Prints a line on stderr, in one piece: others write there too. It may be closed.
+fn print_line(text: &str) {
+    let _ = std::io::stderr().write_all(format!("{text}\n").as_bytes());
 }
 
 /// `lookalike-worker` on its command line.

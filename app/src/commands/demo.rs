@@ -4,6 +4,7 @@ use crate::{
     demo::{environment, material, photo},
     fit::{self, FitJob},
     outputs::{Claim, ClaimedFolder, FIT_FILES, OldFiles, OutFolder, Panel, Pictures, print_result, strip},
+    progress::print_line,
     settings::{ClusterSettings, DemoSettings},
 };
 use anyhow::Context;
@@ -32,7 +33,7 @@ pub(crate) fn run(settings: DemoSettings) -> anyhow::Result<ExitCode> {
     let old = if settings.force { OldFiles::Replace } else { OldFiles::ReplaceDemo };
     let files = FIT_FILES.into_iter().chain(FILES).collect();
     let out = ClaimedFolder::take(&Claim { command: "demo", files, ..Claim::of_fit(&settings.out, old) })?.begin()?;
-    eprintln!("making a photo of a pearl paint under lacquer, in a pavilion with four windows");
+    print_line("making a photo of a pearl paint under lacquer, in a pavilion with four windows");
     let map = environment::lat_long(MAP_ROWS);
     let light = Arc::new(Environment::new(map.clone()).context("the demo's light")?);
     let geometry = Geometry::sphere(SIZE, SIZE, Circle::inscribed(SIZE, SIZE), Camera::Orthographic)

@@ -12,7 +12,7 @@ use crate::run::{Clock, Session, cpu_seconds};
 use crate::{
     exit::Exit,
     outputs::{FitRecord, OutFolder, Pictures, Timing, print_summary},
-    progress::{Display, Ending, PartCount, PartEvent, Shape, display},
+    progress::{Display, Ending, PartCount, PartEvent, Shape, display, print_line},
     settings::{ClusterSettings, MetricsAddress, ProgressKind},
 };
 use anyhow::Context;
@@ -74,7 +74,10 @@ pub(crate) fn run(job: FitJob) -> anyhow::Result<Option<Finished>> {
     let best = final_score(&method, &outcome);
     let missed = job.max_cssim.is_some_and(|limit| best > limit);
     if let (true, Some(limit)) = (missed, job.max_cssim) {
-        eprintln!("the match has a score of {best:.4} (--judge {}), more than --max-cssim {limit}", method.judge);
+        print_line(&format!(
+            "the match has a score of {best:.4} (--judge {}), more than --max-cssim {limit}",
+            method.judge
+        ));
     }
     let code = if missed { Exit::MissedMaxCssim } else { Exit::Done };
     Ok(Some(Finished { outcome, pictures, code: code.into() }))

@@ -28,7 +28,7 @@ use crate::{
     fit::version,
     inputs::{load_environment, show_warnings},
     outputs::{Claim, ClaimedFolder, OldFiles, print_result},
-    progress::{Display, Ending, PartCount, Shape, display},
+    progress::{Display, Ending, PartCount, Shape, display, print_line},
     run::Session,
     settings::{EnvironmentSettings, StudySettings},
 };
@@ -106,7 +106,7 @@ pub(crate) fn run(settings: StudySettings) -> anyhow::Result<ExitCode> {
     display.finish(problem.as_deref().map_or(Ending::Finished, Ending::Failed));
     let failed = failed?;
     for cell in &failed {
-        eprintln!("failed: {cell}");
+        print_line(&format!("failed: {cell}"));
     }
     let page = inputs.out.file("report.html");
     print_result(&format!("{}\n", page.display())).context("cannot write to stdout")?;
