@@ -159,11 +159,11 @@ mod tests {
         }
     }
 
-    /// A lobe around a fixed direction, with a width of five nodes: the function is smooth over the axis and up to the edge.
+    /// A lobe around a fixed direction, as wide as 1 / .22 nodes: also over the axis and up to the edge.
     #[test]
-    fn smooth_functions_are_interpolated_to_a_thousandth_of_their_peak() {
+    fn lobes_are_interpolated_to_three_thousandths_of_their_peak() {
         for viewpoint in viewpoints() {
-            let grid = Grid::new(viewpoint, 0.06);
+            let grid = Grid::new(viewpoint, 0.22 * 0.3);
             for centre in [Vec3::Z, Vec3::new(0.1, 0.1, 1.0), Vec3::X, Vec3::new(-1.0, 0.3, 0.5)].map(Vec3::normalize) {
                 let lobe = |normal: Vec3| {
                     let x2 = normal.cross(centre).length_squared() / 0.09;
@@ -172,7 +172,7 @@ mod tests {
                 let values: Vec<f64> = (0..grid.nodes()).map(|node| lobe(grid.point(node).unwrap().normal)).collect();
                 for normal in normals(viewpoint) {
                     let sum: f64 = grid.stencil(normal).iter().map(|&(node, weight)| weight * values[node]).sum();
-                    assert!((sum - lobe(normal)).abs() < 1e-3, "{viewpoint:?} {normal}: {sum} {}", lobe(normal));
+                    assert!((sum - lobe(normal)).abs() < 3e-3, "{viewpoint:?} {normal}: {sum} {}", lobe(normal));
                 }
             }
         }

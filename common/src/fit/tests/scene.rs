@@ -57,7 +57,9 @@ pub(super) fn capture_of(
     let pixels: Vec<Pixel> = places.map(|place| place.map(|x| u32::try_from(x).unwrap())).collect();
     let width = model.lobes().iter().find_map(|basis| basis.width_at(parameters)).unwrap();
     let knots = Knots::covering(width / 1.3, width * 1.3, PER_OCTAVE);
-    let plan = TransportPlan { model, knots, accuracy: Accuracy::FULL };
+    // Finer than any table of a fit.
+    let accuracy = Accuracy { tolerance: 5e-4, footprint: 1.0 };
+    let plan = TransportPlan { model, knots, accuracy };
     let table = plan.integrate(&geometry, &LightPyramid::new(room()), &pixels);
     let (width, height) = (columns, rows);
     let view = FullView { model, table: &table, pixels: &pixels, coverage: &coverage, stride: 1, width, height };

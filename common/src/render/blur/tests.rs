@@ -115,7 +115,8 @@ fn light_that_the_horizon_cuts_counts_only_above_it() {
         let n = 1000;
         let spread = |k: i32| cos_i + 0.1 * ((f64::from(k) + 0.5) / f64::from(n) - 0.5);
         let mean = (0..n).map(|k| spread(k).max(0.0)).sum::<f64>() / f64::from(n);
-        let found = above_horizon(cos_i, 0.01 / 12.0, 0.1);
+        let [cos, variance, radius] = [cos_i, 0.01 / 12.0, 0.1].map(|x| Lanes::splat(pulp::Scalar, x));
+        let found = above_horizon(cos, variance, radius).value;
         assert!((found - mean).abs() < 1e-6, "{cos_i}: {found} {mean}");
     }
 }
