@@ -143,7 +143,7 @@ impl Lobe for Sheen {
     }
 
     fn care(&self) -> f64 {
-        4.0 * CARE
+        12.0 * CARE
     }
 
     fn bend(&self) -> f64 {
