@@ -15,7 +15,7 @@ use serde_json::Value;
 
 use crate::PATIENCE;
 use crate::journal::{JournalView, damage_an_output, tear};
-use crate::process::{Process, signal};
+use crate::process::{Process, signal_if_there};
 use crate::proxy::Proxy;
 
 /// How many faults there are in a run, at least and at most.
@@ -344,17 +344,15 @@ struct Processes(Vec<u32>);
 impl Processes {
     /// Signal a process, which may have ended meanwhile.
     fn signal(&self, process: u32, name: &str) {
-        if is_worker(process) {
-            signal(process, name);
-        }
+        // It may end between the question and the signal.
+        let _ = is_worker(process) && signal_if_there(process, name);
     }
 }
 
 impl Drop for Processes {
     fn drop(&mut self) {
         for process in self.0.iter().filter(|process| is_worker(**process)) {
-            // An error means that it has ended meanwhile.
-            let _ = Command::new("kill").args(["-KILL", &process.to_string()]).status();
+            signal_if_there(*process, "KILL");
         }
     }
 }

@@ -127,9 +127,17 @@ pub fn kill_if_alive(process: u32) {
 /// # Panics
 /// When there is no such process.
 pub fn signal(process: u32, name: &str) {
+    assert!(signal_if_there(process, name), "cannot send {name} to process {process}");
+}
+
+/// Send a signal by its name to a process of the test that may have ended. Returns whether it was there.
+///
+/// # Panics
+/// For a process that no test starts.
+pub fn signal_if_there(process: u32, name: &str) -> bool {
     assert!(process > 1, "not a process of ours: {process}");
-    let status = Command::new("sh").args(["-c", &format!("kill -{name} {process}")]).status();
-    assert!(status.is_ok_and(|status| status.success()), "cannot send {name} to process {process}");
+    let status = Command::new("sh").args(["-c", &format!("kill -{name} {process}")]).stderr(Stdio::null()).status();
+    status.is_ok_and(|status| status.success())
 }
 
 /// The standard error of a process as text.
