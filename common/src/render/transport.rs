@@ -332,3 +332,6 @@ fn bands(lobe: &dyn Lobe, widths: &[f64], ratio: f64) -> Vec<(Band, Range<usize>
         })
         .collect()
 }
+
+#[cfg(test)]
+mod tests;
