@@ -33,9 +33,9 @@ pub struct Accuracy {
 
 impl Accuracy {
     /// Tables of stage one.
-    pub const SUBSET: Self = Self { tolerance: 1.5e-3, footprint: 2.0 };
+    pub const SUBSET: Self = Self { tolerance: 1e-3, footprint: 2.0 };
     /// Full-resolution tables of stage two and polish.
-    pub const FULL: Self = Self { tolerance: 1e-2, footprint: 3.0 };
+    pub const FULL: Self = Self { tolerance: 5e-3, footprint: 3.0 };
     /// Tables of the coarse picture, on which stage three finds the lobe to start from.
     pub const COARSE: Self = Self { tolerance: 3e-2, footprint: 10.0 };
 

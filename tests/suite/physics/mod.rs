@@ -25,6 +25,12 @@ use std::collections::BTreeSet;
 /// Largest root mean square deviation of tables of stage one, as a share of mean radiance (design section 5).
 const TOLERANCE: f64 = 2e-3;
 
+/// The same of full-resolution tables: stage two and polish rank images that differ by far more.
+const FULL_TOLERANCE: f64 = 5e-3;
+
+/// The accuracies of tables that are compared, and what each must keep.
+const ACCURACIES: &[(Accuracy, f64)] = &[(Accuracy::SUBSET, TOLERANCE), (Accuracy::FULL, FULL_TOLERANCE)];
+
 /// The target accuracy of a reference.
 #[derive(Debug, Clone, Copy)]
 struct Rigour {

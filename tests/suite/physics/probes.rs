@@ -1,14 +1,11 @@
 //! Tables against the direct integrator under real light: takes minutes, so it needs `--features slow`.
 
-use super::{Case, THOROUGH, TOLERANCE};
-use lookalike::{brdf::MODELS, render::transport::Accuracy, scene::Camera};
+use super::{ACCURACIES, Case, THOROUGH};
+use lookalike::{brdf::MODELS, scene::Camera};
 use lookalike_tests::scene::{
     Scene,
     probes::{GRACE, NOON_GRASS, Probe, RNL, STUDIO, UFFIZI},
 };
-
-/// Root mean square deviation of full-resolution tables: stage two and polish rank images that differ by far more.
-const FULL_TOLERANCE: f64 = 5e-3;
 
 /// Half-way between knots, over the widths of common materials.
 const ALPHAS: [f64; 6] = [0.01, 0.025, 0.06, 0.15, 0.4, 0.95];
@@ -22,7 +19,7 @@ fn agree(probe: Probe) {
         models: MODELS.to_vec(),
         alphas: &ALPHAS,
         pixels: 64,
-        accuracies: &[(Accuracy::SUBSET, TOLERANCE), (Accuracy::FULL, FULL_TOLERANCE)],
+        accuracies: ACCURACIES,
         rigour: THOROUGH,
     };
     case.check(&case.integrate());

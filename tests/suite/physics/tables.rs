@@ -6,7 +6,7 @@
 //! By default the integrator's means and variances are read from a file. With `--features slow` they are integrated again, for more
 //! pixels.
 
-use super::{Case, EFFORT, Rigour, TOLERANCE, knots, stored};
+use super::{ACCURACIES, Case, EFFORT, Rigour, knots, stored};
 use lookalike::{
     brdf::{CookTorrance, Ggx, MODELS, Material, Model, Split},
     render::{
@@ -20,8 +20,6 @@ use lookalike_tests::scene::{
     reference::{Effort, Reference},
     spread, synthetic,
 };
-
-const SUBSET: &[(Accuracy, f64)] = &[(Accuracy::SUBSET, TOLERANCE)];
 
 /// A comparison and its numbers of pixels.
 pub(super) struct Comparison {
@@ -50,20 +48,20 @@ impl Comparison {
 fn room(pixels: usize, rigour: Rigour) -> Case {
     let scene = Scene::sphere(256, Camera::Orthographic, synthetic::room(128)).unwrap();
     let (models, alphas) = (MODELS.to_vec(), &[0.01, 0.4]);
-    Case { name: "room", scene, models, alphas, pixels, accuracies: SUBSET, rigour }
+    Case { name: "room", scene, models, alphas, pixels, accuracies: ACCURACIES, rigour }
 }
 
 fn sun(pixels: usize, rigour: Rigour) -> Case {
     let scene = Scene::sphere(256, Camera::Orthographic, synthetic::one_texel_sun(256, 80, 100)).unwrap();
     let splits = |model: &&&dyn Model| model.lobes().iter().any(|basis| basis.lobe.split() == Split::Schlick);
     let (models, alphas) = (MODELS.iter().filter(splits).copied().collect(), &[0.01, 0.1]);
-    Case { name: "sun", scene, models, alphas, pixels, accuracies: SUBSET, rigour }
+    Case { name: "sun", scene, models, alphas, pixels, accuracies: ACCURACIES, rigour }
 }
 
 fn perspective(pixels: usize, rigour: Rigour) -> Case {
     let scene = Scene::sphere(256, Camera::perspective(50.0).unwrap(), synthetic::room_at_dusk(64)).unwrap();
     let (models, alphas): (Vec<&dyn Model>, _) = (vec![&Ggx, &CookTorrance], &[0.1]);
-    Case { name: "perspective", scene, models, alphas, pixels, accuracies: SUBSET, rigour }
+    Case { name: "perspective", scene, models, alphas, pixels, accuracies: ACCURACIES, rigour }
 }
 
 /// The whole path under light with texture, windows and a sun of one texel: both lobes and both Fresnel parts of every model.

@@ -36,8 +36,8 @@ fn tables_on_a_grid_of_normals_agree_with_integrals_at_the_pixels() {
                 pixels.chunks(16).map(|pixels| plan.integrate(&geometry, &pyramid, pixels)).collect();
             let parts = TransportTable::concatenate(&parts.iter().collect::<Vec<_>>()).unwrap();
             for (lobe, (whole, parts)) in whole.lobes.iter().zip(&parts.lobes).enumerate() {
-                // A grid for the cosine lobe has more nodes than this image has pixels.
-                assert_eq!(whole == parts, lobe == 0, "on a grid twice, or never");
+                // A grid for the cosine lobe may have more nodes than this image has pixels.
+                assert!(lobe == 0 || whole != parts, "on a grid twice, or never");
                 for (plane, (whole, parts)) in
                     whole.values.chunks(pixels.len()).zip(parts.values.chunks(pixels.len())).enumerate()
                 {
