@@ -177,7 +177,7 @@ fn form<S: Simd>([a, b, c]: Lanes3<S>, v: [Lanes<S>; 2], w: [Lanes<S>; 2]) -> La
 fn tangents<S: Simd>([x, y, z]: Lanes3<S>) -> [Lanes3<S>; 2] {
     let sign = z.signum();
     let minus_a = (sign + z).inverse();
-    let zero = sign - sign;
+    let zero = Lanes::splat_like(x, 0.0);
     let b = zero - x * y * minus_a;
     let one = Lanes::splat_like(x, 1.0);
     [[one - sign * x * x * minus_a, sign * b, zero - sign * x], [b, sign - y * y * minus_a, zero - y]]
@@ -190,7 +190,7 @@ fn tangents<S: Simd>([x, y, z]: Lanes3<S>) -> [Lanes3<S>; 2] {
 fn above_horizon<S: Simd>(cos_i: Lanes<S>, variance: Lanes<S>, radius: Lanes<S>) -> Lanes<S> {
     // Rounding may make a variance of 0 negative.
     let reach = (variance.max(0.0) * 3.0).sqrt().min(radius);
-    let (zero, above) = (reach - reach, cos_i + reach);
+    let (zero, above) = (Lanes::splat_like(reach, 0.0), cos_i + reach);
     let partly = above * above / (reach.max(f64::MIN_POSITIVE) * 4.0);
     zero.if_less(above, cos_i.if_less(reach, partly, cos_i), zero)
 }
