@@ -214,13 +214,15 @@ impl View<'_> {
         if part.lobe.footprint(width, 0.0) < width {
             return None;
         }
-        let grid = Grid::new(viewpoint, width * spacing(part.band));
         let points: Vec<Vec<Seen>> =
             self.pixels.par_iter().map(|&pixel| self.points(0, pixel, part, MOST_POSITIONS)).collect();
         let positions: usize = points.iter().map(Vec::len).sum();
-        if grid.nodes() > SPARSEST * positions {
+        let spacing = width * spacing(part.band);
+        let rings = viewpoint.reach_rad() / spacing;
+        if rings * rings > SPARSEST * positions as f64 {
             return None;
         }
+        let grid = Grid::new(viewpoint, spacing);
         let mut place_of = vec![usize::MAX; grid.nodes()];
         points
             .iter()
@@ -272,8 +274,8 @@ fn spacing(band: Band) -> f64 {
     }
 }
 
-/// A grid of so many nodes for each position is not looked at any further.
-const SPARSEST: usize = 16;
+/// A grid whose rings, squared, are more than this for each position is not made: most of its nodes would be of no use.
+const SPARSEST: f64 = 6.0;
 
 /// Most nodes of a grid for each position that they replace: a node costs as much as a position, and interpolation a little.
 const WORTH: f64 = 0.8;
