@@ -132,7 +132,7 @@ def tables(figures):
             tenths = ", ".join(f"{tenth:.0f}" for tenth in best["tenths_us_per_node"])
             cpu = [f"{best[f'{who}_cpu_us_per_node']:.0f} us" for who in ("coordinator", "workers")]
             lines.append(f"| {nodes:,} | {tenths} | {cpu[0]} | {cpu[1]} | {best['coordinator_peak_mib']:.0f} MiB |")
-    lines += ["", "| what happens | noticed after | its nodes run elsewhere, or the first new result comes, after | finished nodes that ran twice |", "|---|---:|---:|---:|"]
+    lines += ["", "| what happens | noticed after | work continues after | finished nodes that ran twice |", "|---|---:|---:|---:|"]
     for measured in found:
         name = measured["measurement"]
         if name.startswith("worker-SIG"):
