@@ -4,7 +4,8 @@
 Usage: publish_study.py OUT docs [NAME]
 
 OUT is the folder of `lookalike study ... --out OUT`. Writes docs/NAME.md, docs/NAME.json and docs/NAME/ (emptied first), NAME being "results" if
-left out, and makes the page's links point there. Nothing is typed: the page is the one that the study wrote.
+left out, and makes the page's links point there. The page is the one that the study wrote; a note that was added to the previous page by hand, such
+as that its figures are older than the program, is replaced with it.
 """
 import re
 import shutil
