@@ -3,7 +3,7 @@
 //! `f = 28/(23 pi) kd (1 - f0) (1 - (1 - n.l/2)^5) (1 - (1 - n.v/2)^5) + F (n + 1)/(8 pi) (n.h)^n / (v.h max(n.l, n.v))` with
 //! `F = f0 + (1 - f0) F5`, `F5 = (1 - v.h)^5`
 //!
-//! (Ashikhmin & Shirley 2000, with both exponents equal; Fresnel term of Schlick 1994.) The diffuse lobe loses what the specular lobe
+//! (Ashikhmin & Shirley 2000 \[AS00\], with both exponents equal; Fresnel term of Schlick 1994.) The diffuse lobe loses what the specular lobe
 //! reflects, so that both together conserve energy. Split: the weights are `kd (1 - f0)`, `f0` and 1. The first is a product of two
 //! parameters; the scan solves for the product instead of `kd`.
 //!

@@ -2,8 +2,8 @@
 //!
 //! `f = kd/pi + ks D / (4 max(n.l, n.v))`, `D = (n + 2)/(2 pi) (n.h)^n`
 //!
-//! (Blinn 1977; `D` is normalised as a distribution of microfacets, and the division by the larger cosine is that of Neumann, Neumann &
-//! Szirmay-Kalos 1999.) There is no Fresnel term: the lobe has one weight, `ks`. The albedo of the lobe is at most 1.
+//! (Blinn 1977 \[B77\]; `D` is normalised as a distribution of microfacets, and the division by the larger cosine is that of Neumann,
+//! Neumann & Szirmay-Kalos 1999 \[NNS99\].) There is no Fresnel term: the lobe has one weight, `ks`. The albedo of the lobe is at most 1.
 //! That of a sharp lobe is `n.v`, because the `1/(v.h)` of microfacets is missing.
 //!
 //! The lobe gets narrower as `n` grows: its width is `alpha = sqrt(2/(n + 2))`, for which `D` has the peak of GGX and Beckmann,

@@ -4,8 +4,8 @@
 //! - `D = exp(-tan^2(th) / m^2) / (pi m^2 cos^4(th))` (Beckmann),
 //! - `G = min(1, 2 n.h n.v / v.h, 2 n.h n.l / v.h)` (V-cavities)
 //!
-//! (Cook & Torrance 1982, in the form used by Bieron & Peers, EGSR 2020, and Ngan et al. 2005: Schlick's Fresnel term and
-//! the factor 4 of microfacet theory.) Split: the weights are `kd`, `ks f0` and `ks`.
+//! (Cook & Torrance 1982 \[CT82\], in the form used by Bieron & Peers 2020 \[BP20a\] and Ngan et al. 2005 \[NDM05\]: Schlick's Fresnel
+//! term and the factor 4 of microfacet theory.) Split: the weights are `kd`, `ks f0` and `ks`.
 //!
 //! | parameter | meaning | bounds |
 //! |---|---|---|

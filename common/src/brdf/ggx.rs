@@ -1,9 +1,9 @@
 //! `ggx`: diffuse plus a GGX microfacet lobe.
 //!
 //! `f = kd/pi + F D V` with
-//! - `D = a^2 / (pi ((n.h)^2 (a^2 - 1) + 1)^2)` (Walter et al. 2007; Trowbridge & Reitz 1975),
-//! - `V` the height-correlated Smith masking-shadowing with `1/(4 n.l n.v)` inside (Heitz 2014, eq. 99),
-//! - `F = f0 + (1 - f0) F5`, `F5 = (1 - v.h)^5` (Schlick 1994).
+//! - `D = a^2 / (pi ((n.h)^2 (a^2 - 1) + 1)^2)` (Walter et al. 2007 \[WMLT07\]; Trowbridge & Reitz 1975 \[TR75\]),
+//! - `V` the height-correlated Smith masking-shadowing with `1/(4 n.l n.v)` inside (Heitz 2014 \[H14\], eq. 99),
+//! - `F = f0 + (1 - f0) F5`, `F5 = (1 - v.h)^5` (Schlick 1994 \[S94\]).
 //!
 //! Split: `F = f0 (1 - F5) + F5`, so the weights are `kd`, `f0` and 1.
 //!

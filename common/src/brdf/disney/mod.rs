@@ -9,7 +9,7 @@
 //! - `D_c`: the distribution with the long tail, `1/(a^2 + tan^2)` to the first power (GTR 1), `a = 0.1 - 0.099 clearcoat_gloss`; `G_c`
 //!   Smith's masking of width 0.25; `F_c = 0.04 + 0.96 F5` (`disney/specular.rs`).
 //!
-//! (Burley 2012, sections 5.3 to 5.6 and the reference implementation, `disney.brdf`; its `specularTint`, `sheenTint` and `anisotropic`
+//! (Burley 2012 \[B12\], sections 5.3 to 5.6 and the reference implementation, `disney.brdf`; its `specularTint`, `sheenTint` and `anisotropic`
 //! are 0.) The Fresnel term is split as in `ggx`. The diffuse lobes are polynomials of the second degree in the roughness, so each is three
 //! basis lobes without a grid of widths.
 //!
