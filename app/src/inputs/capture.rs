@@ -33,9 +33,9 @@ pub struct LoadedCapture {
     pub mask: Option<InputFile>,
     /// The normal map's file.
     pub normals: Option<InputFile>,
-    /// Where the sphere's circle came from; none for a normal map.
+    /// Where the sphere's circle came from; `None` for a normal map.
     pub circle_source: Option<CircleSource>,
-    /// What the user should know, of all files and of the whole.
+    /// Warnings about each file and about the files together.
     pub warnings: Vec<String>,
 }
 
@@ -59,12 +59,12 @@ impl LoadedCapture {
 /// Reads the photo of a fit with its mask, its shape and its light, and checks them against each other.
 ///
 /// # Errors
-/// Those of the loaders, and of [`Capture::new`] when the parts do not fit each other or nothing can be fitted to.
+/// Those of the loaders, and of [`Capture::new`] if the parts do not match each other or no pixel can be fitted.
 pub fn load_capture(files: &CaptureSettings) -> anyhow::Result<LoadedCapture> {
     load_capture_under(files, load_environment)
 }
 
-/// As [`load_capture`], with the light from `light`, which may have it already.
+/// As [`load_capture`], but `light` loads the environment map; it may return one that is already in memory.
 ///
 /// # Errors
 /// Those of [`load_capture`] and of `light`.
@@ -85,7 +85,7 @@ pub fn load_capture_under(
     let (mask_source, mask) = mask.map(|loaded| (loaded.source, loaded.mask)).unzip();
     let input = CaptureInput { photo: image, clipped, mask, geometry: shape.geometry, environment };
     let capture = Capture::new(input).with_context(|| cannot_use(&files.photo, "photo"))?;
-    // The warnings of the normal map are in the list already, with its name.
+    // The list already has the warnings of the normal map, with the name of its file.
     let of_normals = capture.geometry().normal_map().map_or(&[][..], |map| map.warnings());
     warnings.extend(capture.warnings().iter().filter(|text| !of_normals.contains(text)).cloned());
     Ok(LoadedCapture {

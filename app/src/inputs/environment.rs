@@ -12,21 +12,21 @@ use std::sync::Arc;
 /// An environment map with its origin.
 #[derive(Debug, Clone)]
 pub struct LoadedEnvironment {
-    /// The light, canonical and rotated as asked for.
+    /// The light as a lat-long map, rotated by the angle of the settings.
     pub environment: Arc<Environment>,
     /// The layout of the file, given or recognised.
     pub mapping: Mapping,
     /// The file, with the hash of its pixels before any conversion of layout or rotation.
     pub source: InputFile,
-    /// What the user should know.
+    /// Warnings for the user.
     pub warnings: Vec<String>,
 }
 
-/// Reads the environment map: OpenEXR, Radiance HDR or PFM, in the layout that was asked for or that its shape tells.
+/// Reads the environment map: OpenEXR, Radiance HDR or PFM, in the given layout, or the one that its shape implies.
 ///
 /// # Errors
-/// If the file cannot be read or decoded, holds display values (PNG, JPEG), has no known layout, a texel that is negative or
-/// not finite, or no light.
+/// If the file cannot be read or decoded, holds display values (PNG, JPEG), has an unknown layout or a texel that is negative or
+/// not finite, or contains no light.
 pub fn load_environment(settings: &EnvironmentSettings) -> anyhow::Result<LoadedEnvironment> {
     let path = &settings.path;
     let decoded = read_with(path, ROLE, |name, bytes| radiance(decode(name, bytes)?))?;

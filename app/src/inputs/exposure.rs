@@ -1,4 +1,4 @@
-//! `--display-exposure`: computes or reads the number that the flag stands for.
+//! `--display-exposure`: computes or reads the factor that the flag means.
 
 use super::file::read_with;
 use crate::settings::DisplayExposure;
@@ -10,8 +10,8 @@ use lookalike::{
 use serde_json::Value;
 use std::path::Path;
 
-/// The factor of the display transform. `reference` is the image that decides an automatic exposure, over its pixels of
-/// `coverage` 1 (one value per pixel).
+/// The factor of the display transform. An automatic exposure is computed from the pixels of `reference` whose `coverage` (one value per
+/// pixel) is 1.
 ///
 /// # Errors
 /// If there is no light to expose for, or the file that holds the factor cannot be used.
@@ -26,7 +26,7 @@ pub fn resolve_display_exposure(asked: &DisplayExposure, reference: &Image, cove
 /// The factor that an earlier run used, from its `fit.json` or the metadata of one of its images.
 ///
 /// # Errors
-/// If the file cannot be read, is neither, or holds no such number.
+/// If the file cannot be read, is neither a `fit.json` nor an image, or holds no such number.
 pub fn load_display_exposure(path: &Path) -> anyhow::Result<f64> {
     read_with(path, "source of the display exposure", |name, bytes| {
         if Format::sniff(bytes).is_some() { of_image(name, bytes) } else { of_json(bytes) }

@@ -9,17 +9,17 @@ use std::{
     path::{Path, PathBuf},
 };
 
-/// A file that shaped a result: its path as given, and the BLAKE3 of what was decoded from it.
+/// A file that a result depends on: its path as given, and the BLAKE3 of its decoded content.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct InputFile {
     /// The path as the user gave it.
     pub path: PathBuf,
-    /// 64 hexadecimal digits: of the decoded pixels for images, of the bytes for tables.
+    /// 64 hexadecimal digits: the hash of the decoded pixels of an image, or of the bytes of a table.
     pub blake3: String,
 }
 
 impl InputFile {
-    /// The file `path` of which `image` was decoded.
+    /// The file `path`, from which `image` was decoded.
     #[must_use]
     pub fn of_image(path: &Path, image: &Image) -> Self {
         Self { path: path.to_owned(), blake3: content_hash(image).to_hex().to_string() }
@@ -38,7 +38,7 @@ impl std::fmt::Display for InputFile {
     }
 }
 
-/// Reads a file and hands its name and its bytes to `decode`; whatever goes wrong says that the file was to serve as `role`.
+/// Reads a file and passes its name and bytes to `decode`. Any error names the role of the file.
 pub(super) fn read_with<T, E>(
     path: &Path,
     role: &str,

@@ -17,7 +17,7 @@ pub struct LoadedGeometry {
     pub geometry: Geometry,
     /// The normal map, if the shape is not the built-in sphere.
     pub normals: Option<InputFile>,
-    /// What the user should know.
+    /// Warnings for the user.
     pub warnings: Vec<String>,
 }
 
@@ -34,10 +34,10 @@ pub fn sphere_geometry(
     Geometry::sphere(width, height, circle, view.camera)
 }
 
-/// Reads a map of normals, which brings its own size.
+/// Reads a map of normals; the geometry has the size of the map.
 ///
 /// # Errors
-/// If the file cannot be read or decoded, or most of its vectors are no normals that face the camera.
+/// If the file cannot be read or decoded, or most of its vectors are not unit normals that face the camera.
 pub fn load_normals(path: &Path, camera: Camera) -> anyhow::Result<LoadedGeometry> {
     let map = read_with(path, ROLE, normals)?;
     let geometry = Geometry::normals(&map, camera).with_context(|| cannot_use(path, ROLE))?;
@@ -51,7 +51,7 @@ pub fn load_normals(path: &Path, camera: Camera) -> anyhow::Result<LoadedGeometr
     Ok(LoadedGeometry { geometry, normals: Some(InputFile::of_image(path, &map)), warnings })
 }
 
-/// The vectors of a map. A map with a smoothed edge, which the strict reader refuses, is left to the scene to judge.
+/// The vectors of a map. The strict reader refuses a map with a smoothed edge; such a map is read as an image, and the scene checks it.
 fn normals(name: &str, bytes: &[u8]) -> Result<Image, ImageError> {
     match decode_normals(name, bytes) {
         Ok(plane) => {

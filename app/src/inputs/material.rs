@@ -17,14 +17,14 @@ pub struct LoadedTable {
 /// Reads a table in MERL's file format.
 ///
 /// # Errors
-/// If the file cannot be read or is no such table.
+/// If the file cannot be read or is not such a table.
 pub fn load_table(path: &Path) -> anyhow::Result<LoadedTable> {
     let table = read_with(path, "measured material", MerlTable::read)?;
     let source = InputFile { path: path.to_owned(), blake3: table.content_hash().to_hex().to_string() };
     Ok(LoadedTable { table, source })
 }
 
-/// The flat parameter vector of a model from values by name. All parameters are required; one value for a colour is a grey.
+/// The flat parameter vector of a model from values by name. All parameters are required; a single value for a colour means grey.
 ///
 /// # Errors
 /// [`ParameterError::UnknownParameter`], [`ParameterError::Missing`] and [`ParameterError::Count`]; bounds are checked by the material.

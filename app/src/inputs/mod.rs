@@ -1,8 +1,8 @@
-//! From settings to the objects of the science: the files a user names are read, decoded and checked here, once.
+//! Reads, decodes and checks the files that the settings name, once, and makes the library's types of them.
 //!
-//! Every error says which file was to serve as what, what was expected and found, and what to do. An input that can be used but is doubtful
-//! comes with warnings, which the caller shows ([`show_warnings`]). Every file that shapes a result comes with the
-//! hash of its decoded content ([`InputFile`]), for `fit.json` and the metadata of images.
+//! Every error names the file and its role, and says what was expected, what was found and what to do. A usable but doubtful input has
+//! warnings, which the caller shows ([`show_warnings`]). Every file that a result depends on has the hash of its decoded content
+//! ([`InputFile`]), for `fit.json` and the metadata of images.
 //!
 //! What is deliberately absent: nothing here renders, scores or writes a file.
 

@@ -1,4 +1,4 @@
-//! Photographs and other images to look at, and masks.
+//! Photographs, other images, and masks.
 
 use super::file::{InputFile, cannot_use, read_with};
 use anyhow::Context;
@@ -12,9 +12,9 @@ use std::path::Path;
 /// An image with its origin.
 #[derive(Debug, Clone)]
 pub struct LoadedPhoto {
-    /// The pixels: linear Rec. 709; where the file has transparency, as seen over black.
+    /// The pixels: linear Rec. 709, composited over black where they are transparent.
     pub image: Image,
-    /// Opacity of every pixel, where the file has it.
+    /// Opacity of every pixel, if the file has it.
     pub alpha: Option<Vec<f32>>,
     /// For PNG and JPEG, which pixels are clipped.
     pub clipped: Option<Vec<bool>>,
@@ -24,11 +24,11 @@ pub struct LoadedPhoto {
     pub metadata: Vec<(String, String)>,
     /// The file, with the hash of [`Self::image`].
     pub source: InputFile,
-    /// What the user should know.
+    /// Warnings for the user.
     pub warnings: Vec<String>,
 }
 
-/// Reads the photo of a fit. NaN and infinities are kept: the capture decides.
+/// Reads the photo of a fit. NaN and infinities are kept; the capture excludes such pixels.
 ///
 /// # Errors
 /// If the file cannot be read or decoded.
@@ -36,7 +36,7 @@ pub fn load_photo(path: &Path) -> anyhow::Result<LoadedPhoto> {
     load_image(path, "photo")
 }
 
-/// Reads an image that serves as `role` ("reference"), a word for errors.
+/// Reads an image. Errors name its `role`, such as "reference".
 ///
 /// # Errors
 /// If the file cannot be read or decoded.
@@ -58,7 +58,7 @@ pub fn load_image(path: &Path, role: &str) -> anyhow::Result<LoadedPhoto> {
     })
 }
 
-/// Multiplies colours by their opacity unless the file stored them so; says whether that changed anything.
+/// Multiplies colours by their opacity unless the file stored them multiplied; returns whether a pixel changed.
 fn blend_over_black(decoded: &mut Decoded) -> bool {
     let is_premultiplied = decoded.is_premultiplied();
     let Some(alpha) = decoded.alpha.as_ref().filter(|alpha| !is_premultiplied && alpha.iter().any(|&a| a != 1.0))

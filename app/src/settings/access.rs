@@ -3,10 +3,10 @@
 use super::Advertise;
 use std::path::PathBuf;
 
-/// An access file to be made before the runs it is for.
+/// An access file that is created before the runs that use it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct AccessSettings {
-    /// Under which host and port workers will reach the coordinator; always with a port.
+    /// Host and port where workers will reach the coordinator; the port is always given.
     pub address: Advertise,
     /// The file to write. The coordinator's key goes beside it.
     pub out: PathBuf,

@@ -9,7 +9,7 @@ use std::{ffi::OsString, path::PathBuf};
 pub struct BatchSettings {
     /// The file that lists the fits.
     pub manifest: PathBuf,
-    /// The fits, in the order in which they are to be done; at least one, and no two of one name.
+    /// The fits, in the order of the manifest; at least one, each with a name of its own.
     pub fits: Vec<BatchFit>,
     /// The folder of results.
     pub out: PathBuf,
@@ -17,7 +17,7 @@ pub struct BatchSettings {
     pub resume: bool,
     /// Replace files with our names in the folder, never an input of the run.
     pub force: bool,
-    /// Where candidates are judged and polished.
+    /// Where stage two, polish and the pictures of each fit are computed.
     pub stage_two: StageTwo,
     /// What happens when a fit fails.
     pub on_failure: OnFailure,
@@ -29,7 +29,7 @@ pub struct BatchSettings {
     pub progress: ProgressKind,
 }
 
-/// What `lookalike batch --slurm` and `lookalike study --slurm` submit.
+/// The Slurm job that `lookalike batch --slurm` or `lookalike study --slurm` submits.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct JobSettings {
     /// The user's command line, the command first.
@@ -41,9 +41,9 @@ pub struct JobSettings {
 /// One photo of a batch, its light, and how to fit it.
 #[derive(Debug, Clone)]
 pub struct BatchFit {
-    /// Its name, which is also that of its folder: a part of a path on any file system.
+    /// Its name, which is also the name of its folder: valid on any file system.
     pub name: String,
-    /// The line of the manifest that asks for it.
+    /// The line of the manifest that lists it.
     pub line: usize,
     /// The photo with its scene.
     pub capture: CaptureSettings,
@@ -55,7 +55,7 @@ pub struct BatchFit {
     pub max_cssim: Option<f64>,
 }
 
-/// Where what follows the searches of a fit runs: judging its candidates, polish, pictures.
+/// Where stage two, polish and the pictures of a fit are computed.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, clap::ValueEnum)]
 pub enum StageTwo {
     /// In the coordinator's process
@@ -68,9 +68,9 @@ pub enum StageTwo {
 /// What a batch does when one of its fits fails.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum OnFailure {
-    /// The others continue.
+    /// Continue with the other fits.
     #[default]
     KeepGoing,
-    /// The batch stops.
+    /// Stop the batch.
     FailFast,
 }

@@ -9,13 +9,13 @@ use std::{fmt, net::SocketAddr, num::NonZeroUsize, path::PathBuf, str::FromStr, 
 pub struct ClusterSettings {
     /// Local worker processes to spawn.
     pub workers: Workers,
-    /// The log filter of the local workers; none leaves them their own default.
+    /// The log filter of the local workers. `None`: their own default.
     pub log: Option<String>,
-    /// Address to listen on; port 0 lets the system choose. None is the loopback interface.
+    /// Address to listen on. Port 0 lets the system choose. `None`: the loopback interface.
     pub listen: Option<SocketAddr>,
-    /// What the access file tells workers to connect to; none means the address listened on.
+    /// Host and port that the access file gives to workers. `None`: the address listened on.
     pub advertise: Option<Advertise>,
-    /// An access file made beforehand, to be used instead of a new one.
+    /// An access file that was created before the run. `None`: the run creates one.
     pub access: Option<PathBuf>,
     /// How workers and nodes are treated.
     pub policy: Policy,
@@ -27,7 +27,7 @@ pub enum Workers {
     /// One per core that this process may use.
     #[default]
     PerCore,
-    /// This many; with 0, only workers on other machines compute.
+    /// This many. With 0, only workers on other machines compute.
     Count(usize),
 }
 
@@ -46,7 +46,8 @@ impl Default for ClusterSettings {
 }
 
 impl ClusterSettings {
-    /// Where workers that the run does not start itself may join; none when the run needs none.
+    /// The address to listen on for workers that the run does not start. `None` if no address is given and only local workers are
+    /// expected, or if the access file has the address.
     #[must_use]
     pub fn listen_for_others(&self) -> Option<SocketAddr> {
         let waits = self.workers.count() == 0 && self.access.is_none();
@@ -93,7 +94,7 @@ impl fmt::Display for Workers {
 pub struct Advertise {
     /// A name, an IPv4 address, or an IPv6 address without its brackets.
     pub host: String,
-    /// The port; none means the one listened on.
+    /// The port. `None`: the port of the address listened on.
     pub port: Option<u16>,
 }
 
@@ -136,7 +137,7 @@ impl fmt::Display for Advertise {
     }
 }
 
-/// More processes than any machine has cores: a typing error.
+/// More processes than any machine has cores, most likely a typing error.
 const MOST_LOCAL: usize = 4096;
 
 #[cfg(test)]
@@ -154,14 +155,14 @@ mod tests {
     }
 
     #[test]
-    fn without_local_workers_others_are_listened_for() {
+    fn without_local_workers_the_run_listens_for_others() {
         let with = |workers, access: Option<&str>| {
             let access = access.map(PathBuf::from);
             ClusterSettings { workers: Workers::Count(workers), access, ..ClusterSettings::default() }
         };
         assert_eq!(with(1, None).listen_for_others(), None);
         assert_eq!(with(0, None).listen_for_others(), Some(([127, 0, 0, 1], 0).into()));
-        // Where to, the access file says.
+        // The access file has the address.
         assert_eq!(with(0, Some("a.json")).listen_for_others(), None);
     }
 

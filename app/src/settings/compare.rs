@@ -17,7 +17,7 @@ pub struct CompareSettings {
     pub map: Option<PathBuf>,
     /// The measure.
     pub metric: MetricKind,
-    /// Exposure before it.
+    /// Exposure before the measure.
     pub display_exposure: DisplayExposure,
     /// Print JSON, not text.
     pub json: bool,

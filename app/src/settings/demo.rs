@@ -8,7 +8,7 @@ use std::path::PathBuf;
 pub struct DemoSettings {
     /// The folder of results.
     pub out: PathBuf,
-    /// Replace files with our names in the folder, also those of no demo.
+    /// Replace files with our names even if no demo wrote them.
     pub force: bool,
     /// Local worker processes; never 0.
     pub workers: Workers,

@@ -1,8 +1,8 @@
-//! Settings: what a command is to do, in types that cannot hold invalid values.
+//! The settings of each command, in types that cannot hold invalid values.
 //!
 //! Raw arguments (`cli::args`, clap) become these structs in one place, with every default and rule applied; nothing
-//! downstream validates again. One struct per command. What the library knows (cameras, methods, layouts of maps) is the library's
-//! type, with its grammar (`FromStr`), its inverse (`Display`), its bounds and its one default; the other values have a file each.
+//! downstream validates again. One struct per command. Cameras, methods and layouts of maps are types of
+//! the library, each with its grammar (`FromStr`), the inverse (`Display`), its bounds and its one default; the other values have a file each.
 //!
 //! What is deliberately absent: files are not opened here, and nothing here depends on the command line's grammar.
 

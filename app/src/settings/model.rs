@@ -57,7 +57,7 @@ impl fmt::Display for ModelName {
     }
 }
 
-/// Values of a model's parameters by name, in the order given; names, counts and bounds are the model's to check.
+/// Values of a model's parameters by name, in the order given; the model checks names, counts and bounds.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct ModelParams(Vec<(String, Vec<f64>)>);
 
@@ -127,7 +127,7 @@ mod tests {
     }
 
     #[test]
-    fn malformed_parameters_say_which_one() {
+    fn errors_of_parameters_say_which_one() {
         for (text, phrase) in [
             ("kd=1,2", "kd has 2 values"),
             ("kd=1,kd=2", "kd is given twice"),

@@ -6,13 +6,13 @@ use std::{num::NonZeroUsize, path::PathBuf};
 /// A sphere, or a map of normals, of one material under one light.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RenderSettings {
-    /// What it is made of.
+    /// The material.
     pub material: Material,
     /// The light.
     pub environment: EnvironmentSettings,
     /// Camera and shape.
     pub view: ViewSettings,
-    /// Width and height of the image in pixels; a map of normals brings its own.
+    /// Width and height of the image in pixels; ignored with a map of normals, whose size counts.
     pub size_px: NonZeroUsize,
     /// Directions per pixel.
     pub samples: NonZeroUsize,

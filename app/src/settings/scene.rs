@@ -6,23 +6,23 @@ use lookalike::{
 };
 use std::path::{Path, PathBuf};
 
-/// A photo with everything that is known of its scene.
+/// A photo and its scene: mask, light, shape and camera.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CaptureSettings {
     /// The photo.
     pub photo: PathBuf,
-    /// Which pixels show the object; none means all that the silhouette covers.
+    /// Which pixels show the object. `None`: all that the silhouette covers.
     pub mask: Option<PathBuf>,
     /// The light.
     pub environment: EnvironmentSettings,
     /// Camera and shape.
     pub view: ViewSettings,
-    /// Where the sphere lies; none means fitted to the mask, else the inscribed circle.
+    /// The circle of the sphere. `None`: fitted to the mask, else the largest circle in the photo.
     pub sphere: Option<Circle>,
 }
 
 impl CaptureSettings {
-    /// The files that it is read from.
+    /// All files that the capture is read from.
     pub(crate) fn files(&self) -> Vec<&Path> {
         let others = [&self.mask, &self.view.normals].into_iter().filter_map(|path| path.as_deref());
         [self.photo.as_path(), &self.environment.path].into_iter().chain(others).collect()
@@ -34,7 +34,7 @@ impl CaptureSettings {
 pub struct EnvironmentSettings {
     /// The image file.
     pub path: PathBuf,
-    /// Its layout; none means by its shape (2:1 is lat-long, 3:4 is a cross, all else is an error).
+    /// Its layout. `None`: the layout that its shape implies (2:1 lat-long, 3:4 cross; any other shape is an error).
     pub mapping: Option<Mapping>,
     /// Rotation of the map about +Y in degrees, finite.
     pub rotation_deg: f64,

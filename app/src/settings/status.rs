@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-/// Which run, and for whom.
+/// The run, and the form of the output.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct StatusSettings {
     /// The folder of the run.

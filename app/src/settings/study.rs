@@ -20,6 +20,6 @@ pub struct StudySettings {
     pub cluster: ClusterSettings,
     /// How progress is shown.
     pub progress: ProgressKind,
-    /// The command line, for the report.
+    /// The command line, which the report shows.
     pub command: String,
 }
