@@ -8,7 +8,7 @@ use serde::de::DeserializeOwned;
 use std::{collections::BTreeMap, ffi::OsString, fs, ops::Range, path::Path};
 use toml::{Spanned, Value};
 
-/// What a settings file says, as arguments.
+/// The content of a settings file as arguments.
 #[derive(Debug, Default)]
 pub(crate) struct Config {
     /// `--name=value` or `--name`, in the order of the file.
@@ -20,7 +20,7 @@ pub(crate) struct Config {
 /// Reads the settings file of a command.
 ///
 /// # Errors
-/// If the file cannot be read, is not TOML, or holds a key or a value that the command does not take; the message
+/// If the file cannot be read, is not TOML, or has a key or a value that the command does not accept; the message
 /// names the file, the line and the key.
 pub(crate) fn read(command: &Command, path: &Path) -> anyhow::Result<Config> {
     let text = fs::read_to_string(path).with_context(|| format!("cannot read the settings file {}", path.display()))?;
@@ -33,10 +33,10 @@ fn parse(command: &Command, path: &Path, text: &str) -> anyhow::Result<Config> {
     problems.into_iter().next().map_or(Ok(config), Err)
 }
 
-/// A table of settings whose keys and values know where they stand.
+/// A table of settings with the place of each key and value in the file.
 pub(crate) type Table = BTreeMap<Spanned<String>, Spanned<Value>>;
 
-/// A TOML file, to name the line of whatever is wrong in it.
+/// A TOML file, with its text to find the lines of errors.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct TomlFile<'a> {
     pub(crate) path: &'a Path,
@@ -54,7 +54,7 @@ impl TomlFile<'_> {
         })
     }
 
-    /// The error with the file and the line where a span begins in front.
+    /// The error, preceded by the file and the line on which a span begins.
     pub(crate) fn at(&self, span: Range<usize>, error: &anyhow::Error) -> anyhow::Error {
         anyhow::anyhow!("{}:{}: {error:#}", self.path.display(), self.line(span))
     }
@@ -65,7 +65,7 @@ impl TomlFile<'_> {
     }
 }
 
-/// What a table says, as arguments of a command, and everything that is wrong in it, in the order of the file.
+/// The content of a table as arguments of a command, and all its errors, in the order of the file.
 pub(crate) fn of_table(command: &Command, file: &TomlFile<'_>, table: Table) -> (Config, Vec<anyhow::Error>) {
     let mut entries: Vec<_> = table.into_iter().collect();
     entries.sort_by_key(|(key, _)| key.span().start);
@@ -79,7 +79,7 @@ pub(crate) fn of_table(command: &Command, file: &TomlFile<'_>, table: Table) -> 
     (config, problems)
 }
 
-/// Adds one key and its value to what the file says.
+/// Adds one key and its value to the arguments.
 fn entry<'c>(
     command: &'c Command,
     path: &Path,
@@ -101,7 +101,7 @@ fn entry<'c>(
     Ok(())
 }
 
-/// The argument a key stands for.
+/// The argument that a key names.
 fn find<'c>(command: &'c Command, key: &str) -> anyhow::Result<&'c Arg> {
     let wanted = key.replace('_', "-");
     let known = || command.get_arguments().filter(|arg| !matches!(name(arg), "help" | "version"));
@@ -110,7 +110,7 @@ fn find<'c>(command: &'c Command, key: &str) -> anyhow::Result<&'c Arg> {
     }
     match known().min_by_key(|arg| strsim::damerau_levenshtein(name(arg), &wanted)) {
         Some(nearest) => bail!("unknown key {key:?}; the nearest one is {:?}", name(nearest)),
-        None => bail!("unknown key {key:?}; this command takes none"),
+        None => bail!("unknown key {key:?}; this command takes no keys"),
     }
 }
 
@@ -119,7 +119,7 @@ fn name(arg: &Arg) -> &str {
     arg.get_long().unwrap_or(arg.get_id().as_str())
 }
 
-/// The argument as one token; none for a switch that is off.
+/// The argument as one token; `None` for a switch that is off.
 fn token(arg: &Arg, value: Value, file: &Path) -> anyhow::Result<Option<OsString>> {
     let switch = matches!(arg.get_action(), ArgAction::SetTrue);
     let text = match value {
@@ -166,7 +166,7 @@ fn rebase(arg: &Arg, text: String, file: &Path) -> OsString {
     }
 }
 
-/// Parses one argument alone, so that its error can name the line it comes from.
+/// Parses one argument alone, so that an error can be reported with its line.
 fn check(command: &Command, arg: &Arg, token: &OsString) -> anyhow::Result<()> {
     let lone = command.clone().mut_args(|arg| arg.required(false)).no_binary_name(true);
     let separator = arg.is_positional().then(|| OsString::from("--"));
@@ -178,7 +178,7 @@ fn check(command: &Command, arg: &Arg, token: &OsString) -> anyhow::Result<()> {
     }
 }
 
-/// What clap says first, on one line.
+/// The first paragraph of clap's message, on one line.
 pub(crate) fn first_paragraph(error: &clap::Error) -> String {
     let text = error.render().to_string();
     let message = text.split("\n\n").next().unwrap_or_default();

@@ -1,4 +1,4 @@
-//! Rewrites an argument list: a TOML file becomes the flags it stands for.
+//! Rewrites an argument list: a TOML file is replaced by the flags that it contains.
 
 use super::{config, tokens};
 use anyhow::bail;
@@ -6,8 +6,8 @@ use clap::{Args, Command, parser::ValueSource};
 use std::{ffi::OsString, path::Path};
 
 /// Replaces `command FILE.toml` by the flags and positional arguments in that file. The user's flags follow the
-/// file's and so override them; the user's positional arguments take the place of the file's, from the first. Lists
-/// without a TOML file, and commands whose argument *is* a TOML file, pass through.
+/// file's and so override them; the user's positional arguments replace the file's, from the first. Lists
+/// without a TOML file, and commands whose own argument is a TOML file, are returned unchanged.
 ///
 /// # Errors
 /// If there are two TOML files, or the file cannot be read or understood.
@@ -50,7 +50,7 @@ pub(crate) fn insert_flags(grammar: &Command, mut argv: Vec<OsString>, flags: Ve
     argv
 }
 
-/// The flags of `A` that an argument list for a subcommand gives, each as one token, without defaults.
+/// The flags of `A` in an argument list for a subcommand, each as one token, without defaults.
 ///
 /// # Errors
 /// If the list does not parse.

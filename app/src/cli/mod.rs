@@ -1,5 +1,5 @@
 //! The command line (design section 10): raw arguments, a TOML file and a preset become one argument list; clap parses
-//! it; the result becomes typed settings; a command runs them.
+//! it; the result becomes typed settings, with which a command runs.
 //!
 //! A TOML file and a preset are *rewritten into flags that precede the user's* (`expand`), and a later flag overrides
 //! an earlier one. So each input has one grammar, one default and one error message, wherever it comes from, and
@@ -40,7 +40,7 @@ pub(crate) fn main(argv: Vec<OsString>) -> ExitCode {
 /// The argument list with its TOML file and its preset applied, parsed.
 ///
 /// # Errors
-/// A [`clap::Error`], which also stands for `--help` and `--version`, or what is wrong with the TOML file.
+/// A [`clap::Error`], also for `--help` and `--version`, or the error of the TOML file.
 fn parse(argv: Vec<OsString>) -> anyhow::Result<Cli> {
     let mut grammar = Cli::command();
     grammar.build();

@@ -7,7 +7,7 @@ use lookalike::{
 };
 use std::ffi::OsString;
 
-/// The flags a preset stands for. They precede all others, so that a flag given explicitly wins.
+/// The flags of a preset. They precede all others, so that a flag given explicitly wins.
 pub(crate) fn flags(preset: Preset) -> Vec<OsString> {
     match preset {
         Preset::Paper => {
@@ -33,7 +33,7 @@ pub(crate) fn compress(preset: Option<Preset>) -> Compress {
     }
 }
 
-/// \[BP20b\] section 3 but for the model, with the start of design section 10 and one pixel subset.
+/// \[BP20b\] section 3 except the model, with one pixel subset; the start is that of design section 10.
 const PAPER: [&str; 7] = [
     "--gammas=1:3:0.1",
     "--samples=256",

@@ -7,8 +7,7 @@ use std::{
     process::ExitCode,
 };
 
-/// Reports the error and says with which code to exit. Help and version, which clap hands over as errors, go to stdout
-/// with code 0.
+/// Reports the error and returns the exit code. Help and version, which clap returns as errors, go to stdout with code 0.
 pub(crate) fn failure(error: &anyhow::Error) -> ExitCode {
     if let Some(error) = error.downcast_ref::<clap::Error>() {
         // A closed pipe behind `lookalike --help | head` is not worth an error.
@@ -18,7 +17,7 @@ pub(crate) fn failure(error: &anyhow::Error) -> ExitCode {
     let is_terminal = io::stderr().is_terminal();
     let colour = is_terminal && env::var_os("NO_COLOR").is_none_or(|value| value.is_empty());
     let text = render(error, colour);
-    // In a log, a cause stays on one line, where it can be searched for.
+    // In a log, each cause stays on one line, so that a search finds it.
     let text = if is_terminal { wrap(&text) } else { text };
     // A closed stderr cannot be reported anywhere.
     let _ = io::stderr().write_all(text.as_bytes());

@@ -9,7 +9,7 @@ pub(crate) fn subcommand<'g>(grammar: &'g Command, tokens: &[OsString]) -> Optio
     Some((first, grammar.find_subcommand(&tokens[first])?))
 }
 
-/// The tokens without the program's name, and with the subcommand's before flags that may stand there too, such as `--log`.
+/// The tokens without the program's name, and with the subcommand's name before flags that may precede it, such as `--log`.
 pub(crate) fn subcommand_first(grammar: &Command, tokens: &[OsString]) -> Vec<OsString> {
     let Some((place, _)) = subcommand(grammar, tokens) else { return tokens.iter().skip(1).cloned().collect() };
     [&tokens[place..=place], &tokens[1..place], &tokens[place + 1..]].concat()

@@ -5,7 +5,7 @@ use clap::ValueEnum;
 /// A named bundle of settings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Preset {
-    /// The paper's 256 samples, pattern search, 21 gammas and no polish; the paper names no model, start or bounds: they are ours
+    /// The paper's 256 samples, pattern search, 21 gammas and no polish; model, start and bounds are ours, because the paper names none
     Paper,
 }
 

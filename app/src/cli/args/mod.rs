@@ -75,7 +75,7 @@ pub(crate) struct DemoArgs {
     /// Folder for the results; only files of an earlier demo are replaced there
     #[arg(long, short, value_name = "DIR", default_value = "lookalike-demo", help_heading = "Output")]
     out: PathBuf,
-    /// Replace files in the folder that have the names of the demo's, even if another command wrote them
+    /// Replace files with our names in the folder, even if another command wrote them
     #[arg(long, help_heading = "Output")]
     force: bool,
     /// Worker processes to start: auto starts one per core
@@ -95,7 +95,7 @@ impl DemoArgs {
     }
 }
 
-/// Accepts what the log filter's own grammar accepts.
+/// Accepts a filter of `tracing_subscriber`.
 fn log_filter(text: &str) -> Result<String, tracing_subscriber::filter::ParseError> {
     tracing_subscriber::EnvFilter::try_new(text).map(|_| text.to_owned())
 }
@@ -107,11 +107,11 @@ const VERSION: &str = concat!(
 );
 
 const TOP_NOTES: &str = "\
-Any command but batch, study and access also takes a TOML file whose keys are its flags: lookalike fit fit.toml. \
+Every command except batch, study and access also takes a TOML file whose keys are its flags: lookalike fit fit.toml. \
 Flags win over the file.";
 
 const TOP_EXAMPLES: &str = "\
-Any command but batch, study and access also takes a TOML file whose keys are its flags and positional arguments. Flags \
+Every command except batch, study and access also takes a TOML file whose keys are its flags and positional arguments. Flags \
 win over the file; relative paths in the file are relative to it.
 
 Results go to stdout, everything for people to stderr. Exit codes: 0 done; 1 done, but --max-cssim was missed; 2 bad \

@@ -32,21 +32,21 @@ pub(crate) struct PolicyArgs {
     #[arg(long, value_name = "N", default_value_t = Policy::default().suspect_after)]
     #[arg(help_heading = "Policy", hide_short_help = true)]
     suspect_after: u32,
-    /// Fail a node that runs alone after this many of its workers have died
+    /// Fail a node after this many workers have died while it ran alone on them
     #[arg(long, value_name = "N", default_value_t = Policy::default().node_crashes)]
     #[arg(help_heading = "Policy", hide_short_help = true)]
     node_crashes: u32,
-    /// Run a slow node on an idle worker too and take the first result: on, off, or the factor above the median time of its kind from
-    /// which a node is slow (on: 2)
+    /// Run a slow node on an idle worker too and take the first result: on, off, or a factor. A node is slow once it has run this factor
+    /// times the median time of its kind (on: 2)
     #[arg(long, value_name = "on|off|FACTOR", default_value = "on")]
     #[arg(help_heading = "Policy", hide_short_help = true)]
     speculate: Speculate,
-    /// The shortest time after which a node may count as slow
+    /// Shortest running time of a node that counts as slow
     #[arg(long, value_name = "T", default_value_t = Time(Policy::default().speculation.after))]
     #[arg(help_heading = "Policy", hide_short_help = true)]
     speculate_after: Time,
     /// Share of the nodes on workers, from 0 to 1, that a second worker computes too, to compare the results bit for bit. Searches are
-    /// left out, because the coordinator computes the costs of their results itself
+    /// left out, because the coordinator recomputes the costs of their results
     #[arg(long, value_name = "F", default_value_t = Policy::default().verify_fraction, allow_negative_numbers = true)]
     #[arg(help_heading = "Policy", hide_short_help = true)]
     verify_fraction: f64,
@@ -78,7 +78,7 @@ impl FromStr for Time {
     }
 }
 
-/// The factor above the median time from which a node is slow; none: no node is slow.
+/// A node is slow once it has run this many times the median time of its kind. `None`: no node is slow.
 #[derive(Clone, Copy, Debug)]
 struct Speculate(Option<f64>);
 

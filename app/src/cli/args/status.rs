@@ -22,7 +22,7 @@ impl StatusArgs {
 }
 
 const EXAMPLES: &str = "\
-The exit code is 0 whatever the state of the run, and 2 where there is no run.
+The exit code is 0 if the folder has a run, whatever its state, and 2 if it has none.
 
 Examples:
   lookalike status run

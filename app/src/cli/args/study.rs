@@ -66,7 +66,7 @@ Examples:
 where STUDY.toml is, for instance (its relative paths are relative to the file):
   materials = [\"merl/*.binary\"]           # measured materials in MERL's format
   probes = [\"grace_cross.hdr\", \"rnl_cross.hdr\", \"uffizi.hdr\"]
-  held-out = [\"studio.hdr\"]               # lights to show matches under, never to fit to
+  held-out = [\"studio.hdr\"]               # lights for scoring matches, not for fits
   size = 128                              # columns and rows of the photos
   experiments = [\"methods\", \"held-out\"]  # all of them, if left out
 

@@ -13,7 +13,7 @@
 //! photo = "gold.exr"
 //! env = "garden.hdr"
 //! ```
-//! Every table is rewritten into flags, as a settings file is: defaults, then set or fit, then the command line, and the last one
+//! Every table is rewritten into flags, as a settings file is, in this order: defaults, set or fit, command line. The last one
 //! wins. All problems are reported together, each with its line.
 
 mod names;
@@ -32,13 +32,13 @@ use serde::Deserialize;
 use std::{ffi::OsString, fs, ops::Range, path::Path};
 use toml::{Spanned, Value};
 
-/// More fits than any batch has: most likely a mistake in a pattern.
+/// More fits than any batch has, most likely a mistake in a pattern.
 const MOST_FITS: usize = 100_000;
 
-/// The fits of a manifest in their order, at least one, with flags of the command line that win over all of it.
+/// The fits of a manifest in their order, at least one. The flags `given` on the command line override the manifest.
 ///
 /// # Errors
-/// If the file cannot be read; else everything that is wrong in it.
+/// If the file cannot be read; else all errors in it.
 pub(crate) fn read(path: &Path, given: &[OsString]) -> anyhow::Result<Vec<BatchFit>> {
     let text = fs::read_to_string(path).with_context(|| format!("cannot read the manifest {}", path.display()))?;
     let file = TomlFile { path, text: &text };
@@ -47,7 +47,7 @@ pub(crate) fn read(path: &Path, given: &[OsString]) -> anyhow::Result<Vec<BatchF
     reader.read(content);
     if reader.fits.is_empty() && reader.problems.is_empty() {
         reader.problems.push(anyhow!(
-            "{}: it lists no fit; give photos and environments, or a [[fit]] with photo and env",
+            "{}: the manifest has no fit; give photos and environments, or a [[fit]] with photo and env",
             path.display()
         ));
     }
@@ -70,15 +70,15 @@ struct Content {
     fit: Vec<Spanned<Table>>,
 }
 
-/// Keys of a product, which are no settings.
+/// Keys of a product, which are not settings.
 const PRODUCT: [&str; 3] = ["photos", "environments", "models"];
 
-/// What a fit is made of before it is parsed.
+/// The parts of a fit before it is parsed.
 struct Draft {
     span: Range<usize>,
     photo: OsString,
     flags: Vec<OsString>,
-    /// Its name, whole; else it is made of its inputs, after a prefix.
+    /// Its whole name. `None`: the name is made of the prefix and the inputs.
     name: Option<String>,
     prefix: Option<String>,
 }
@@ -194,7 +194,7 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// The name that a table gives, if it can be one.
+    /// The name in a table, if it is valid.
     fn name(&mut self, table: &mut Table) -> Option<String> {
         let (key, value) = take(table, "name")?;
         let checked = match value.into_inner() {

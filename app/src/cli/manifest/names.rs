@@ -9,7 +9,7 @@ use std::{collections::BTreeMap, path::Path};
 pub(super) struct Names(BTreeMap<String, usize>);
 
 impl Names {
-    /// Takes a name, which was checked, for a fit of this line.
+    /// Records a checked name for the fit of this line.
     pub(super) fn claim(&mut self, name: &str, line: usize) -> anyhow::Result<()> {
         match self.0.insert(name.to_lowercase(), line) {
             None => Ok(()),
@@ -17,8 +17,8 @@ impl Names {
                 bail!("two fits are named {name:?}; list a file once, or give each fit a name in a [[fit]] of its own")
             }
             Some(other) => bail!(
-                "two fits are named {name:?}, the other one on line {other}; give a [[fit]] another name, or a [[set]] one that \
-                 goes before the names of its fits"
+                "two fits are named {name:?}, the other one on line {other}; give a [[fit]] another name, or a [[set]] a name, \
+                 which then precedes the names of its fits"
             ),
         }
     }
@@ -37,7 +37,7 @@ const FILES: [&str; 9] = [
     "summary.json",
 ];
 
-/// Names that are devices on Windows, whatever follows a dot after them; COM and LPT with a digit are as well.
+/// Names of devices on Windows, with any extension; COM and LPT with a digit are devices too.
 const DEVICES: [&str; 4] = ["con", "prn", "aux", "nul"];
 
 /// Advice about a name that was given.
@@ -45,7 +45,7 @@ pub(super) const GIVEN: &str = "use another one";
 /// Advice about a name that was made of the inputs.
 pub(super) const MADE: &str = "give the fit a name in a [[fit]], or rename the photo";
 
-/// Accepts what is one part of a path everywhere and one word in a log. `advice` says what else to do.
+/// Accepts a name that is valid as a folder on every system and one word in a log. `advice` is the remedy in the message.
 pub(super) fn check(name: &str, advice: &str) -> anyhow::Result<()> {
     if name.is_empty() || name.len() > MAX_PART_NAME_BYTES {
         bail!("a name must have 1 to {MAX_PART_NAME_BYTES} bytes, found {}: {name:?}; {advice}", name.len());
@@ -60,17 +60,17 @@ pub(super) fn check(name: &str, advice: &str) -> anyhow::Result<()> {
     let is_file =
         |file: &str| lower.strip_prefix(file).is_some_and(|rest| rest.is_empty() || rest.starts_with(['.', '-']));
     if FILES.iter().any(|file| is_file(file)) || (lower.starts_with("slurm-") && lower.ends_with(".out")) {
-        bail!("the name {name:?} is that of a file which the batch itself writes; {advice}");
+        bail!("the name {name:?} is reserved for a file of the batch; {advice}");
     }
     let stem = lower.split('.').next().unwrap_or_default();
     let is_port = |port: &str| stem.strip_prefix(port).is_some_and(|rest| matches!(rest.as_bytes(), [b'0'..=b'9']));
     if DEVICES.contains(&stem) || is_port("com") || is_port("lpt") {
-        bail!("the name {name:?} is that of a device on Windows; {advice}");
+        bail!("{name:?} is the name of a device on Windows; {advice}");
     }
     Ok(())
 }
 
-/// The name of a fit that was given none: of photo, light and model.
+/// The name of a fit without a given name: photo, light and model.
 pub(super) fn of_inputs(prefix: Option<&str>, photo: &Path, environment: &Path, model: &str) -> String {
     let stem = |path: &Path| plain(&path.file_stem().unwrap_or_default().to_string_lossy());
     let parts = [prefix.map(str::to_owned), Some(stem(photo)), Some(stem(environment)), Some(model.to_owned())];
@@ -102,7 +102,7 @@ mod tests {
     }
 
     #[test]
-    fn names_that_are_no_folders_everywhere_are_refused_with_one_that_is() {
+    fn names_that_are_not_valid_folders_are_refused_with_a_valid_one() {
         for (name, instead) in
             [("a/b", "a_b"), ("../up", "_up"), ("two words", "two_words"), (".hidden", "hidden"), ("a:b", "a_b")]
         {
@@ -128,7 +128,7 @@ mod tests {
         for name in files {
             let message = check(name, MADE).unwrap_err().to_string();
             assert!(
-                message.contains("a file which the batch itself writes; give the fit a name in a [[fit]]"),
+                message.contains("reserved for a file of the batch; give the fit a name in a [[fit]]"),
                 "{message}"
             );
         }

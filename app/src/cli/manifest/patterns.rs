@@ -31,8 +31,8 @@ impl Patterns {
         self.0
     }
 
-    /// The files, relative to a folder: of each pattern in alphabetical order. A text without `*`, `?` and `[` is the name of a
-    /// file, whether it is there or not.
+    /// The files, relative to a folder; those of a pattern are in alphabetical order. A text without `*`, `?` and `[` is the name of a
+    /// file, which need not exist.
     pub(super) fn files(self, folder: &Path) -> (Vec<OsString>, Vec<anyhow::Error>) {
         let (mut files, mut problems) = (Vec::new(), Vec::new());
         for text in self.0 {

@@ -105,7 +105,7 @@ fn refusal(text: &str) -> String {
 #[test]
 fn mistakes_are_reported_with_line_and_key() {
     for (text, phrase) in [
-        ("", "batch.toml: it lists no fit"),
+        ("", "batch.toml: the manifest has no fit"),
         ("photos = ", "batch.toml:1: "),
         ("\nfotos = 'a.exr'", "batch.toml:2: unknown field `fotos`, expected one of `photos`"),
         ("environments = 'm.hdr'", "batch.toml:1: \"environments\" at the top needs \"photos\" at the top"),
