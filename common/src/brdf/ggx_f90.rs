@@ -2,8 +2,8 @@
 //!
 //! `f = kd/pi + F D V` with `D` and `V` of `ggx` and `F = f0 + (f90 - f0) F5`, `F5 = (1 - v.h)^5`: Schlick (1994) with `f90` instead of 1.
 //!
-//! A smooth interface reflects all light at grazing incidence, and so does `ggx`. The measured materials of docs/results.md reflect less
-//! there, because they are rough or because of how they were measured and fitted, so the rim of their `ggx` renderings is too bright.
+//! A smooth interface reflects all light at grazing incidence, and so does `ggx`. The specular lobe of the measured materials of
+//! docs/results.md is weaker at every angle (docs/method.md), so the rim of their `ggx` renderings is too bright.
 //! MaterialX has this model as the generalized Schlick BSDF with a grey `color90`.
 //!
 //! Split: `F = f0 (1 - F5) + f90 F5`, so the weights are `kd`, `f0` and `f90`.

@@ -85,7 +85,7 @@ pub trait Lobe: Debug + Sync {
         width
     }
 
-    /// What the tests hold the lobe to.
+    /// The limits against which tests check the lobe.
     fn expected(&self) -> Expected {
         Expected::default()
     }
@@ -108,7 +108,8 @@ pub trait Lobe: Debug + Sync {
     }
 }
 
-/// What the tests hold a lobe to. The defaults suit a lobe of microfacets that conserves energy; others state what their formula gives.
+/// The limits against which tests check a lobe. The defaults suit a lobe of microfacets that conserves energy; other lobes state the
+/// limits of their formula.
 #[derive(Debug, Clone, Copy)]
 pub struct Expected {
     /// Largest directional albedo without Fresnel term.

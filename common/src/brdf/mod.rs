@@ -50,7 +50,7 @@ pub use width::Width;
 /// Every model, in the order in which lists show them.
 pub static MODELS: &[&dyn Model] = &[&Ggx, &GgxF90, &CookTorrance, &Ward, &BlinnPhong, &AshikhminShirley, &Disney];
 
-/// The model of a fit that names none.
+/// The default model.
 pub static DEFAULT_MODEL: &dyn Model = &Ggx;
 
 /// The model of the papers' results and of `--preset paper`.

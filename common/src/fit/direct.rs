@@ -30,7 +30,7 @@ impl DirectPixels<'_> {
         let (lower, upper) = flat_bounds(model.parameters());
         let inside = parameters.iter().zip(lower.iter().zip(&upper)).map(|(x, (l, u))| x.clamp(*l, *u)).collect();
         let Ok(material) = Material::new(model, inside) else {
-            // A parameter is not a number: neither is the cost, and the search reports it.
+            // A parameter is not a number. Then the cost is not a number either, and the search reports it.
             out.iter_mut().for_each(|plane| plane.fill(f64::NAN));
             return;
         };

@@ -11,7 +11,7 @@ pub struct Gammas {
     step: f64,
 }
 
-/// What is wrong with a sequence of gammas.
+/// Why a sequence of gammas is invalid.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum GammasError {
@@ -38,7 +38,7 @@ pub enum GammasError {
         /// The step.
         found: f64,
     },
-    /// More gammas than anyone searches.
+    /// Too many gammas.
     #[error("at most {MOST} gammas, found a step of {step} from {start} to {stop}")]
     TooMany {
         /// The first gamma.
@@ -121,11 +121,11 @@ impl fmt::Display for Gammas {
 
 /// Gammas are rounded to 1 / `PER_UNIT`: an integer divided by a power of ten is the double nearest to that decimal.
 const PER_UNIT: f64 = 1e9;
-/// Half a rounding unit: admits a last gamma that equals `stop` but for rounding, never one a step beyond.
+/// Half a rounding unit: accepts a last gamma that differs from `stop` by rounding, but not one that is a step above it.
 const SLACK: f64 = 0.5e-9;
-/// Far below any difference that shows, far above the rounding.
+/// Far below any visible difference, and far above the rounding.
 const SMALLEST_STEP: f64 = 1e-6;
-/// x^(1/100) is flat for every purpose.
+/// x^(1/100) is nearly constant, so a larger gamma gives no other match.
 const LARGEST: f64 = 100.0;
 /// Each gamma is a search, a candidate and a full-resolution rendering.
 const MOST: usize = 1000;

@@ -237,10 +237,10 @@ impl Method {
     }
 }
 
-/// One setting of a method, as outputs name it.
+/// One setting of a method, for outputs.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Setting {
-    /// Its flag, or in words what decides it. It is part of the identity of a run, which `--resume` compares.
+    /// Its flag, or a description if no flag sets it alone. It is part of the identity of a run, which `--resume` compares.
     pub flag: &'static str,
     /// Its value in words.
     pub text: String,

@@ -125,8 +125,8 @@ impl LeastSquaresProblem for Objective<'_> {
 
 /// A value of the photo as used in Eq. 1. A photo may have negative values, from colours outside the gamut of Rec. 709 or from noise
 /// around black. At gamma = 3 the tangent below the knee is so steep (about 1e4 at a mean of 0.2) that one channel at -0.01 would
-/// outweigh all other pixels, so the photo's negative values count as 0. This deviates from design section 1, which treats A and B
-/// alike; negative values of B keep their order.
+/// outweigh all other pixels, so the photo's negative values count as 0 (design section 1). Negative values of B keep their
+/// order.
 pub(super) fn observed(value: f32) -> f64 {
     f64::from(value).max(0.0)
 }

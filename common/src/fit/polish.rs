@@ -1,8 +1,8 @@
 //! Stage three, always reported apart: a short search on CSSIM itself from the winner of stage two, on the full-resolution table around
 //! the winner's width (design section 2).
 //!
-//! The design asks for a pattern search. CSSIM is smooth in the parameters, though its valleys are narrow: in a few hundred evaluations
-//! a projected quasi-Newton search reaches the score that a pattern search reaches in 7,000 (docs/results.md).
+//! CSSIM is smooth in the parameters, but its valleys are narrow. In a few hundred evaluations a projected quasi-Newton search reaches
+//! the score that a pattern search reaches in 7,000 (docs/results.md).
 
 use super::{
     method::{JudgedBy, SearchKind},
@@ -46,7 +46,7 @@ pub struct Polished {
 /// no worse than any of them *on this table*.
 ///
 /// # Errors
-/// When there is no start, or none can be rendered and scored.
+/// If there is no start, or no start can be rendered and scored.
 pub fn polish(
     view: &FullView<'_>,
     judge: &Judge,

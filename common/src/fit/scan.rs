@@ -15,7 +15,7 @@ use crate::{
 use std::ops::Range;
 
 /// All points of the scan, in the order of widths, then scanned values. Of several points that give the same material, such as points
-/// that differ only in a lobe of zero weight, only the first.
+/// that differ only in a lobe of zero weight, only the first is kept.
 pub(super) fn scan(model: &dyn Model, table: &TransportTable, weights: &[f64], photo: &[[f32; 3]]) -> Vec<Vec<f64>> {
     let grids = grids(model, table);
     let mut terms: Vec<Planes> = (0..term_count(model)).map(|_| table.planes()).collect();

@@ -25,7 +25,7 @@ use crate::{
 /// How well the photo determines one entry of the flat parameter vector.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Uncertainty {
-    /// The parameter is known to this standard error, in its own unit.
+    /// The photo determines the parameter with this standard error, in the parameter's unit.
     StandardError(f64),
     /// The parameter is at its lower or upper bound, and would stay near it if it were free.
     AtBound,
@@ -34,7 +34,7 @@ pub enum Uncertainty {
 }
 
 impl Uncertainty {
-    /// The standard error, where there is one.
+    /// The standard error, if the parameter has one.
     fn standard_error(self) -> Option<f64> {
         match self {
             Self::StandardError(error) => Some(error),

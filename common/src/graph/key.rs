@@ -1,10 +1,10 @@
-//! Keys: identify what a node computes, independently of its number.
+//! Keys identify the computation of a node, independently of its number.
 
 use std::fmt;
 
 use super::BlobHash;
 
-/// Identifies what a node computes: the BLAKE3 hash of its kind, its parameters and the hashes of its inputs, in order.
+/// Identifies the computation of a node: the BLAKE3 hash of its kind, its parameters and the hashes of its inputs, in order.
 ///
 /// Nodes are pure functions, so nodes of equal key have equal outputs, in any run and in any order of addition. Label, number and
 /// placement are not part of the key.

@@ -29,8 +29,8 @@ pub struct Part<P> {
     pub name: String,
     /// The planner of its nodes.
     pub planner: P,
-    /// Whether it holds its nodes until the run ends, even if it waits for none, for other parts that add equal nodes. Such a part never
-    /// completes.
+    /// Whether it holds its nodes until the run ends, so that other parts that add equal nodes share them, even when it waits for no node.
+    /// Such a part never completes.
     pub stays: bool,
 }
 

@@ -2,8 +2,8 @@
 //!
 //! A run is a [`Graph`] of nodes. A node is a pure function of its parameters and its input blobs; its `kind` selects the [`NodeType`]
 //! of the [`Registry`] that runs it. Its output becomes a blob named by its BLAKE3 hash, so equal bytes are stored and sent once, and
-//! two computations of a node can be compared bit for bit. A [`Planner`] decides which nodes there are: it is called for each finished
-//! node and may add more.
+//! two computations of a node can be compared bit for bit. A [`Planner`] adds the nodes: it is called for each finished node
+//! and may add more.
 //!
 //! ```text
 //!   Planner --add_node--> Waiting --inputs there--> Ready --output--> Completed --> Planner::completed
@@ -14,7 +14,7 @@
 //! A planner holds the nodes and blobs that it adds until it releases them. Blobs that are neither held nor read by an open node are
 //! dropped, so a run of hundreds of fits stores only those of the fits in progress. [`Many`] planners can share a graph.
 //!
-//! Payloads are opaque here (no rendering, no parameters of a BRDF), and there are no workers, leases, sockets or time.
+//! Payloads are opaque here, without rendering or parameters of a BRDF. This module has no workers, leases, sockets or time.
 //! [`run_in_process`] runs a graph in one process: every distributed run must reproduce its result bit for bit.
 
 mod blob;

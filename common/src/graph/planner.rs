@@ -1,8 +1,8 @@
-//! The planner: decides which nodes a run has.
+//! The planner, which adds the nodes of a run.
 
 use super::{Blob, FailureReason, GraphEdit, NodeId, NodeSpec, PlanError};
 
-/// Decides which nodes a run has. The run ends when no node is open.
+/// Adds the nodes of a run. The run ends when no node is open.
 ///
 /// Nodes finish in any order. The outcome of a planner must depend on their outputs alone, never on the order or on the numbers of the
 /// nodes.

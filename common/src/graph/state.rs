@@ -340,7 +340,7 @@ impl Graph {
         self.get(node)?.spec.inputs.iter().map(blob_of).collect()
     }
 
-    /// The key of what a node computes; `None` while an input has no output. It remains available after blobs are dropped.
+    /// The key of a node; `None` while an input has no output. It remains available after blobs are dropped.
     #[must_use]
     pub fn key(&self, node: NodeId) -> Option<NodeKey> {
         let spec = self.spec(node)?;

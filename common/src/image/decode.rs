@@ -13,7 +13,7 @@ use crate::math::Vec3;
 ///   converted to Rec. 709.
 /// - Radiance HDR: divided by `EXPOSURE` and `COLORCORR`; `PRIMARIES` are converted to Rec. 709.
 /// - PFM: multiplied by the magnitude of the scale.
-/// - PNG, JPEG: decoded from sRGB, also if the file declares other colours, which is a warning. Exif orientation is
+/// - PNG, JPEG: decoded from sRGB, even if the file declares other colours, which gives a warning. Exif orientation is
 ///   applied.
 ///
 /// # Errors

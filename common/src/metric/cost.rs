@@ -3,8 +3,8 @@
 //! `C(A, B, gamma) = sum_p w_p sum_rgb (A[p]^(1/gamma) - B[p]^(1/gamma))^2`
 //!
 //! without clamping. A power below 1 has an infinite slope at zero, so the tangent line at a small e replaces it below
-//! e. The function is then continuously differentiable with a finite gradient, and negative values keep their order. A
-//! and B are treated the same.
+//! e. The function is then continuously differentiable with a finite gradient, and negative values keep their order.
+//! This function treats A and B the same; `fit` replaces negative values of A by 0 first (design section 1).
 
 use crate::math::elementary::{ln, pow};
 

@@ -1,4 +1,4 @@
-//! The metrics by name, behind one function: what `lookalike compare` can measure.
+//! The metrics of `lookalike compare` by name, behind one function.
 
 use super::{DisplayImage, ErrorMap, IcidOptions, Judge, JudgeOptions, MetricError, icid};
 use crate::{choice::choice, image::Image};
@@ -27,7 +27,7 @@ pub struct Difference {
     pub score_object: f64,
     /// Means of l_L, c_L, s_L, l_C, l_H over the image and over the object; CSSIM only.
     pub features: Option<[[f64; 5]; 2]>,
-    /// The error of every window, if it was asked for.
+    /// The error of every window, if it was requested.
     pub map: Option<ErrorMap>,
 }
 

@@ -1,9 +1,10 @@
 //! The difference between two images: the per-pixel cost of stage one and the perceptual error CSSIM of stage two.
 //!
 //! Selection and polishing use [`Judge`]: CSSIM against a prepared reference. [`cid`] is the same measure on two
-//! displayed images, with the authors' variants; [`icid`] is its successor. [`MetricKind`] has them by name. [`DisplayImage`] and [`auto_exposure`] are
-//! the display transform before them. The pipeline, in the order of the files: `display`, `colour` and `scielab` (or
-//! `icam`) under `working`, `lab2000hl`, `window`, `features`, then `cssim`, `cid` or `icid`, and `maps` for pictures.
+//! displayed images, with the authors' variants; [`icid`] is its successor. [`MetricKind`] has the metrics by name.
+//! [`DisplayImage`] and [`auto_exposure`] are the display transform before them. The pipeline, in the order of the
+//! files: `display`, `colour` and `scielab` (or `icam`) under `working`, `lab2000hl`, `window`, `features`, then
+//! `cssim`, `cid` or `icid`, and `maps` for pictures.
 //!
 //! Scores depend much more on resolution, exposure and background than on details of the formulas. Compare only scores
 //! with equal resolution, exposure and background.

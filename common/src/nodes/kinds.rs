@@ -14,7 +14,7 @@ pub const SELECT: &str = "select";
 pub const EXPLORE: &str = "explore";
 /// Lowers the score of the winner.
 pub const POLISH: &str = "polish";
-/// Renders what a fit ends with.
+/// Renders the pictures at the end of a fit.
 pub const REPORT: &str = "report";
 /// Renders a photo.
 pub const RENDER: &str = "render";

@@ -30,7 +30,7 @@ pub(crate) struct SearchParameters {
 }
 
 impl SearchParameters {
-    /// What a worker has to know of `method` to search one gamma on one subset.
+    /// The part of `method` that a worker needs to search one gamma on one subset.
     pub(crate) fn of(
         method: &Method,
         (gamma, subset): (f64, u32),

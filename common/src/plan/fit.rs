@@ -1,4 +1,4 @@
-//! The plan of one fit: which nodes there are and what follows from their outputs (design section 7).
+//! The plan of one fit: its nodes, and the further nodes that their outputs lead to (design section 7).
 //!
 //! ```text
 //! transport(subset) shards -> search(gamma) x 21 -> transport(full) shards -> select -> explore -> polish -> report
@@ -160,7 +160,7 @@ impl FitPlanner {
         self
     }
 
-    /// What a node of this kind computes for this fit. Ask before [`Planner::completed`] hears of the node.
+    /// The work of a node of this kind for this fit. Call this before [`Planner::completed`] receives the node.
     #[must_use]
     pub fn work_of(&self, node: NodeId, kind: &str) -> Work {
         let is_judged = !matches!(self.step, Step::Searching | Step::Selecting(_));
@@ -232,7 +232,7 @@ impl FitPlanner {
         Ok(candidate)
     }
 
-    /// What the search of a candidate minimised.
+    /// The objective that the search of a candidate minimised.
     fn with_objective<T>(
         &mut self,
         candidate: &Candidate,
@@ -402,7 +402,7 @@ impl Planner for FitPlanner {
     }
 
     /// The result of a search is verified here by computing its cost again. Of every other output only the shape is checked here, so
-    /// those are worth a second run.
+    /// a second run is useful.
     fn is_verified_by_repetition(&self, spec: &NodeSpec) -> bool {
         spec.kind != nodes::SEARCH
     }

@@ -1,4 +1,4 @@
-//! Which nodes a fit, a photo and a survey need, and what follows from the outputs of these nodes (design section 7).
+//! The nodes of a fit, a photo and a survey, and the further nodes that their outputs lead to (design section 7).
 
 mod appraisal;
 mod direct;

@@ -1,4 +1,4 @@
-//! The tables of one capture and the nodes that wait for them: what a fit and a survey have in common.
+//! The tables of one capture and the nodes that wait for them, for fits and surveys.
 
 use super::{
     encode::{add, encode, encode_light, index},
@@ -220,7 +220,7 @@ impl SceneTables {
         }
     }
 
-    /// Checks the output of a node if it is a shard of a table, and says whether it is.
+    /// Checks the output of a node if it is a shard of a table; returns whether it is.
     pub(super) fn check_if_shard(&mut self, node: NodeId, output: &Blob) -> Result<bool, PlanError> {
         let Some(shard) = self.shards.remove(&node) else { return Ok(false) };
         verify::check_shard(self.method.model, shard, output)?;

@@ -25,7 +25,7 @@ use crate::{
 };
 use std::{collections::BTreeMap, sync::Arc};
 
-/// The request of a survey. An empty request integrates the table and nothing else.
+/// The request of a survey. An empty request only integrates the table.
 #[derive(Debug, Clone, Default)]
 pub struct SurveyRequest {
     /// Brute force starts from each of these flat parameter vectors.
@@ -38,7 +38,7 @@ pub struct SurveyRequest {
     pub points: Vec<Vec<f64>>,
     /// Gammas at which Eq. 1 is evaluated at every point.
     pub gammas: Vec<f64>,
-    /// The first so many points are rendered too.
+    /// How many of the points, from the first on, are rendered too.
     pub pictures: usize,
 }
 
@@ -102,7 +102,7 @@ impl SurveyPlanner {
         self.outcome
     }
 
-    /// What a node of this kind computes for this survey. Ask before [`Planner::completed`] hears of the node.
+    /// The work of a node of this kind for this survey. Call this before [`Planner::completed`] receives the node.
     #[must_use]
     pub fn work_of(&self, node: NodeId, kind: &str) -> Work {
         self.searches.get(&node).map_or_else(|| Work::of_survey(kind), |start| Work::Search(*start))

@@ -1,8 +1,8 @@
-//! What a node computes for its fit or survey, so that costs can be added up.
+//! The work of a node for its fit or survey, so that costs can be added up.
 
 use crate::nodes;
 
-/// What a node computes for a fit or a survey.
+/// The work of a node for a fit or a survey.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Work {
     /// A shard of the table that searches read: that of a subset, or a survey's table.
@@ -20,7 +20,7 @@ pub enum Work {
 }
 
 impl Work {
-    /// The work of a node of a fit that is no search. `is_judged` tells whether stage two is over.
+    /// The work of a node of a fit other than a search. `is_judged`: whether stage two is over.
     pub(super) fn of_fit(kind: &str, is_judged: bool) -> Self {
         match kind {
             nodes::TRANSPORT => Self::Table,
@@ -32,7 +32,7 @@ impl Work {
         }
     }
 
-    /// The work of a node of a survey that is no search.
+    /// The work of a node of a survey other than a search.
     pub(super) fn of_survey(kind: &str) -> Self {
         match kind {
             nodes::TRANSPORT_FULL => Self::Table,

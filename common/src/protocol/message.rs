@@ -54,8 +54,8 @@ pub struct Welcome {
     pub heartbeat_ms: u32,
     /// After this time without a received byte, in milliseconds, the worker must treat the connection as broken.
     pub silence_ms: u32,
-    /// How long the worker may take to finish its running nodes when it is asked to end, in milliseconds, unless its own options say
-    /// otherwise.
+    /// How long the worker may take to finish its running nodes when it is asked to end, in milliseconds, unless its own options give
+    /// another time.
     pub drain_ms: u32,
 }
 

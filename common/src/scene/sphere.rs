@@ -3,7 +3,7 @@
 //! Orthographic: the normal at the point (x, y) of the photo has the components (x - cx)/R, (cy - y)/R.
 //!
 //! Perspective: the distance of the camera follows from the circle. The axis of the camera passes through the middle of
-//! the photo along -Z, also if the circle lies elsewhere. The camera then sees the sphere obliquely, as it did when the
+//! the photo along -Z, even if the circle lies elsewhere. The camera then sees the sphere obliquely, as it did when the
 //! photo was taken. In the scene the camera is moved sideways and the sphere stays at the origin, which is the same
 //! because the light is infinitely far away. The silhouette of such a sphere is an ellipse, longest along the line from
 //! the middle of the photo through the centre of the circle. It touches the circle at both ends of that line and lies

@@ -63,8 +63,8 @@ pub struct LeastSquaresOptions {
 }
 
 impl Default for LeastSquaresOptions {
-    /// The tolerances are so small that tighter ones change no reported figure. The damping is what Madsen, Nielsen &
-    /// Tingleff recommend for a start of moderate quality.
+    /// The tolerances are so small that tighter ones change no reported figure. The damping is that which Madsen,
+    /// Nielsen & Tingleff recommend for a start of moderate quality.
     fn default() -> Self {
         Self {
             gradient_tolerance: 1e-10,

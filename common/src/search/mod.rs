@@ -1,4 +1,4 @@
-//! Minimisers of a function over a box. They take a closure and bounds, and know nothing of rendering.
+//! Minimisers of a function over a box. They take a closure and bounds, and do not depend on rendering.
 //!
 //! | module | minimises | method |
 //! |---|---|---|

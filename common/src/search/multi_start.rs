@@ -35,7 +35,7 @@ impl Default for MultiStartOptions {
     }
 }
 
-/// What a refinement returns: a point and its objective.
+/// The result of a refinement: a point and its objective.
 pub trait Refined {
     /// The natural point.
     fn point(&self) -> &[f64];

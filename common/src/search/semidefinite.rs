@@ -5,8 +5,8 @@
 //! before it do not explain (1 - R^2). Columns with a pivot of at most [`RANK_TOLERANCE`] are dependent; their solution
 //! is 0.
 
-/// The largest pivot that counts as rounding: 50 units in the last place. That is about ten times what ten eliminations
-/// leave of an exactly dependent column, and a hundredth of what the least damping adds to one.
+/// The largest pivot that counts as rounding: 50 units in the last place. That is about ten times the remainder of
+/// an exactly dependent column after ten eliminations, and a hundredth of what the least damping adds to such a column.
 const RANK_TOLERANCE: f64 = 1e-14;
 
 /// The largest component of a null vector, in units of scaled columns, that counts as rounding.
