@@ -16,7 +16,7 @@ const SHOWN: [&str; 2] = ["ours", "full"];
 /// their names.
 ///
 /// # Errors
-/// Where a picture cannot be read, has another size than its photo, or cannot be written.
+/// If a picture cannot be read, has another size than its photo, or cannot be written.
 pub(super) fn write(
     folder: &Path,
     names: &mut BTreeSet<String>,

@@ -20,7 +20,7 @@ pub(super) enum Block {
     Text(String),
     /// A conclusion, with the rule that it follows from.
     Finding(Verdict, String),
-    /// What the study needs for this section.
+    /// The entries that the study needs for this section.
     Missing(String),
     /// Preformatted text.
     Code(String),
@@ -115,7 +115,7 @@ impl Section {
         Self { id, title: title.to_owned(), blocks: Vec::new() }
     }
 
-    /// A section without data; `needs` says what `STUDY.toml` needs for it.
+    /// A section without data; `needs` are the entries of `STUDY.toml` that it needs.
     pub(super) fn missing(mut self, needs: &str) -> Self {
         self.blocks.push(Block::Missing(format!("Not in this study: STUDY.toml needs {needs}.")));
         self

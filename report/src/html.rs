@@ -156,7 +156,7 @@ fn panel_html(panel: &Panel, album: &mut Album<'_>) -> anyhow::Result<String> {
     Ok(format!("<div class=\"panel\">{picture}<span>{caption}</span>{note}</div>\n"))
 }
 
-/// Escapes text, so that nothing in it is markup.
+/// Escapes text, so that no part of it is markup.
 fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }

@@ -1,7 +1,7 @@
 //! The report of a study: turns its measurements into pages, figures and files for programs.
 //!
-//! Every verdict and every number is computed from the data. A section whose data the study does not have says what the study file
-//! needs for it.
+//! Every verdict and every number is computed from the data. A section without data says which entries of the study file
+//! it needs.
 
 mod chart;
 mod differences;
@@ -28,11 +28,11 @@ use study::Study;
 /// The heading of both pages.
 const TITLE: &str = "Lookalike against Bieron and Peers 2020";
 
-/// Makes the report of the study in `out`: `results.md`, `report.html`, `results.json`, `data.json` and `figures/`, which `write` gets
-/// with their names below `out`. The pictures that it shows are in `out/pictures/` already; those of differences are added.
+/// Makes the report of the study in `out`: `results.md`, `report.html`, `results.json`, `data.json` and `figures/`. Each file is passed
+/// to `write` with its name below `out`. The pictures must already be in `out/pictures/`; pictures of differences are added.
 ///
 /// # Errors
-/// Where a picture cannot be read, or as `write` says.
+/// If a picture cannot be read, or the error of `write`.
 pub fn write(
     data: &StudyData,
     out: &Path,

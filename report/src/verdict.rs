@@ -53,8 +53,8 @@ const CHANCE: f64 = 0.1;
 /// The rule of [`paired`] in words, after the numbers that it uses.
 pub(super) fn rule(margins: &[f64]) -> String {
     format!(
-        "n = {}, sign test {}; confirmed if the mean margin is positive, two thirds of at least {FEWEST} comparisons are, and \
-         p (two-sided) is below {CHANCE}; refuted if so of negative ones; else not decided",
+        "n = {}, sign test {}; confirmed if the mean margin is positive, at least two thirds of {FEWEST} or more margins are positive, \
+         and p (two-sided) is below {CHANCE}; refuted if all this holds for negative margins; otherwise not decided",
         margins.len(),
         text::probability(sign_test(margins))
     )

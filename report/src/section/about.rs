@@ -41,7 +41,7 @@ pub(super) fn section(study: &Study<'_>) -> anyhow::Result<Section> {
     if !study.data.direct.is_empty() {
         section.blocks.push(Block::Table(direct(study)));
     }
-    section.text("The study file, with what it says of where the materials and lights come from:");
+    section.text("The study file, with the sources of the materials and lights:");
     section.blocks.push(Block::Code(about.study.clone()));
     Ok(section)
 }

@@ -12,7 +12,7 @@ use crate::{
 
 /// The paper's setting.
 const SAMPLES: u32 = 32;
-/// What a study needs for this section.
+/// The entries that a study needs for this section.
 const NEEDS: &str = "the experiment \"clamped\" with several seeds, in the paper under Grace Cathedral";
 /// Share of the unclamped spread from which on the spread counts as remaining.
 const REMAINS: f64 = 0.25;

@@ -15,10 +15,10 @@ use std::collections::BTreeSet;
 pub(super) const PAPER_RATIO: f64 = 10.0;
 
 /// The definition of a second.
-pub(super) const SECONDS: &str = "CPU seconds are wall time from the start of a node to the arrival of its output, on workers \
-                                  of one thread each if they are local; where a worker shares a core with other work they count \
-                                  that as well, and where a remote one has more threads they leave the others out.";
-/// What the charged seconds leave out.
+pub(super) const SECONDS: &str = "CPU seconds are the wall time from the start of a node on a worker to the arrival of its \
+                                  output. Local workers have one thread each. If a worker shares a core with other work, its \
+                                  seconds include that work; if a remote worker has several threads, they are counted as one.";
+/// The time that the charged seconds do not include.
 const SCORE: &str = "about a millisecond at 128 x 128";
 /// The paper's start of brute force.
 const PAPER_START: &str = "paper";
@@ -122,7 +122,7 @@ pub(super) fn claim(study: &Study<'_>, method: Method) -> (Verdict, String) {
     let words = format!(
         "Brute force from one start, the paper's, charged one direct rendering of {} for each evaluation, costs {} times {} \
          (median over {}, lowest {}); from all its starts together {} times; from one start as run, on tables, {} times. The \
-         charge is without the score of each rendering, {SCORE}. The paper has {PAPER_RATIO}, and less refutes it.",
+         charge does not include the score of each rendering, {SCORE}. The paper has {PAPER_RATIO}; a lower ratio refutes it.",
         samples_per_pixel(study),
         text::significant(median(&one)),
         text::method(method),
@@ -165,7 +165,7 @@ fn direct_check(study: &Study<'_>) -> Option<String> {
     let found = Match::best(&[row])?;
     let charged = charged(study, &found)?;
     Some(format!(
-        "One search truly without tables ({}, {size} x {size}) took {} s for {} evaluations of CSSIM; the charge for them is {} s, {} times that.",
+        "One search without tables ({}, {size} x {size}) took {} s for {} evaluations of CSSIM; the charge for them is {} s, {} times that.",
         text::cell(&row.material, &row.probe),
         text::significant(Some(row.cpu_seconds)),
         row.evaluations,

@@ -137,8 +137,8 @@ pub(super) fn claim(pairs: &[Pair<'_>]) -> (Verdict, String) {
     };
     let words = format!(
         "From samples CSSIM differs from that of all pixels by {} in the mean of {} (with sign, positive worse: {}), most by {} \
-         ({}); each is {}. Confirmed up to a mean absolute difference of {CLOSE:.3} with none above {CELL_SLACK:.2}, refuted \
-         above a mean of {CELL_SLACK:.2}.",
+         ({}); each is {}. Confirmed if the mean absolute difference is at most {CLOSE:.3} and no difference is above \
+         {CELL_SLACK:.2}; refuted if the mean is above {CELL_SLACK:.2}.",
         text::score(mean(&off)),
         text::count(pairs.len(), "cell"),
         text::signed(mean(&excess)),

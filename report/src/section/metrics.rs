@@ -46,7 +46,7 @@ pub(super) fn section(study: &Study<'_>) -> anyhow::Result<Section> {
         .map(|(name, cells)| variant(study, name, cells, study.size()))
         .collect();
     if !fewer.is_empty() {
-        let caption = "Metrics that fewer cells have, over those: no part of the verdict.";
+        let caption = "Metrics that only some cells have, over those cells; they do not count for the verdict.";
         section.blocks.push(Block::Table(self::table(&methods, &fewer, caption).0));
     }
     let holds = (methods.len() > 1).then_some(orders.len() == 1);

@@ -108,8 +108,8 @@ pub(super) fn grazing(study: &Study<'_>) -> Option<String> {
     let (bound, free, paper) = (column(0)?, column(1)?, column(2)?);
     let wins = |rival: usize| complete.iter().filter(|scores| scores[1] < scores[rival]).count();
     Some(format!(
-        "The Fresnel term of {GGX} rises to 1 at grazing incidence, as that of a smooth interface does; {FREE_RIM} is {GGX} with that end \
-         as one more parameter. Its mean CSSIM is {} against {} of {GGX} (lower in {} cells) and {} of {PAPER} (lower in {}), all with polish.",
+        "The Fresnel term of {GGX} rises to 1 at grazing incidence, as that of a smooth interface does; in {FREE_RIM} the value \
+         at grazing incidence is a parameter. The mean CSSIM of {FREE_RIM} is {} against {} of {GGX} (lower in {} cells) and {} of {PAPER} (lower in {}), all with polish.",
         text::score(Some(free)),
         text::score(Some(bound)),
         text::share(wins(0), complete.len()),
@@ -161,7 +161,7 @@ fn cells(study: &Study<'_>) -> Option<Table> {
     (model != PAPER && !pairs.is_empty()).then_some(table)
 }
 
-/// Whether the study's model is the better one, as [BP20a] holds of GGX against Cook-Torrance, and the numbers.
+/// Whether the study's model is the better one, as GGX is better than Cook-Torrance according to [BP20a], and the numbers.
 pub(super) fn claim(study: &Study<'_>) -> (Verdict, String) {
     if study.model == PAPER {
         return (Verdict::NotDecided, format!("{PAPER} is the model of this study."));
@@ -182,7 +182,7 @@ pub(super) fn claim(study: &Study<'_>) -> (Verdict, String) {
     if parts.is_empty() {
         return (Verdict::NotDecided, text::ABSENT.to_owned());
     }
-    let held = if study.model == GGX { " [BP20a] holds GGX to be the better model." } else { "" };
+    let held = if study.model == GGX { " According to [BP20a], GGX is the better model." } else { "" };
     let words = format!("{}{held} Judged by the first: {}.", parts.join(" "), verdict::rule(judged));
     (verdict::paired(judged), words)
 }

@@ -26,10 +26,10 @@ pub(super) fn section(study: &Study<'_>) -> anyhow::Result<Section> {
         ("The paper: 32 samples are usable", table_one::claim(study)),
         ("The paper: sharper than low resolution", low_resolution::claim(study)),
         ("The paper: ten times cheaper than brute force", cost::claim(study, Method::Ours)),
-        ("So with polish", cost::claim(study, Method::OursPolished)),
+        ("The same with polish", cost::claim(study, Method::OursPolished)),
     ];
     let mut table = Table::new(
-        "What was claimed, and what the numbers say; each rule is beside its numbers.",
+        "The claims, the verdict on each, and the numbers and the rule of the verdict.",
         3,
         ["claim", "verdict", "numbers and rule"],
     );
@@ -62,7 +62,7 @@ fn brute(study: &Study<'_>) -> (Verdict, String) {
     });
     let words = format!(
         "Mean CSSIM {} against {} over {}, a difference of {}.{worst} Confirmed if the mean difference is at most {MEAN_SLACK} \
-         and none above {CELL_SLACK}.",
+         and no difference is above {CELL_SLACK}.",
         text::score(ours),
         text::score(rival),
         text::count(pairs.len(), "cell"),

@@ -64,7 +64,7 @@ pub(super) fn section(study: &Study<'_>) -> anyhow::Result<Section> {
     }
     let csv = table.csv("table1");
     section.blocks.extend([Block::Table(table), Block::Data(csv)]);
-    section.text("The paper's .6282 and .6115 are surely misprints of .06282 and .06115: ten times as bad from all pixels as from 32 of them is no result.");
+    section.text("The paper's .6282 and .6115 are probably misprints of .06282 and .06115: a match from all pixels cannot be ten times as bad as one from 32 of them.");
     let (verdict, words) = claim(study);
     section.finding(verdict, words);
     Ok(section)

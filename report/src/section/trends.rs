@@ -55,8 +55,7 @@ pub(super) fn section(study: &Study<'_>) -> anyhow::Result<Section> {
         signs(&trends[0]),
         verdict::rule(&trends[0])
     );
-    section
-        .finding(verdict::paired(&trends[0]), words.replace("margin", "correlation").replace("comparisons", "cells"));
+    section.finding(verdict::paired(&trends[0]), words.replace("margin", "correlation"));
     section.finding(Verdict::Measured, format!("The mean diffuse albedo {}.", signs(&trends[1])));
     Ok(section)
 }

@@ -24,7 +24,7 @@ pub(super) fn section(study: &Study<'_>) -> anyhow::Result<Section> {
         return Ok(section.missing("the experiment \"methods\""));
     }
     let columns = ["material", "light", "size", "method", "CSSIM", "evaluations", "of", "CPU s", "charged s"];
-    let caption = "Brute force is the best of its starts, and the sum of what they cost. Charged: its evaluations times the median \
+    let caption = "Brute force has the best score of its starts and the sum of their costs. Charged: its evaluations times the median \
                    seconds of one direct rendering, without its score; for the two stages, the CPU seconds themselves.";
     let mut table = Table::new(caption, 4, columns);
     let mut strip = Vec::new();
@@ -48,7 +48,7 @@ pub(super) fn section(study: &Study<'_>) -> anyhow::Result<Section> {
         verdict::no_worse(&pairs),
         format!(
             "On these cells our best match differs from the best of brute force by {} (negative: ours is better); confirmed if \
-             the mean is at most {:.3} and none is above {:.2}.",
+             the mean is at most {:.3} and no difference is above {:.2}.",
             text::list(&margins),
             verdict::MEAN_SLACK,
             verdict::CELL_SLACK
