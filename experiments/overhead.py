@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
-"""What the runner itself costs, beside Dask distributed: nodes that do nothing, two worker processes of one thread each.
+"""The cost of the runner, beside Dask distributed: nodes that do nothing, two worker processes of one thread each.
 
 Usage: overhead.py [--program lookalike-overhead] [--repetitions N] [--nodes N ...] [--dask-nodes N ...] [--only-write]
 
-Measures both in turn, so that whatever else the machine does hits both, and writes docs/overhead.json (every measurement) and the
+Measures both in turn, so that other load on the machine affects both, and writes docs/overhead.json (every measurement) and the
 tables of docs/overhead.md (between its markers). Needs Python 3.10 and the package `distributed`; first
 `cargo build --release -p lookalike-tests --bin lookalike-overhead`.
 """
@@ -24,7 +24,7 @@ ROUND = 21
 
 
 def ours(program, *arguments):
-    """What one measurement of lookalike-overhead says."""
+    """The result of one measurement by lookalike-overhead."""
     done = subprocess.run([str(program), *map(str, arguments)], capture_output=True, text=True)
     if done.returncode:
         sys.exit(f"{program} {' '.join(map(str, arguments))}\n{done.stderr}")

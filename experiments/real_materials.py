@@ -3,8 +3,9 @@
 
 Usage: real_materials.py --data DIR --make-merl make_merl.py [--lookalike PROGRAM] [--work DIR] [--only MATERIAL-PROBE ...]
 
-Renders four measured materials under three light probes (photos that are there already are kept), fits each with the models
-(--models; with --pattern once more with pattern search), and writes docs/real-materials.csv (every candidate) and the tables of docs/real-materials.md (between its markers).
+Renders four measured materials under three light probes (existing photos are kept), fits each with the models (--models; with --pattern
+once more with pattern search), and writes docs/real-materials.csv (every candidate) and the tables of docs/real-materials.md (between its
+markers).
 Needs Python 3.10 and, for make_merl.py, numpy. About an hour on two cores.
 """
 import argparse
@@ -15,7 +16,7 @@ import subprocess
 import sys
 
 MATERIALS = ["gold-metallic-paint3", "aluminium", "red-metallic-paint", "blue-acrylic"]
-# Samples per pixel: a typical pixel is noisy by less than 1 % (`lookalike render` says it).
+# Samples per pixel: the noise of a typical pixel is at most 1.3 % (docs/real-materials.md).
 PROBES = {"rnl_cross": ("Eucalyptus Grove", 3072), "grace_cross": ("Grace Cathedral", 3072), "uffizi": ("Uffizi", 6144)}
 MODELS = ["ggx", "cook-torrance"]
 ROOT = pathlib.Path(__file__).resolve().parent.parent

@@ -3,8 +3,9 @@
 
 Usage: speed.py --before PROGRAM --after PROGRAM --data DIR [--runs 3] [--works demo,256,...]
 
-DIR holds the light probes in `probes/`. Photos are rendered by AFTER's `render`, so both fit the same files. CPU seconds are of
-the whole process tree, user and system; memory is the largest resident set of any process. Medians over the runs. Needs Python 3.10; the machine should be idle.
+DIR holds the light probes in `probes/`. Photos are rendered by the program AFTER, so both fit the same files. CPU seconds are of the
+whole process tree, user and system; memory is the largest resident set of any process. The table has medians over the runs. Needs Python
+3.10 and an otherwise idle machine.
 """
 import argparse
 import json

@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
-"""How much sooner two workers are done than one, on this machine, and what is left of the second one's time.
+"""How much faster two workers are than one, on this machine, and how long they were idle.
 
 Usage: speedup.py [--program lookalike] [--out DIR] COMMAND ARGUMENTS...
 
-COMMAND is `fit` or `batch` with its arguments but --out and --workers. It runs twice, with one and with two workers of one thread
+COMMAND is `fit` or `batch` with its arguments, without --out and --workers. It runs twice, with one and with two workers of one thread
 each, which join by the access file as remote ones do. Prints the seconds of both, their ratio, and from the journal of the second
 run how long both workers, one, or none held a node. First `cargo build --release --bin lookalike`. Needs Python 3.10.
 """
