@@ -150,7 +150,7 @@ fn stage_two(study: &Study<'_>) -> Option<String> {
     let shares: Vec<f64> = study.cells().into_iter().filter_map(share).filter(|share| share.is_finite()).collect();
     let (low, high) = range(&shares)?;
     Some(format!(
-        "Stage two, its table included, takes {} % of the CPU seconds of ours without polish in the mean of {}, from {} % to \
+        "Stage two, its table included, takes {} % of the CPU seconds of ours without polish on average over {}, from {} % to \
          {} %; the paper calls it negligible.",
         text::fixed(mean(&shares), 1),
         text::count(shares.len(), "cell"),

@@ -136,7 +136,7 @@ pub(super) fn claim(pairs: &[Pair<'_>]) -> (Verdict, String) {
         return (Verdict::NotDecided, text::ABSENT.to_owned());
     };
     let words = format!(
-        "From samples CSSIM differs from that of all pixels by {} in the mean of {} (with sign, positive worse: {}), most by {} \
+        "CSSIM from samples differs from that from all pixels by {} on average over {} (with sign, positive worse: {}), at most by {} \
          ({}); each is {}. Confirmed if the mean absolute difference is at most {CLOSE:.3} and no difference is above \
          {CELL_SLACK:.2}; refuted if the mean is above {CELL_SLACK:.2}.",
         text::score(mean(&off)),

@@ -92,7 +92,7 @@ pub(super) fn claim(study: &Study<'_>, method: Method) -> (Verdict, String) {
     }
     let wins = margins.iter().filter(|margin| **margin > 0.0).count();
     let words = format!(
-        "Under held-out lights {} beats L2 in {} cases, by a CSSIM of {} in the mean; {}.",
+        "Under held-out lights {} beats L2 in {} cases, by a CSSIM of {} on average; {}.",
         text::method(method),
         text::share(wins, margins.len()),
         text::signed(mean(&margins)),
@@ -109,7 +109,7 @@ fn polish(cases: &[Case<'_>]) -> Option<(Verdict, String)> {
     let wins = margins.iter().filter(|margin| **margin > 0.0).count();
     let verb = if mean > 0.0 { "helps" } else { "hurts" };
     let words = format!(
-        "Polish on the fitting light {verb} under held-out lights: it {} CSSIM by {} in the mean, and lowers it in {} cases; that \
+        "Polish on the fitting light {verb} under held-out lights: it {} CSSIM by {} on average, and lowers it in {} cases; that \
          it helps is judged so: {}.",
         if mean > 0.0 { "lowers" } else { "raises" },
         text::score(Some(mean.abs())),
@@ -126,7 +126,7 @@ fn runner_up(cases: &[Case<'_>]) -> Option<String> {
     let wins = pairs.iter().filter(|(runner_up, ours)| ours < runner_up).count();
     let column = |value: fn(&(f64, f64)) -> f64| mean(&pairs.iter().map(value).collect::<Vec<_>>());
     Some(format!(
-        "The winner of stage two scores {} under held-out lights in the mean, its runner-up (the best of the γs that are at least \
+        "The winner of stage two scores {} under held-out lights on average, its runner-up (the best of the γs that are at least \
          {APART} from the winner's) {}; the winner is the better one in {} cases.",
         text::score(Some(column(|pair| pair.1)?)),
         text::score(Some(column(|pair| pair.0)?)),

@@ -95,7 +95,7 @@ fn claim_at(study: &Study<'_>, image: u32) -> (Verdict, String) {
         let of: Vec<f64> = pairs(study, image, size).iter().map(|(few, low)| low.cssim - few.cssim).collect();
         if !of.is_empty() {
             let wins = text::share(of.iter().filter(|margin| **margin > 0.0).count(), of.len());
-            parts.push(format!("at {size} pixels in {wins} cells, by {} in the mean", text::signed(mean(&of))));
+            parts.push(format!("at {size} pixels in {wins} cells, by {} on average", text::signed(mean(&of))));
         }
         // At the full size of the image, low resolution is brute force itself.
         margins.extend(of.into_iter().filter(|_| size < image));

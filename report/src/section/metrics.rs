@@ -181,7 +181,7 @@ fn nearest(study: &Study<'_>, section: &mut Section) {
     let csv = table.csv("nearest-to-paper");
     section.blocks.extend([Block::Table(table), Block::Data(csv)]);
     let words = format!(
-        "Nearest to the paper's means of 256 samples is {} with {model} by {metric}: {} from them in the mean over {}.",
+        "Nearest to the paper's means of 256 samples is {} with {model} by {metric}: {} from them on average over {}.",
         text::method(method),
         text::score(Some(off)),
         text::count(lights.len(), "light")

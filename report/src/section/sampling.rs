@@ -53,7 +53,7 @@ pub(super) fn section(study: &Study<'_>) -> anyhow::Result<Section> {
     section.blocks.push(Block::Table(table));
     let wins = margins.iter().filter(|margin| **margin > 0.0).count();
     let words = format!(
-        "{} beats the others in {} comparisons, by a CSSIM of {} in the mean; {}.",
+        "{} beats the others in {} comparisons, by a CSSIM of {} on average; {}.",
         capitalised(kinds[0]),
         text::share(wins, margins.len()),
         text::signed(mean(&margins)),

@@ -110,7 +110,7 @@ fn spread(levels: &[(u32, Vec<Cell<'_>>)], section: &mut Section) -> anyhow::Res
     section.blocks.push(Block::Table(table));
     section.finding(
         Verdict::Measured,
-        format!("The standard deviation of CSSIM over seeds is {} in the mean over cells.", text::list(&deviations)),
+        format!("The standard deviation of CSSIM over seeds is {} on average over the cells.", text::list(&deviations)),
     );
     Ok(())
 }
@@ -150,7 +150,7 @@ fn polish(study: &Study<'_>, section: &mut Section) {
         return section.blocks.push(Block::Missing(needs.to_owned()));
     };
     let words = format!(
-        "Polish lowers CSSIM by {} in the mean and {} in the median of {}, from {} to {}.",
+        "Polish lowers CSSIM by {} on average and {} in the median of {}, from {} to {}.",
         text::score(mean(&gains)),
         text::score(median(&gains)),
         text::count(gains.len(), "cell"),

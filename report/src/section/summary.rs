@@ -79,7 +79,7 @@ fn fitting(study: &Study<'_>) -> (Verdict, String) {
     }
     let wins = margins.iter().filter(|margin| **margin > 0.0).count();
     let words = format!(
-        "Lower CSSIM in {} cells, by {} in the mean; {}.",
+        "Lower CSSIM in {} cells, by {} on average; {}.",
         text::share(wins, margins.len()),
         text::signed(mean(&margins)),
         verdict::rule(&margins)

@@ -152,7 +152,7 @@ fn models_sampling_seeds_and_clamping_are_judged() {
     assert_eq!(row(tables(&clamped)[0], &["delrin", "clamped"])[2], "20");
     let seeds = section_of(&data, "seeds");
     assert_eq!(row(tables(&seeds)[0], &["256"])[1..3], ["12", "240"]);
-    assert!(findings(&seeds)[1].1.contains("lowers CSSIM by 0.0040 in the mean and 0.0040 in the median of 12 cells"));
+    assert!(findings(&seeds)[1].1.contains("lowers CSSIM by 0.0040 on average and 0.0040 in the median of 12 cells"));
 }
 
 #[test]
