@@ -27,10 +27,10 @@ mod window;
 use crate::{
     exit::Exit,
     inputs::show_warnings,
-    outputs::{BATCH_MARK, Claim, ClaimedFolder, FIT_FILES, OldFiles, OutFolder, print_result},
+    outputs::{BATCH_MARK, Claim, ClaimedFolder, FIT_FILES, OutFolder, print_result},
     progress::{Ending, Shape, display},
     run::Session,
-    settings::{BatchFit, BatchSettings, OnFailure, ProgressKind},
+    settings::{BatchFit, BatchSettings, OldFiles, OnFailure, ProgressKind},
 };
 use anyhow::Context;
 use board::{Board, Watchers};
@@ -96,7 +96,7 @@ pub(crate) fn run(settings: BatchSettings) -> anyhow::Result<ExitCode> {
         out: &out,
         out_name: &out_name,
         identity,
-        resume: settings.resume,
+        resume: settings.old_files == OldFiles::Resume,
         seed: fits.first().map_or(0, |fit| fit.method.seed),
         metrics: metrics.as_ref(),
         score: None,
@@ -143,7 +143,7 @@ fn claim(settings: &BatchSettings) -> Claim<'_> {
         fits: settings.fits.iter().map(|fit| fit.name.as_str()).collect(),
         inputs,
         access: settings.cluster.access.as_deref(),
-        ..Claim::of_fit(&settings.out, OldFiles::of(settings.resume, settings.force))
+        ..Claim::of_fit(&settings.out, settings.old_files)
     }
 }
 

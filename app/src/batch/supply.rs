@@ -176,9 +176,9 @@ mod tests {
     use super::*;
     use crate::{
         batch::{board::Watchers, window::Demand},
-        outputs::{Claim, ClaimedFolder, OldFiles},
+        outputs::{Claim, ClaimedFolder},
         progress::{Shape, display},
-        settings::ProgressKind,
+        settings::{OldFiles, ProgressKind},
     };
     use lookalike_coordinator::journal::PartLedger;
     use serde_json::Value;

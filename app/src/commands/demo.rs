@@ -3,7 +3,7 @@
 use crate::{
     demo::{environment, material, photo},
     fit::{self, FitJob},
-    outputs::{Claim, ClaimedFolder, FIT_FILES, OldFiles, OutFolder, Panel, Pictures, print_result, strip},
+    outputs::{Claim, ClaimedFolder, FIT_FILES, OutFolder, Panel, Pictures, print_result, strip},
     progress::print_line,
     settings::{ClusterSettings, DemoSettings},
 };
@@ -30,9 +30,10 @@ const SHOWN: [f64; 3] = [1.0, 2.0, 3.0];
 
 pub(crate) fn run(settings: DemoSettings) -> anyhow::Result<ExitCode> {
     let began = Instant::now();
-    let old = if settings.force { OldFiles::Replace } else { OldFiles::ReplaceDemo };
     let files = FIT_FILES.into_iter().chain(FILES).collect();
-    let out = ClaimedFolder::take(&Claim { command: "demo", files, ..Claim::of_fit(&settings.out, old) })?.begin()?;
+    let out =
+        ClaimedFolder::take(&Claim { command: "demo", files, ..Claim::of_fit(&settings.out, settings.old_files) })?
+            .begin()?;
     print_line("making a photo of a pearl paint under lacquer, in a pavilion with four windows");
     let map = environment::lat_long(MAP_ROWS);
     let light = Arc::new(Environment::new(map.clone()).context("the demo's light")?);

@@ -4,8 +4,8 @@ use super::activity::Activity;
 use crate::{
     fit::{self, FitJob},
     inputs::{load_capture, resolve_display_exposure, show_warnings},
-    outputs::{Claim, ClaimedFolder, OldFiles},
-    settings::{FitSettings, ProgressKind},
+    outputs::{Claim, ClaimedFolder},
+    settings::{FitSettings, OldFiles, ProgressKind},
 };
 use std::{process::ExitCode, sync::Arc, time::Instant};
 
@@ -33,7 +33,7 @@ pub(crate) fn run(settings: FitSettings) -> anyhow::Result<ExitCode> {
         out_name: settings.out.display().to_string(),
         max_cssim: settings.max_cssim,
         also_render: Vec::new(),
-        resume: settings.resume,
+        resume: settings.old_files == OldFiles::Resume,
         input_seconds: began.elapsed().as_secs_f64(),
     };
     Ok(fit::run(job)?.map_or(ExitCode::SUCCESS, |finished| finished.code))
@@ -44,9 +44,5 @@ fn claim(settings: &FitSettings) -> Claim<'_> {
     let mut inputs = settings.capture.files();
     inputs.extend(settings.display_exposure.file());
     inputs.extend(settings.cluster.access.as_deref());
-    Claim {
-        inputs,
-        access: settings.cluster.access.as_deref(),
-        ..Claim::of_fit(&settings.out, OldFiles::of(settings.resume, settings.force))
-    }
+    Claim { inputs, access: settings.cluster.access.as_deref(), ..Claim::of_fit(&settings.out, settings.old_files) }
 }

@@ -8,7 +8,7 @@
 //! | a symbolic link or a folder with such a name | refused | refused | refused | refused |
 
 use super::ledger::{LEDGER, Ledger, hash_of};
-use crate::problems::Problems;
+use crate::{problems::Problems, settings::OldFiles};
 use anyhow::bail;
 use lookalike_coordinator::{
     atomic::draft_of,
@@ -40,30 +40,6 @@ const KEY_FILE: &str = "access.key.pem";
 
 /// Files of every run beside its journal. They are rewritten throughout the run, so their hashes are not checked.
 const RUN_FILES: [&str; 3] = [STATUS_FILE, ACCESS_FILE, KEY_FILE];
-
-/// What a run does with existing files.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum OldFiles {
-    /// Refuse them.
-    Refuse,
-    /// Resume the run that wrote them.
-    Resume,
-    /// Replace them.
-    Replace,
-    /// Replace them if they are those of a demo.
-    ReplaceDemo,
-}
-
-impl OldFiles {
-    /// The choice for the flags `--resume` and `--force`.
-    pub(crate) fn of(is_resumed: bool, is_forced: bool) -> Self {
-        match (is_resumed, is_forced) {
-            (_, true) => Self::Replace,
-            (true, false) => Self::Resume,
-            (false, false) => Self::Refuse,
-        }
-    }
-}
 
 /// The files that a run reads and writes.
 #[derive(Debug, Clone)]

@@ -1,9 +1,10 @@
 //! The folder of results: checked and locked before any work. Only files that the run wrote are replaced.
 
 use super::{
-    claim::{Claim, FIT_FILES, OldFiles, changed, is_file, is_there},
+    claim::{Claim, FIT_FILES, changed, is_file, is_there},
     ledger::{Ledger, hash_of},
 };
+use crate::settings::OldFiles;
 use anyhow::{Context, bail};
 use lookalike_coordinator::{
     atomic,

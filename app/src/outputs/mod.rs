@@ -10,7 +10,7 @@ mod pictures;
 mod strip;
 mod summary;
 
-pub(crate) use claim::{ACCESS_FILE, BATCH_MARK, Claim, FIT_FILES, MARK, OldFiles, changed};
+pub(crate) use claim::{ACCESS_FILE, BATCH_MARK, Claim, FIT_FILES, MARK, changed};
 pub(crate) use conventions::conventions;
 pub(crate) use fit_json::{FitRecord, Timing, parameters_json};
 pub(crate) use folder::{ClaimedFolder, OutFolder};

@@ -1,6 +1,7 @@
 //! Which files a run may replace: each case of the table in `claim`.
 
-use super::{BATCH_MARK, Claim, ClaimedFolder, FIT_FILES, OldFiles, OutFolder};
+use super::{BATCH_MARK, Claim, ClaimedFolder, FIT_FILES, OutFolder};
+use crate::settings::OldFiles;
 use std::{fs, path::Path};
 use tempfile::TempDir;
 

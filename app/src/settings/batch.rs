@@ -1,6 +1,6 @@
 //! The settings of `lookalike batch`.
 
-use super::{CaptureSettings, ClusterSettings, DisplayExposure, MetricsAddress, ProgressKind};
+use super::{CaptureSettings, ClusterSettings, DisplayExposure, MetricsAddress, OldFiles, ProgressKind};
 use lookalike::fit::Method;
 use std::{ffi::OsString, path::PathBuf};
 
@@ -13,10 +13,8 @@ pub struct BatchSettings {
     pub fits: Vec<BatchFit>,
     /// The folder of results.
     pub out: PathBuf,
-    /// Resume the run in the folder, if there is one.
-    pub resume: bool,
-    /// Replace files with our names in the folder, never an input of the run.
-    pub force: bool,
+    /// What happens to files that the folder holds.
+    pub old_files: OldFiles,
     /// Where stage two, polish and the pictures of each fit are computed.
     pub stage_two: StageTwo,
     /// What happens when a fit fails.

@@ -1,6 +1,6 @@
 //! The settings of `lookalike demo`.
 
-use super::{ProgressKind, Workers};
+use super::{OldFiles, ProgressKind, Workers};
 use std::path::PathBuf;
 
 /// A fit of the bundled scene.
@@ -8,8 +8,8 @@ use std::path::PathBuf;
 pub struct DemoSettings {
     /// The folder of results.
     pub out: PathBuf,
-    /// Replace files with our names even if no demo wrote them.
-    pub force: bool,
+    /// What happens to files that the folder holds.
+    pub old_files: OldFiles,
     /// Local worker processes; never 0.
     pub workers: Workers,
     /// The log filter of the local workers.

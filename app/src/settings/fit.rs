@@ -1,6 +1,6 @@
 //! The settings of `lookalike fit`.
 
-use super::{CaptureSettings, ClusterSettings, DisplayExposure, MetricsAddress, ProgressKind};
+use super::{CaptureSettings, ClusterSettings, DisplayExposure, MetricsAddress, OldFiles, ProgressKind};
 use lookalike::fit::Method;
 use std::path::PathBuf;
 
@@ -17,10 +17,8 @@ pub struct FitSettings {
     pub max_cssim: Option<f64>,
     /// The folder of results.
     pub out: PathBuf,
-    /// Resume the run in the folder, if there is one.
-    pub resume: bool,
-    /// Replace files with our names in the folder, never an input of the run.
-    pub force: bool,
+    /// What happens to files that the folder holds.
+    pub old_files: OldFiles,
     /// Where workers come from.
     pub cluster: ClusterSettings,
     /// How progress is shown.

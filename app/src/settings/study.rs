@@ -1,6 +1,6 @@
 //! The settings of `lookalike study`.
 
-use super::{ClusterSettings, MetricsAddress, ProgressKind};
+use super::{ClusterSettings, MetricsAddress, OldFiles, ProgressKind};
 use std::path::PathBuf;
 
 /// A study: experiments on measured materials under known lights, as one run.
@@ -10,10 +10,8 @@ pub struct StudySettings {
     pub study: PathBuf,
     /// The folder of results.
     pub out: PathBuf,
-    /// Resume the run in the folder, if there is one.
-    pub resume: bool,
-    /// Replace files with our names in the folder, never an input of the run.
-    pub force: bool,
+    /// What happens to files that the folder holds.
+    pub old_files: OldFiles,
     /// Where metrics are served.
     pub metrics: Option<MetricsAddress>,
     /// Where workers come from.

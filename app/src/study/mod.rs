@@ -27,10 +27,10 @@ use crate::{
     exit::Exit,
     fit::version,
     inputs::{load_environment, show_warnings},
-    outputs::{Claim, ClaimedFolder, OldFiles, print_result},
+    outputs::{Claim, ClaimedFolder, print_result},
     progress::{Display, Ending, PartCount, Shape, display, print_line},
     run::Session,
-    settings::{EnvironmentSettings, StudySettings},
+    settings::{EnvironmentSettings, OldFiles, StudySettings},
 };
 use anyhow::Context;
 use effort::Effort;
@@ -76,7 +76,7 @@ pub(crate) fn run(settings: StudySettings) -> anyhow::Result<ExitCode> {
         out: &inputs.out,
         out_name: &out_name,
         identity: identity(&inputs)?,
-        resume: settings.resume,
+        resume: settings.old_files == OldFiles::Resume,
         seed: inputs.study.file.seed,
         metrics: metrics.as_ref(),
         score: None,
@@ -159,7 +159,7 @@ fn claim<'a>(settings: &'a StudySettings, study: &'a Study) -> Claim<'a> {
         folders: vec!["cells", "pictures", "figures"],
         inputs,
         access: settings.cluster.access.as_deref(),
-        ..Claim::of_fit(&settings.out, OldFiles::of(settings.resume, settings.force))
+        ..Claim::of_fit(&settings.out, settings.old_files)
     }
 }
 

@@ -4,6 +4,7 @@ use super::{
     cluster::ClusterArgs,
     fit::{DiagnosticsArgs, score},
     method::MethodArgs,
+    old_files::OldFilesFlags,
     scene::CaptureArgs,
 };
 use crate::settings::{BatchFit, BatchSettings, JobSettings, OnFailure, Preset, StageTwo};
@@ -64,8 +65,7 @@ impl BatchArgs {
             manifest: self.manifest,
             fits,
             out: self.out,
-            resume: self.resume,
-            force: self.force,
+            old_files: OldFilesFlags { resume: self.resume, force: self.force }.into(),
             stage_two: self.stage_two,
             on_failure: if self.fail_fast { OnFailure::FailFast } else { OnFailure::KeepGoing },
             metrics,

@@ -1,6 +1,6 @@
 //! `lookalike fit`.
 
-use super::{cluster::ClusterArgs, method::MethodArgs, scene::CaptureArgs};
+use super::{cluster::ClusterArgs, method::MethodArgs, old_files::OldFilesFlags, scene::CaptureArgs};
 use crate::settings::{FitSettings, MetricsAddress, ProgressKind};
 use anyhow::bail;
 use clap::Args;
@@ -58,8 +58,7 @@ impl FitArgs {
             method: self.method.into_method(),
             max_cssim: self.output.max_cssim,
             out: self.output.out,
-            resume: self.output.resume,
-            force: self.output.force,
+            old_files: OldFilesFlags { resume: self.output.resume, force: self.output.force }.into(),
             cluster: self.cluster.into_settings()?,
             progress: self.diagnostics.progress,
             metrics: self.diagnostics.metrics,

@@ -9,6 +9,7 @@ mod cluster;
 mod compare;
 mod fit;
 mod method;
+mod old_files;
 mod policy;
 mod render;
 mod scene;
@@ -19,7 +20,7 @@ pub(crate) use batch::{BatchArgs, EntryArgs};
 pub(crate) use fit::FitArgs;
 pub(crate) use method::MethodArgs;
 
-use crate::settings::{DemoSettings, Preset, ProgressKind, Workers};
+use crate::settings::{DemoSettings, OldFiles, Preset, ProgressKind, Workers};
 use anyhow::bail;
 use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
@@ -91,7 +92,8 @@ impl DemoArgs {
         if self.workers == Workers::Count(0) {
             bail!("the demo computes with local workers only; give --workers 1 or more");
         }
-        Ok(DemoSettings { out: self.out, force: self.force, workers: self.workers, progress: self.progress, log: None })
+        let old_files = if self.force { OldFiles::Replace } else { OldFiles::ReplaceDemo };
+        Ok(DemoSettings { out: self.out, old_files, workers: self.workers, progress: self.progress, log: None })
     }
 }
 

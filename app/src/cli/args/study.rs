@@ -1,6 +1,6 @@
 //! `lookalike study`.
 
-use super::{cluster::ClusterArgs, fit::DiagnosticsArgs};
+use super::{cluster::ClusterArgs, fit::DiagnosticsArgs, old_files::OldFilesFlags};
 use crate::settings::{JobSettings, StudySettings};
 use clap::Args;
 use std::{ffi::OsString, path::PathBuf};
@@ -41,8 +41,7 @@ impl StudyArgs {
         Ok(StudySettings {
             study: self.study,
             out: self.out,
-            resume: self.resume,
-            force: self.force,
+            old_files: OldFilesFlags { resume: self.resume, force: self.force }.into(),
             metrics: self.diagnostics.metrics,
             cluster: self.cluster.into_settings()?,
             progress: self.diagnostics.progress,
