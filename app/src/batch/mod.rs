@@ -147,11 +147,12 @@ fn claim(settings: &BatchSettings) -> Claim<'_> {
     }
 }
 
-/// Checks a batch without running it.
-pub(crate) fn check(settings: &BatchSettings) -> anyhow::Result<()> {
-    claim(settings).check()?;
+/// Checks a batch that a job is to run, and carries out `--force`, which the job does not get.
+pub(crate) fn prepare_job(settings: &BatchSettings) -> anyhow::Result<()> {
+    let claim = claim(settings);
+    claim.check()?;
     show_warnings(&check::check(settings, &Lights::default())?.warnings);
-    Ok(())
+    claim.replace_now()
 }
 
 /// The files of all fits, each with its hash.

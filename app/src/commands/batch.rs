@@ -13,5 +13,5 @@ pub(crate) fn run(settings: BatchSettings) -> anyhow::Result<ExitCode> {
 
 /// Submits the batch.
 pub(crate) fn submit(settings: &BatchSettings, job: JobSettings) -> anyhow::Result<ExitCode> {
-    submit::submit(job, &settings.out, || batch::check(settings))
+    submit::submit(job, &settings.out, || batch::prepare_job(settings))
 }

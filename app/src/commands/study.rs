@@ -13,5 +13,5 @@ pub(crate) fn run(settings: StudySettings) -> anyhow::Result<ExitCode> {
 
 /// Submits the study.
 pub(crate) fn submit(settings: &StudySettings, job: JobSettings) -> anyhow::Result<ExitCode> {
-    submit::submit(job, &settings.out, || study::check(settings))
+    submit::submit(job, &settings.out, || study::prepare_job(settings))
 }

@@ -9,11 +9,12 @@ use crate::{
 use anyhow::Context;
 use std::{env, path, path::Path, process::ExitCode};
 
-/// Submits a run whose results go to the folder `out`. The problems that `check` finds are reported before the job is queued.
+/// Submits a run whose results go to the folder `out`. `prepare` runs before the job is queued and reports
+/// problems of its inputs.
 pub(crate) fn submit(
     job: JobSettings,
     out: &Path,
-    check: impl FnOnce() -> anyhow::Result<()>,
+    prepare: impl FnOnce() -> anyhow::Result<()>,
 ) -> anyhow::Result<ExitCode> {
     let job = SlurmJob {
         command: command_line(&job.typed)?,
@@ -23,7 +24,7 @@ pub(crate) fn submit(
         out: path::absolute(out).context("--out")?,
     };
     job.script()?;
-    check()?;
+    prepare()?;
     if job.options.is_empty() {
         let note = "note: no options for sbatch were given after --, such as -- --nodes=4 --cpus-per-task=16, so the job gets the \
                     cluster's defaults, often one CPU";

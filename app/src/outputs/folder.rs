@@ -96,6 +96,19 @@ impl ClaimedFolder {
     }
 }
 
+impl Claim<'_> {
+    /// With `--force`: removes the files that the run replaces, ahead of the run.
+    ///
+    /// # Errors
+    /// Those of [`ClaimedFolder::take`] and [`ClaimedFolder::begin`].
+    pub(crate) fn replace_now(&self) -> anyhow::Result<()> {
+        if self.old == OldFiles::Replace {
+            ClaimedFolder::take(self)?.begin()?;
+        }
+        Ok(())
+    }
+}
+
 impl OutFolder {
     /// The files of a fit that exist, each with the BLAKE3 of its bytes.
     pub(crate) fn results(&self) -> anyhow::Result<Vec<(String, String)>> {

@@ -12,8 +12,9 @@ pub fn command_line(typed: &[OsString]) -> anyhow::Result<Vec<String>> {
     let mut command = Vec::new();
     for argument in typed.iter().take_while(|argument| *argument != "--") {
         match argument.to_str() {
-            // The script asks for --resume itself.
-            Some("--slurm" | "--resume") => {}
+            // The script asks for --resume itself. --force was carried out when the job was submitted: a requeued job would delete
+            // its own results.
+            Some("--slurm" | "--resume" | "--force") => {}
             Some(text) => command.push(text.to_owned()),
             None => bail!("a job script holds UTF-8 only, but the argument {argument:?} is not UTF-8; rename the file"),
         }
@@ -30,5 +31,7 @@ mod tests {
         let typed = "batch a.toml --resume --out run --slurm --seed 3 -- --nodes=4 -p gpu";
         let command = command_line(&typed.split(' ').map(OsString::from).collect::<Vec<_>>()).unwrap();
         assert_eq!(command, ["batch", "a.toml", "--out", "run", "--seed", "3"]);
+        let typed = ["study", "a.toml", "--force", "--out", "run", "--slurm"].map(OsString::from);
+        assert_eq!(command_line(&typed).unwrap(), ["study", "a.toml", "--out", "run"]);
     }
 }

@@ -113,13 +113,15 @@ pub(crate) fn run(settings: StudySettings) -> anyhow::Result<ExitCode> {
     Ok(if failed.is_empty() { Exit::Done } else { Exit::SomeFitsFailed }.into())
 }
 
-/// Checks a study without running it.
-pub(crate) fn check(settings: &StudySettings) -> anyhow::Result<()> {
+/// Checks a study that a job is to run, and carries out `--force`, which the job does not get.
+pub(crate) fn prepare_job(settings: &StudySettings) -> anyhow::Result<()> {
     let study = Study::read(&settings.study)?;
-    claim(settings, &study).check()?;
+    let claim = claim(settings, &study);
+    claim.check()?;
     cells::plan(&study)?;
     read_materials(&study)?;
-    read_lights(&study).map(|_| ())
+    read_lights(&study)?;
+    claim.replace_now()
 }
 
 /// Computes the cells that are not complete. Returns how many workers joined.

@@ -203,6 +203,7 @@ fn invalid_command_lines_are_refused_before_anything_is_started() {
         ("fit photo.exr --env map.exr", "expected --out DIR"),
         ("study study.toml", "expected --out DIR"),
         ("fit photo.exr --env map.exr --out run --workers 3", "--workers cannot be used in a Slurm job"),
+        ("fit photo.exr --env map.exr --out run --force", "--force cannot be used in a job, because a requeued job"),
         ("fit photo.exr --env map.exr --out run --listen=0.0.0.0:1", "--listen cannot be used in a Slurm job"),
     ];
     for (line, words) in cases {

@@ -56,6 +56,31 @@ fn study_is_submitted_like_a_batch() {
 }
 
 #[test]
+fn force_is_carried_out_at_submission_and_is_not_in_the_job() {
+    let site = site("echo 4711");
+    let at = |name: &str| site.path().join("run").join(name);
+    for (line, result) in [("batch two.toml", "summary.csv"), ("study study.toml", "report.html")] {
+        fs::create_dir_all(at("")).unwrap();
+        for name in [result, "run.sqlite", "notes.txt"] {
+            fs::write(at(name), "old").unwrap();
+        }
+        let (code, _, stderr) = say(site.path(), &format!("{line} --out run --slurm"));
+        assert!(code == Some(2) && stderr.contains("--force"), "{stderr}");
+        // Nothing is removed if the inputs have a mistake.
+        fs::rename(site.path().join("map.exr"), site.path().join("moved.exr")).unwrap();
+        let (code, _, stderr) = say(site.path(), &format!("{line} --out run --slurm --force"));
+        assert!(code == Some(2) && at(result).exists() && at("run.sqlite").exists(), "{stderr}");
+        fs::rename(site.path().join("moved.exr"), site.path().join("map.exr")).unwrap();
+        let (code, stdout, stderr) = say(site.path(), &format!("{line} --out run --slurm --force"));
+        assert_eq!((code, stdout.as_str()), (Some(0), "4711\n"), "{stderr}");
+        assert!(!at(result).exists() && !at("run.sqlite").exists() && at("notes.txt").exists());
+        let script = fs::read_to_string(at("lookalike.sbatch")).unwrap();
+        assert!(script.contains(&format!("\nset -- {line} --out run\n")), "{script}");
+        fs::remove_dir_all(at("")).unwrap();
+    }
+}
+
+#[test]
 fn mistakes_are_reported_before_anything_is_submitted() {
     let site = site("touch submitted; echo 4711");
     for (line, words) in [
