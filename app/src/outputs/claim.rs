@@ -12,7 +12,7 @@ use crate::{problems::Problems, settings::OldFiles};
 use anyhow::bail;
 use lookalike_coordinator::{
     atomic::draft_of,
-    journal::{JOURNAL_FILE, LOCK_FILE, status::STATUS_FILE},
+    journal::{self, JOURNAL_FILE, LOCK_FILE, status::STATUS_FILE},
 };
 use serde_json::Value;
 use std::{
@@ -170,7 +170,8 @@ impl<'a> Claim<'a> {
         let own = self.files.iter().chain(&self.growing).chain(&self.folders).map(|name| (*name).to_owned());
         let of_fits = self.fits.iter().flat_map(|fit| FIT_FILES.map(|file| format!("{fit}/{file}")));
         let own_access = |name: &&str| *name == STATUS_FILE || self.access.is_none();
-        own.chain(of_fits).chain(RUN_FILES.into_iter().filter(own_access).map(str::to_owned)).collect()
+        let of_run = RUN_FILES.into_iter().filter(own_access).map(str::to_owned);
+        own.chain(of_fits).chain(of_run).chain(journal_companions()).collect()
     }
 
     /// Refuses to replace an input of the run.
@@ -224,11 +225,15 @@ impl<'a> Claim<'a> {
         if !is_kind {
             return Some(self.in_the_way(name));
         }
-        let is_passing = is_folder || self.growing.contains(&name) || RUN_FILES.contains(&name);
+        let is_companion = journal_companions().any(|companion| companion == name);
+        let is_rewritten = self.growing.contains(&name) || RUN_FILES.contains(&name) || is_companion;
+        let is_passing = is_folder || is_rewritten;
         let is_fine = match self.old {
             OldFiles::Replace => !is_folder || ledger.is_begun(),
             // Left by a run that ended before it had a journal.
-            OldFiles::Refuse => (RUN_FILES.contains(&name) || self.growing.contains(&name)) && ledger.is_begun(),
+            OldFiles::Refuse => is_rewritten && ledger.is_begun(),
+            // SQLite removes them.
+            OldFiles::Resume if is_companion => ledger.is_begun(),
             OldFiles::Resume if is_passing => has_journal || ledger.is_begun(),
             OldFiles::Resume | OldFiles::ReplaceDemo if ledger.is_begun() => {
                 is_passing || self.is_of_run(name, &path, ledger)
@@ -239,7 +244,9 @@ impl<'a> Claim<'a> {
         };
         match (is_fine, self.old) {
             (true, _) => None,
-            (false, OldFiles::Resume) if has_journal => Some(changed(name, &self.out.display().to_string())),
+            (false, OldFiles::Resume) if has_journal && !is_companion => {
+                Some(changed(name, &self.out.display().to_string()))
+            }
             (false, OldFiles::Replace) => Some(format!(
                 "{} holds files that no run in this folder wrote: choose another --out, or move that folder elsewhere",
                 path.display()
@@ -290,6 +297,12 @@ impl<'a> Claim<'a> {
             ),
         }
     }
+}
+
+/// The names of the files beside the journal that SQLite and the journal's creation write and remove.
+fn journal_companions() -> impl Iterator<Item = String> {
+    let files = journal::all_files(Path::new(JOURNAL_FILE)).into_iter().skip(1);
+    files.map(|file| file.to_string_lossy().into_owned())
 }
 
 /// The message that a file differs from what the run wrote.

@@ -150,6 +150,37 @@ fn refused_while_locked(claim: &Claim<'_>, phrase: &str) {
 }
 
 #[test]
+fn files_beside_a_journal_are_replaced_only_where_a_run_has_begun() {
+    const NAMES: [&str; 7] = [
+        "run.sqlite-wal",
+        "run.sqlite-shm",
+        "run.sqlite-journal",
+        "run.sqlite.new",
+        "run.sqlite.new-wal",
+        "run.sqlite.new-shm",
+        "run.sqlite.new-journal",
+    ];
+    for name in NAMES {
+        let folder = folder(&[(name, "mine")]);
+        let out = folder.path();
+        refused(&fit(out, OldFiles::Refuse), &[name, "already exists", "--force"]);
+        refused(&fit(out, OldFiles::Resume), &[name, "is not a file of this run"]);
+        refused(&demo(out, OldFiles::ReplaceDemo), &["holds files that are not from a demo", name]);
+        fs::write(out.join("run.sqlite"), "").unwrap();
+        refused(&fit(out, OldFiles::Resume), &[name, "is not a file of this run"]);
+        assert_eq!(fs::read(out.join(name)).unwrap(), b"mine");
+        drop(begin(&fit(out, OldFiles::Replace)));
+        assert!(!out.join(name).exists());
+        // Left by a process that was killed, before its journal was in place and after.
+        fs::write(out.join(name), "ours").unwrap();
+        drop(begin(&fit(out, OldFiles::Refuse)));
+        fs::write(out.join("run.sqlite"), "").unwrap();
+        drop(begin(&fit(out, OldFiles::Resume)));
+        assert!(out.join(name).exists());
+    }
+}
+
+#[test]
 fn batch_refuses_the_folder_of_another_fit() {
     let folder = folder(&[("a/fit.json", FIT), ("b/run.sqlite", ""), ("c/match.png", ""), ("d/notes.txt", "")]);
     let claim = |old| Claim {

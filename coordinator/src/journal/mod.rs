@@ -64,7 +64,7 @@ pub use self::lock::{LOCK_FILE, LockError, RunLock};
 pub use self::options::{JOURNAL_FILE, JournalOptions, Score};
 pub use self::parts::{PartLedger, PartRow, PartStatus, written};
 use self::past::{Loaded, Past};
-pub use self::schema::remove;
+pub use self::schema::{all_files, remove};
 use self::writer::{Command, Writer};
 use crate::state::Deaths;
 use crate::state::past_outputs::{Memory, PastOutputs};

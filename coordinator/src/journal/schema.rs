@@ -125,6 +125,17 @@ fn beside(path: &Path, suffix: &str) -> PathBuf {
     name.into()
 }
 
+/// All files that a journal of this path may use: its own, then those of an unfinished one. Any of them may be removed.
+#[must_use]
+pub fn all_files(path: &Path) -> Vec<PathBuf> {
+    files(path).into_iter().chain(files(&unfinished(path))).collect()
+}
+
+/// Where a journal is made before it appears.
+fn unfinished(path: &Path) -> PathBuf {
+    beside(path, ".new")
+}
+
 /// Remove a journal, if there is one. The journal itself goes last, because a log without its journal is useless and harmless.
 ///
 /// # Errors
@@ -146,7 +157,7 @@ pub(super) fn create(
     begin: impl FnOnce(&Connection) -> rusqlite::Result<()>,
 ) -> Result<Connection, JournalError> {
     let creating = |source| JournalError::Create { path: path.to_owned(), source };
-    let unfinished = beside(path, ".new");
+    let unfinished = unfinished(path);
     // Remove what a failed attempt left.
     remove(&unfinished).map_err(creating)?;
     let made = make(&unfinished, begin).map_err(|error| error.about(path));
