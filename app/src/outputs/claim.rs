@@ -147,7 +147,10 @@ impl<'a> Claim<'a> {
     /// The existing files that the run replaces.
     pub(super) fn replaced(&self, ledger: &Ledger) -> Vec<PathBuf> {
         // The mark goes first, so that a partly removed fit does not count as finished.
-        let names = [MARK.to_owned()].into_iter().chain(self.names()).chain(ledger.names());
+        let is_theirs =
+            |name: &String| self.old == OldFiles::ReplaceDemo && !self.is_of_run(name, &self.out.join(name), ledger);
+        let of_ledger = ledger.names().into_iter().filter(|name| !is_theirs(name));
+        let names = [MARK.to_owned()].into_iter().chain(self.names()).chain(of_ledger);
         let mut seen = BTreeSet::new();
         names
             .filter(|name| seen.insert(name.clone()))

@@ -1,12 +1,12 @@
 //! `run.written`: the files that a run wrote into its folder, each with the hash of its bytes. Only these may be replaced.
 
-use anyhow::Context;
+use anyhow::{Context, bail};
 use lookalike::graph::BlobHash;
 use std::{
     collections::BTreeSet,
     fs::{self, File, OpenOptions},
     io::{self, Read, Write},
-    path::{Path, PathBuf},
+    path::{Component, Path, PathBuf},
     sync::{Mutex, PoisonError},
 };
 
@@ -31,6 +31,9 @@ struct State {
 
 impl Ledger {
     /// The ledger of a folder; empty if the folder has no ledger.
+    ///
+    /// # Errors
+    /// If it cannot be read, or names a file outside the folder, so that this program did not write it.
     pub(super) fn read(folder: &Path) -> anyhow::Result<Self> {
         let path = folder.join(LEDGER);
         let text = match fs::read_to_string(&path) {
@@ -42,6 +45,10 @@ impl Ledger {
         for line in text.split_inclusive('\n').filter_map(|line| line.strip_suffix('\n')) {
             match (line.strip_prefix("# lookalike "), line.split_once("  ")) {
                 (Some(command), _) => state.command = Some(command.to_owned()),
+                (None, Some((_, name))) if !is_inside(name) => bail!(
+                    "{} names {name:?}, where no run in this folder writes a file: choose another --out, or move {LEDGER} elsewhere",
+                    path.display()
+                ),
                 (None, Some((hash, name))) => _ = state.written.insert((name.to_owned(), hash.to_owned())),
                 (None, None) => {}
             }
@@ -118,6 +125,12 @@ impl Ledger {
     }
 }
 
+/// Whether a name is that of a file in the folder, or of one in a folder there. Files of these names may be removed.
+fn is_inside(name: &str) -> bool {
+    let parts: Vec<_> = Path::new(name).components().collect();
+    matches!(parts.len(), 1 | 2) && parts.iter().all(|part| matches!(part, Component::Normal(_)))
+}
+
 /// The hash of a file's bytes, in the form that the ledger and the journal use.
 pub(super) fn hash_of(bytes: &[u8]) -> String {
     BlobHash::of(bytes).to_string()
@@ -150,5 +163,16 @@ mod tests {
         ledger.note("match.png", "01").unwrap();
         let ledger = Ledger::read(folder.path()).unwrap();
         assert!(ledger.has("match.png", "01") && ledger.names().len() == 3, "a line that was cut off is not continued");
+    }
+
+    #[test]
+    fn ledger_with_a_name_outside_its_folder_is_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join(LEDGER);
+        for name in ["../mine", "a/../../mine", "../../x", "/etc/hosts", "..", "a/b/c", ".", ""] {
+            fs::write(&path, format!("# lookalike fit\nab  match.exr\ncd  {name}\n")).unwrap();
+            let error = Ledger::read(folder.path()).unwrap_err().to_string();
+            assert!(error.contains(&format!("run.written names {name:?}")), "{error}");
+        }
     }
 }

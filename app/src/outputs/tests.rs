@@ -75,6 +75,34 @@ fn demo_replaces_demos_only() {
 }
 
 #[test]
+fn demo_removes_only_files_with_the_bytes_that_its_ledger_records() {
+    let folder = folder(&[]);
+    let at = |name: &str| folder.path().join(name);
+    let out = begin(&demo(folder.path(), OldFiles::ReplaceDemo));
+    out.write("old.png", b"ours").unwrap();
+    out.write("notes.txt", b"ours").unwrap();
+    drop(out);
+    fs::write(at("notes.txt"), "mine").unwrap();
+    drop(begin(&demo(folder.path(), OldFiles::ReplaceDemo)));
+    assert!(!at("old.png").exists() && at("notes.txt").exists());
+}
+
+#[test]
+fn nothing_outside_the_folder_is_removed() {
+    let folder = folder(&[("mine", "precious")]);
+    let (out, mine) = (folder.path().join("out"), folder.path().join("mine"));
+    fs::create_dir(&out).unwrap();
+    for name in ["../mine", mine.to_str().unwrap()] {
+        for command in ["fit", "demo"] {
+            fs::write(out.join("run.written"), format!("# lookalike {command}\nab  {name}\n")).unwrap();
+            refused(&fit(&out, OldFiles::Replace), &["run.written names", "choose another --out"]);
+            refused(&demo(&out, OldFiles::ReplaceDemo), &["run.written names"]);
+        }
+    }
+    assert_eq!(fs::read(mine).unwrap(), b"precious");
+}
+
+#[test]
 fn input_is_never_replaced() {
     let folder = folder(&[("own/match.exr", "photo"), ("own/fit.json", FIT)]);
     let (out, photo) = (folder.path().join("own"), folder.path().join("own/../own/match.exr"));
