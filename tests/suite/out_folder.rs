@@ -2,7 +2,7 @@
 
 use crate::{
     fit::scene::{QUICK, folder},
-    program::lookalike,
+    program::{image, lookalike, write_png},
 };
 use std::fs;
 
@@ -43,6 +43,38 @@ fn demo_refuses_to_replace_a_fit_and_a_fit_its_own_photo() {
             .refused(&["own/match.exr is an input of this run", "choose another --out"]);
     }
     assert!(fs::read(at("own/match.exr")).unwrap() == photo && at("own/fit.json").exists());
+}
+
+#[test]
+fn render_and_compare_replace_no_input_and_follow_no_link() {
+    let folder = folder();
+    let at = |name: &str| folder.path().join(name);
+    fs::create_dir(at("sub")).unwrap();
+    let grey = image(40, 36, |_, _| [0.5; 3]);
+    for name in ["a.png", "b.png", "kept.png", "precious.png"] {
+        write_png(&at(name), &grey);
+    }
+    std::os::unix::fs::symlink(at("precious.png"), at("link.png")).unwrap();
+    fs::write(at("other.png.partial"), "mine").unwrap();
+    let old = |name: &str| fs::read(at(name)).unwrap();
+    let before = ["a.png", "b.png", "map.exr", "precious.png", "other.png.partial"].map(old);
+    let render = "render --model ggx --params kd=.5,f0=0,alpha=.3 --env map.exr --size 16 --samples 16 -o";
+    for (line, phrases) in [
+        (format!("{render} map.exr"), ["cannot write map.exr", "it is the input map.exr"]),
+        (format!("{render} sub/../map.exr"), ["cannot write sub/../map.exr", "it is the input map.exr"]),
+        (format!("{render} link.png"), ["cannot write link.png", "symbolic link"]),
+        (format!("{render} other.png"), ["cannot write other.png", "other.png.partial would be replaced"]),
+        ("compare a.png b.png --map a.png".to_owned(), ["cannot write a.png", "it is the input a.png"]),
+        ("compare a.png b.png --map ./b.png".to_owned(), ["cannot write ./b.png", "it is the input b.png"]),
+        ("compare a.png b.png --mask kept.png --map kept.png".to_owned(), ["cannot write", "the input kept.png"]),
+        ("compare a.png b.png --map link.png".to_owned(), ["cannot write link.png", "symbolic link"]),
+    ] {
+        lookalike(folder.path(), &line).refused(&phrases);
+    }
+    assert!(before == ["a.png", "b.png", "map.exr", "precious.png", "other.png.partial"].map(old));
+    // Another old file is replaced.
+    lookalike(folder.path(), "compare a.png b.png --map kept.png").done();
+    assert!(old("kept.png") != before[0] && !at("kept.png.partial").exists());
 }
 
 #[test]

@@ -25,7 +25,7 @@ use std::{path::Path, process::ExitCode};
 /// Measures the difference of two images.
 pub(crate) fn run(settings: CompareSettings) -> anyhow::Result<ExitCode> {
     if let Some(path) = &settings.map {
-        check_map(path)?;
+        check_map(path, &settings.files())?;
     }
     let files = format!("{} and {}", settings.image.display(), settings.reference.display());
     let activity = Activity::new({
@@ -105,11 +105,11 @@ fn name(photo: &LoadedPhoto) -> String {
     photo.source.path.display().to_string()
 }
 
-fn check_map(path: &Path) -> anyhow::Result<()> {
+fn check_map(path: &Path, inputs: &[&Path]) -> anyhow::Result<()> {
     if path.extension().is_none_or(|extension| !extension.eq_ignore_ascii_case("png")) {
         bail!("cannot write {}: a map of differences is a PNG; expected a name that ends in .png", path.display());
     }
-    check_writable(path)
+    check_writable(path, inputs)
 }
 
 /// The map as a picture, with its scale in words.

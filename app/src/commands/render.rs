@@ -30,7 +30,7 @@ pub(crate) fn run(settings: RenderSettings) -> anyhow::Result<ExitCode> {
     let format = Format::of(&settings.out)?;
     let samples = u32::try_from(settings.samples.get())
         .with_context(|| format!("--samples must be at most {}, found {}", u32::MAX, settings.samples))?;
-    check_writable(&settings.out)?;
+    check_writable(&settings.out, &settings.files())?;
     let activity = Activity::new(|| "reading the inputs".to_owned());
     let material = LoadedMaterial::load(&settings.material)?;
     let shape = shape(&settings)?;

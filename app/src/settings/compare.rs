@@ -2,7 +2,7 @@
 
 use super::DisplayExposure;
 use lookalike::metric::MetricKind;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Two images and how to measure their difference.
 #[derive(Debug, Clone, PartialEq)]
@@ -21,4 +21,12 @@ pub struct CompareSettings {
     pub display_exposure: DisplayExposure,
     /// Print JSON, not text.
     pub json: bool,
+}
+
+impl CompareSettings {
+    /// The files that it reads.
+    pub(crate) fn files(&self) -> Vec<&Path> {
+        let others = [self.mask.as_deref(), self.display_exposure.file()].into_iter().flatten();
+        [self.reference.as_path(), &self.image].into_iter().chain(others).collect()
+    }
 }

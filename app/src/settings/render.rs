@@ -1,7 +1,10 @@
 //! The settings of `lookalike render`.
 
 use super::{EnvironmentSettings, ModelName, ModelParams, ViewSettings};
-use std::{num::NonZeroUsize, path::PathBuf};
+use std::{
+    num::NonZeroUsize,
+    path::{Path, PathBuf},
+};
 
 /// A sphere, or a map of normals, of one material under one light.
 #[derive(Debug, Clone, PartialEq)]
@@ -20,6 +23,18 @@ pub struct RenderSettings {
     pub seed: u64,
     /// The image to write; its extension is the format.
     pub out: PathBuf,
+}
+
+impl RenderSettings {
+    /// The files that it reads.
+    pub(crate) fn files(&self) -> Vec<&Path> {
+        let table = match &self.material {
+            Material::Measured(path) => Some(path.as_path()),
+            Material::Analytic { .. } => None,
+        };
+        let others = [table, self.view.normals.as_deref()].into_iter().flatten();
+        [self.environment.path.as_path()].into_iter().chain(others).collect()
+    }
 }
 
 /// A material to render.
