@@ -29,7 +29,7 @@ use crate::{
     inputs::show_warnings,
     outputs::{BATCH_MARK, Claim, ClaimedFolder, FIT_FILES, OutFolder, print_result},
     progress::{Ending, Shape, display},
-    run::Session,
+    run::{Session, listen},
     settings::{BatchFit, BatchSettings, OldFiles, OnFailure, ProgressKind},
 };
 use anyhow::Context;
@@ -46,7 +46,7 @@ use window::{Demand, Window};
 pub(crate) fn run(settings: BatchSettings) -> anyhow::Result<ExitCode> {
     // Check for errors before any work is done.
     let folder = ClaimedFolder::take(&claim(&settings))?;
-    let metrics = settings.metrics.map(|address| address.listen()).transpose()?;
+    let metrics = listen(settings.metrics)?;
     let lights = Arc::new(Lights::default());
     let checked = check::check(&settings, &lights)?;
     let out_name = settings.out.display().to_string();

@@ -8,11 +8,11 @@ pub(crate) use identity::{FitIdentity, version};
 pub(crate) use notes::notes;
 pub(crate) use results::{final_parameters, final_score, final_scores, write_results};
 
-use crate::run::{Clock, Session, cpu_seconds};
 use crate::{
     exit::Exit,
     outputs::{FitRecord, OutFolder, Pictures, Timing, print_summary},
     progress::{Display, Ending, PartCount, PartEvent, Shape, display, print_line},
+    run::{Clock, Session, cpu_seconds, listen},
     settings::{ClusterSettings, MetricsAddress, ProgressKind},
 };
 use anyhow::Context;
@@ -63,7 +63,7 @@ pub(crate) fn run(job: FitJob) -> anyhow::Result<Option<Finished>> {
     let planner = FitPlanner::new(Arc::clone(&job.capture), method.clone(), job.exposure)
         .context("the photo cannot be fitted")?
         .also_render(&job.also_render);
-    let metrics = job.metrics.map(MetricsAddress::listen).transpose()?;
+    let metrics = listen(job.metrics)?;
     let mut display = display(job.progress, Shape::OneFit);
     let done = run_shown(&job, &method, planner, metrics.as_ref(), &mut *display);
     let problem = done.as_ref().err().map(|error| format!("{error:#}"));

@@ -9,6 +9,7 @@ mod ledger;
 mod pictures;
 mod strip;
 mod summary;
+mod table;
 
 pub(crate) use claim::{ACCESS_FILE, BATCH_MARK, Claim, FIT_FILES, MARK, changed};
 pub(crate) use conventions::conventions;
@@ -16,7 +17,8 @@ pub(crate) use fit_json::{FitRecord, Timing, parameters_json};
 pub(crate) use folder::{ClaimedFolder, OutFolder};
 pub(crate) use pictures::{Pictures, write_pictures};
 pub(crate) use strip::{Panel, strip};
-pub(crate) use summary::{aligned, print_result, print_summary};
+pub(crate) use summary::print_summary;
+pub(crate) use table::{aligned, print_result};
 
 pub(crate) use candidates_csv::candidates_csv;
 

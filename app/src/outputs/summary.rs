@@ -1,28 +1,19 @@
 //! The table that a fit prints on stdout at its end.
 
-use super::{FitRecord, Timing};
+use super::{
+    FitRecord, Timing,
+    table::{aligned, counted, print_result},
+};
 use crate::wrap::wrap;
 use lookalike::{
     brdf::{Channels, Model},
     plan::FitOutcome,
 };
-use std::{
-    fmt::Write as _,
-    io::{self, Write as _},
-};
+use std::{fmt::Write as _, io};
 
 /// Prints the result: winner, parameters, scores, seconds.
 pub(crate) fn print_summary(record: &FitRecord<'_>, timing: &Timing, out: &str) -> io::Result<()> {
     print_result(&summary(record, timing, out))
-}
-
-/// Writes a result to stdout. A closed pipe (`| head`) is not an error.
-pub(crate) fn print_result(text: &str) -> io::Result<()> {
-    let mut stdout = io::stdout().lock();
-    match stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()) {
-        Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),
-        outcome => outcome,
-    }
 }
 
 fn summary(record: &FitRecord<'_>, timing: &Timing, out: &str) -> String {
@@ -68,11 +59,6 @@ fn add(rows: &mut [Vec<String>], column: Vec<String>) {
     rows.iter_mut().zip(column).for_each(|(row, cell)| row.push(cell));
 }
 
-/// `1 gamma`, `2 gammas`.
-pub(crate) fn counted(count: usize, noun: &str) -> String {
-    format!("{count} {noun}{}", if count == 1 { "" } else { "s" })
-}
-
 fn column(model: &dyn Model, name: &str, gamma: &str, cssim: f64, object: f64, parameters: &[f64]) -> Vec<String> {
     let mut column = vec![name.to_owned(), gamma.to_owned(), format!("{object:.4}"), format!("{cssim:.4}")];
     let mut first = 0;
@@ -85,23 +71,6 @@ fn column(model: &dyn Model, name: &str, gamma: &str, cssim: f64, object: f64, p
         first += values.len();
     }
     column
-}
-
-/// Aligns columns to their widest entries: the first column left, the others right.
-pub(crate) fn aligned(rows: &[Vec<String>]) -> String {
-    let columns = rows.iter().map(Vec::len).max().unwrap_or(0);
-    let width = |c: usize| rows.iter().filter_map(|r| r.get(c)).map(String::len).max().unwrap_or(0);
-    let widths: Vec<usize> = (0..columns).map(width).collect();
-    let mut text = String::new();
-    for row in rows {
-        let mut line = format!("  {:<1$}", row[0], widths[0]);
-        for (cell, width) in row.iter().zip(&widths).skip(1) {
-            let _ = write!(line, "  {cell:>width$}");
-        }
-        text.push_str(line.trim_end());
-        text.push('\n');
-    }
-    text
 }
 
 #[cfg(test)]
@@ -121,11 +90,5 @@ mod tests {
             let text = aligned(&rows);
             assert!(text.lines().all(|line| line.len() <= COLUMNS), "{text}");
         }
-    }
-
-    #[test]
-    fn columns_line_up() {
-        let rows = [vec!["".into(), "gamma".into()], vec!["stage two".into(), "1.5".into()]].map(|r: Vec<String>| r);
-        assert_eq!(aligned(&rows), "             gamma\n  stage two    1.5\n");
     }
 }

@@ -2,10 +2,12 @@
 
 mod clock;
 mod failure;
+mod metrics;
 mod resume;
 mod session;
 
 pub(crate) use clock::{Clock, cpu_seconds};
 pub(crate) use failure::journal_failed;
+pub(crate) use metrics::listen;
 pub(crate) use resume::missing;
 pub(crate) use session::Session;

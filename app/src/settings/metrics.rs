@@ -1,8 +1,6 @@
 //! `--metrics`: where metrics are served.
 
-use crate::exit::Exit;
-use anyhow::{Context, bail};
-use lookalike_coordinator::metrics::Metrics;
+use anyhow::bail;
 use std::{
     fmt,
     net::{Ipv4Addr, SocketAddr},
@@ -12,21 +10,6 @@ use std::{
 /// An address to serve metrics on. Everyone who can connect to it can read them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct MetricsAddress(pub SocketAddr);
-
-impl MetricsAddress {
-    /// Listens there.
-    ///
-    /// # Errors
-    /// If the address cannot be listened on; the exit code is that of bad input.
-    pub(crate) fn listen(self) -> anyhow::Result<Metrics> {
-        let cannot = || {
-            format!(
-                "cannot serve metrics on {self}; check that the address belongs to this machine and that the port is free"
-            )
-        };
-        Metrics::listen(self.0).with_context(cannot).context(Exit::BadInput)
-    }
-}
 
 impl FromStr for MetricsAddress {
     type Err = anyhow::Error;

@@ -29,7 +29,7 @@ use crate::{
     inputs::{load_environment, show_warnings},
     outputs::{Claim, ClaimedFolder, print_result},
     progress::{Display, Ending, PartCount, Shape, display, print_line},
-    run::Session,
+    run::{Session, listen},
     settings::{EnvironmentSettings, OldFiles, StudySettings},
 };
 use anyhow::Context;
@@ -62,7 +62,7 @@ pub(crate) fn run(settings: StudySettings) -> anyhow::Result<ExitCode> {
     let study = Study::read(&settings.study)?;
     let cells = cells::plan(&study)?;
     let folder = ClaimedFolder::take(&claim(&settings, &study))?;
-    let metrics = settings.metrics.map(|address| address.listen()).transpose()?;
+    let metrics = listen(settings.metrics)?;
     let (materials, lights) = (read_materials(&study)?, read_lights(&study)?);
     let (out, workers) = (folder.begin()?, settings.cluster.workers.count());
     let inputs = Arc::new(Inputs { study, cells, materials, lights, out, workers });
