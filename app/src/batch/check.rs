@@ -2,11 +2,17 @@
 
 use super::{lights::Lights, prepare::Prepared};
 use crate::{
+    outputs::counted,
     problems::Problems,
+    progress::Activity,
     settings::{BatchFit, BatchSettings},
 };
 use rayon::prelude::*;
 use serde_json::Value;
+use std::sync::{
+    Arc,
+    atomic::{AtomicUsize, Ordering},
+};
 
 /// The result of the check of a fit.
 #[derive(Debug, Clone)]
@@ -31,15 +37,20 @@ pub(super) struct AllChecked {
 /// # Errors
 /// All problems, each with the names of the fits that have it.
 pub(super) fn check(settings: &BatchSettings, lights: &Lights) -> anyhow::Result<AllChecked> {
-    let found: Vec<anyhow::Result<(Checked, Vec<String>)>> = settings
-        .fits
-        .par_iter()
-        .map(|fit| {
-            let prepared = Prepared::new(fit, lights, settings.stage_two)?;
-            let (pixels, identity) = (prepared.pixels(), prepared.identity()?);
-            Ok((Checked { inputs: prepared.inputs, pixels, identity }, prepared.warnings))
-        })
-        .collect();
+    let checked = |fit| -> anyhow::Result<(Checked, Vec<String>)> {
+        let prepared = Prepared::new(fit, lights, settings.stage_two)?;
+        let (pixels, identity) = (prepared.pixels(), prepared.identity()?);
+        Ok((Checked { inputs: prepared.inputs, pixels, identity }, prepared.warnings))
+    };
+    let read = Arc::new(AtomicUsize::new(0));
+    let activity = Activity::reading(settings.progress, counted(settings.fits.len(), "fit"), &read);
+    let of_fit = |fit| {
+        let checked = checked(fit);
+        read.fetch_add(1, Ordering::Relaxed);
+        checked
+    };
+    let found: Vec<_> = settings.fits.par_iter().map(of_fit).collect();
+    drop(activity);
     let (mut fits, mut warnings, mut problems) = (Vec::new(), Vec::new(), Vec::<(String, Vec<&BatchFit>)>::new());
     for (fit, found) in settings.fits.iter().zip(found) {
         match found {

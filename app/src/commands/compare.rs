@@ -3,13 +3,11 @@
 mod coverage;
 mod report;
 
-use super::{
-    activity::Activity,
-    output::{check_writable, write_file},
-};
+use super::output::{check_writable, write_file};
 use crate::{
     exit::Exit,
     inputs::{LoadedPhoto, load_image, load_mask, resolve_display_exposure, show_warnings},
+    progress::Activity,
     settings::CompareSettings,
     wrap::wrap,
 };

@@ -1,11 +1,11 @@
 //! `lookalike fit`: from a photo and its light to the parameters of a BRDF.
 
-use super::activity::Activity;
 use crate::{
     fit::{self, FitJob},
     inputs::{load_capture, resolve_display_exposure, show_warnings},
     outputs::{Claim, ClaimedFolder},
-    settings::{FitSettings, OldFiles, ProgressKind},
+    progress::Activity,
+    settings::{FitSettings, OldFiles},
 };
 use std::{process::ExitCode, sync::Arc, time::Instant};
 
@@ -13,8 +13,7 @@ pub(crate) fn run(settings: FitSettings) -> anyhow::Result<ExitCode> {
     let began = Instant::now();
     // Check for errors before any work is done.
     let folder = ClaimedFolder::take(&claim(&settings))?;
-    let is_told = matches!(settings.progress, ProgressKind::Auto | ProgressKind::Bar);
-    let activity = is_told.then(|| Activity::new(|| "reading the inputs".to_owned()));
+    let activity = Activity::shown(settings.progress, || "reading the inputs".to_owned());
     let loaded = load_capture(&settings.capture)?;
     show_warnings(&loaded.warnings);
     let coverage = loaded.capture.scoring_coverage();

@@ -1,7 +1,6 @@
 //! The commands. Each takes its settings and returns the exit code of a completed run; the command line reports errors.
 
 pub(crate) mod access;
-mod activity;
 pub(crate) mod batch;
 pub(crate) mod compare;
 pub(crate) mod demo;

@@ -3,13 +3,11 @@
 mod encode;
 mod material;
 
-use super::{
-    activity::Activity,
-    output::{check_writable, write_file},
-};
+use super::output::{check_writable, write_file};
 use crate::{
     exit::Exit,
     inputs::{LoadedEnvironment, LoadedGeometry, load_environment, load_normals, show_warnings, sphere_geometry},
+    progress::Activity,
     settings::RenderSettings,
     wrap::wrap,
 };

@@ -2,7 +2,7 @@
 //! seconds in between.
 
 use super::{
-    Display, Ending, PAUSE,
+    Display, Ending, FIRST, PAUSE,
     parts::{PartCount, PartEvent, Shape},
     print_line, remark,
     rows::Rows,
@@ -15,23 +15,29 @@ pub(super) struct Lines {
     count: PartCount,
     rows: Rows,
     began: Instant,
-    told: Instant,
+    /// When the latest line was printed.
+    told: Option<Instant>,
 }
 
 impl Lines {
     pub(super) fn new(shape: Shape) -> Self {
         let (count, rows, now) = (PartCount::default(), Rows::default(), Instant::now());
-        Self { shape, count, rows, began: now, told: now }
+        Self { shape, count, rows, began: now, told: None }
     }
 
     fn tell(&mut self, text: &str) {
-        self.told = Instant::now();
+        self.told = Some(Instant::now());
         self.say(&format!("{:6.1} s  {text}", self.began.elapsed().as_secs_f64()));
+    }
+
+    /// Whether it is time for a line, although nothing has ended.
+    fn is_due(&self) -> bool {
+        self.told.map_or(self.began.elapsed() >= FIRST, |told| told.elapsed() >= PAUSE)
     }
 
     /// The line about the stage of the only fit that an event belongs to.
     fn stage(&mut self, event: &RunEvent) {
-        let is_due = self.told.elapsed() >= PAUSE;
+        let is_due = self.is_due();
         let Some((_, row, stage, count)) = self.rows.note(event) else { return };
         let is_end = matches!(event, RunEvent::NodeFinished { .. } | RunEvent::NodeRecalled { .. });
         let state = match is_end && count.is_complete() {
@@ -46,7 +52,7 @@ impl Lines {
     /// The line about all parts.
     fn counts(&mut self, noun: &str) {
         let is_over = self.count.done + self.count.failed == self.count.total;
-        if is_over || self.told.elapsed() >= PAUSE {
+        if is_over || self.is_due() {
             self.tell(&format!("{noun}s: {}, {} running", self.count.text(), self.count.running));
         }
     }

@@ -1,5 +1,6 @@
 //! Shows a run while it goes on, all on stderr: bars on a terminal, plain lines elsewhere, JSON lines for programs.
 
+mod activity;
 mod bars;
 mod json;
 mod lines;
@@ -7,6 +8,7 @@ mod parts;
 mod rows;
 mod stage;
 
+pub(crate) use activity::Activity;
 pub(crate) use parts::{PartCount, PartEvent, PartScores, Shape};
 
 use crate::settings::ProgressKind;
@@ -15,6 +17,9 @@ use std::{
     io::{self, IsTerminal, Write as _},
     time::Duration,
 };
+
+/// The time before the first line of progress where bars cannot be drawn.
+const FIRST: Duration = Duration::from_secs(2);
 
 /// The time between two lines of progress where bars cannot be drawn.
 const PAUSE: Duration = Duration::from_secs(10);

@@ -27,10 +27,10 @@ use crate::{
     exit::Exit,
     fit::version,
     inputs::{load_environment, show_warnings},
-    outputs::{Claim, ClaimedFolder, print_result},
-    progress::{Display, Ending, PartCount, Shape, display, print_line},
+    outputs::{Claim, ClaimedFolder, counted, print_result},
+    progress::{Activity, Display, Ending, PartCount, Shape, display, print_line},
     run::{Session, listen},
-    settings::{EnvironmentSettings, OldFiles, StudySettings},
+    settings::{EnvironmentSettings, OldFiles, ProgressKind, StudySettings},
 };
 use anyhow::Context;
 use effort::Effort;
@@ -51,7 +51,10 @@ use std::{
     fs,
     path::Path,
     process::ExitCode,
-    sync::{Arc, Mutex, PoisonError},
+    sync::{
+        Arc, Mutex, PoisonError,
+        atomic::{AtomicUsize, Ordering},
+    },
     time::Instant,
 };
 use supply::{Supply, Tally};
@@ -63,7 +66,7 @@ pub(crate) fn run(settings: StudySettings) -> anyhow::Result<ExitCode> {
     let cells = cells::plan(&study)?;
     let folder = ClaimedFolder::take(&claim(&settings, &study))?;
     let metrics = listen(settings.metrics)?;
-    let (materials, lights) = (read_materials(&study)?, read_lights(&study)?);
+    let (materials, lights) = read_inputs(&study, settings.progress)?;
     let (out, workers) = (folder.begin()?, settings.cluster.workers.count());
     let inputs = Arc::new(Inputs { study, cells, materials, lights, out, workers });
     let tally = Arc::new(Mutex::new(Tally::default()));
@@ -119,8 +122,7 @@ pub(crate) fn prepare_job(settings: &StudySettings) -> anyhow::Result<()> {
     let claim = claim(settings, &study);
     claim.check()?;
     cells::plan(&study)?;
-    read_materials(&study)?;
-    read_lights(&study)?;
+    read_inputs(&study, settings.progress)?;
     claim.replace_now()
 }
 
@@ -169,18 +171,26 @@ fn lock(tally: &Mutex<Tally>) -> std::sync::MutexGuard<'_, Tally> {
     tally.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-fn read_materials(study: &Study) -> anyhow::Result<Vec<Blob>> {
+/// Reads the materials and the lights.
+fn read_inputs(study: &Study, progress: ProgressKind) -> anyhow::Result<(Vec<Blob>, Vec<Light>)> {
+    let read = Arc::new(AtomicUsize::new(0));
+    let _activity = Activity::reading(progress, counted(study.materials.len() + study.lights.len(), "file"), &read);
+    Ok((read_materials(study, &read)?, read_lights(study, &read)?))
+}
+
+fn read_materials(study: &Study, read: &AtomicUsize) -> anyhow::Result<Vec<Blob>> {
     let mut materials = Vec::new();
     for (_, path) in &study.materials {
         let shown = path.display().to_string();
         let bytes = fs::read(path).with_context(|| format!("cannot read the measured material {shown}"))?;
         MerlTable::read(&shown, &bytes)?;
         materials.push(Blob::new(bytes));
+        read.fetch_add(1, Ordering::Relaxed);
     }
     Ok(materials)
 }
 
-fn read_lights(study: &Study) -> anyhow::Result<Vec<Light>> {
+fn read_lights(study: &Study, read: &AtomicUsize) -> anyhow::Result<Vec<Light>> {
     let mut lights = Vec::new();
     for (_, path) in &study.lights {
         let settings = EnvironmentSettings { path: path.clone(), mapping: None, rotation_deg: 0.0 };
@@ -188,6 +198,7 @@ fn read_lights(study: &Study) -> anyhow::Result<Vec<Light>> {
         show_warnings(&loaded.warnings);
         let encoded = encode_light(&loaded.environment)?;
         lights.push(Light { environment: loaded.environment, encoded });
+        read.fetch_add(1, Ordering::Relaxed);
     }
     Ok(lights)
 }

@@ -1,7 +1,10 @@
 //! Progress of a batch: the event stream, the metrics, and the order in which fits end.
 
 use super::{QUICK, folder};
-use lookalike_tests::process::{Process, signal};
+use lookalike_tests::{
+    PATIENCE,
+    process::{Process, signal},
+};
 use serde_json::Value;
 use std::{
     fs,
@@ -133,6 +136,28 @@ fn batch_continues_when_its_progress_is_no_longer_read() {
     assert!(found.is_some());
     assert_eq!(process.output().status.code(), Some(0));
     assert!(folder.path().join("out/photo-map-ggx/fit.json").exists());
+}
+
+#[test]
+fn slow_reading_of_inputs_is_shown() {
+    let folder = folder("photos = 'pipe.exr'\nenvironments = 'map.exr'\n");
+    fs::write(folder.path().join("study.toml"), "materials = ['pipe.exr']\nprobes = ['map.exr']\n").unwrap();
+    // Reading it does not end, because nothing is written to it.
+    assert!(Command::new("mkfifo").arg(folder.path().join("pipe.exr")).status().unwrap().success());
+    for (line, total) in [
+        ("batch batch.toml", "1 fit"),
+        ("batch batch.toml --slurm", "1 fit"),
+        ("study study.toml", "2 files"),
+        ("study study.toml --slurm", "2 files"),
+    ] {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_lookalike-under-test"));
+        let mut process =
+            Process::start(command.args(line.split(' ')).args(["--out", "out"]).current_dir(folder.path()));
+        let told = process.follow_stderr(std::io::sink()).recv_timeout(PATIENCE).expect(line);
+        let expected = format!("reading the inputs: 0 of {total} (");
+        assert!(told.as_str().is_some_and(|told| told.starts_with(&expected)), "{line}: {told}");
+        process.kill();
+    }
 }
 
 #[test]

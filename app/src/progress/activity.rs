@@ -1,21 +1,20 @@
 //! Lines on stderr that say what a slow command does, where there is no other display: one after 2 s, then one every 10 s.
 
-use crate::progress::print_line;
+use super::{FIRST, PAUSE, print_line};
+use crate::settings::ProgressKind;
 use std::{
-    sync::mpsc::{RecvTimeoutError, Sender, channel},
+    sync::{
+        Arc,
+        atomic::{AtomicUsize, Ordering},
+        mpsc::{RecvTimeoutError, Sender, channel},
+    },
     thread::{self, JoinHandle},
-    time::{Duration, Instant},
+    time::Instant,
 };
-
-/// The time before the first line.
-const FIRST: Duration = Duration::from_secs(2);
-
-/// The time between two lines.
-const PAUSE: Duration = Duration::from_secs(10);
 
 /// Lines about some work, until this is dropped.
 #[derive(Debug)]
-pub(super) struct Activity {
+pub(crate) struct Activity {
     /// Dropping it ends the thread.
     end: Option<Sender<()>>,
     thread: Option<JoinHandle<()>>,
@@ -23,7 +22,7 @@ pub(super) struct Activity {
 
 impl Activity {
     /// The work begins. `what` says what is done, as of now.
-    pub(super) fn new(what: impl Fn() -> String + Send + 'static) -> Self {
+    pub(crate) fn new(what: impl Fn() -> String + Send + 'static) -> Self {
         let (end, ended) = channel();
         let thread = thread::spawn(move || {
             let began = Instant::now();
@@ -34,6 +33,20 @@ impl Activity {
             }
         });
         Self { end: Some(end), thread: Some(thread) }
+    }
+
+    /// As [`Activity::new`], if progress of this kind is text.
+    pub(crate) fn shown(kind: ProgressKind, what: impl Fn() -> String + Send + 'static) -> Option<Self> {
+        match kind {
+            ProgressKind::Auto | ProgressKind::Bar => Some(Self::new(what)),
+            ProgressKind::Json | ProgressKind::None => None,
+        }
+    }
+
+    /// Says how many of the files or fits have been read, which the caller counts.
+    pub(crate) fn reading(kind: ProgressKind, total: String, read: &Arc<AtomicUsize>) -> Option<Self> {
+        let read = Arc::clone(read);
+        Self::shown(kind, move || format!("reading the inputs: {} of {total}", read.load(Ordering::Relaxed)))
     }
 }
 
