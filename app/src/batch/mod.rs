@@ -29,7 +29,7 @@ use crate::{
     inputs::show_warnings,
     outputs::{BATCH_MARK, Claim, ClaimedFolder, FIT_FILES, OutFolder, print_result},
     progress::{Ending, Shape, display},
-    run::{Session, listen},
+    run::{Session, access_file, listen},
     settings::{BatchFit, BatchSettings, OldFiles, OnFailure, ProgressKind},
 };
 use anyhow::Context;
@@ -63,7 +63,8 @@ pub(crate) fn run(settings: BatchSettings) -> anyhow::Result<ExitCode> {
         show_warnings(&checked.warnings);
     }
     let done = fits.len() - open.len();
-    let mut display = display(settings.progress, Shape::Many { noun: "fit", total: fits.len(), done });
+    let shape = Shape::Many { noun: "fit", total: fits.len(), done };
+    let mut display = display(settings.progress, shape, access_file(&settings.cluster, &out));
     if is_stream {
         checked.warnings.iter().for_each(|text| display.say(&format!("warning: {text}")));
     }

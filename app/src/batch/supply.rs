@@ -182,11 +182,12 @@ mod tests {
     };
     use lookalike_coordinator::journal::PartLedger;
     use serde_json::Value;
+    use std::path::PathBuf;
 
     /// A supply whose next fit has this many pixels, for one worker of one thread.
     fn supply(out: &OutFolder, pixels: usize) -> Supply {
         let watchers = Watchers {
-            display: display(ProgressKind::None, Shape::OneFit),
+            display: display(ProgressKind::None, Shape::OneFit, PathBuf::new()),
             metrics: None,
             ledger: PartLedger::default(),
         };

@@ -12,7 +12,7 @@ use crate::{
     exit::Exit,
     outputs::{FitRecord, OutFolder, Pictures, Timing, print_summary},
     progress::{Display, Ending, PartCount, PartEvent, Shape, display, print_line},
-    run::{Clock, Session, cpu_seconds, listen},
+    run::{Clock, Session, access_file, cpu_seconds, listen},
     settings::{ClusterSettings, MetricsAddress, ProgressKind},
 };
 use anyhow::Context;
@@ -64,7 +64,7 @@ pub(crate) fn run(job: FitJob) -> anyhow::Result<Option<Finished>> {
         .context("the photo cannot be fitted")?
         .also_render(&job.also_render);
     let metrics = listen(job.metrics)?;
-    let mut display = display(job.progress, Shape::OneFit);
+    let mut display = display(job.progress, Shape::OneFit, access_file(&job.cluster, &job.out));
     let done = run_shown(&job, &method, planner, metrics.as_ref(), &mut *display);
     let problem = done.as_ref().err().map(|error| format!("{error:#}"));
     display.finish(problem.as_deref().map_or(Ending::Finished, Ending::Failed));

@@ -4,7 +4,8 @@
 use super::{
     Display, Ending,
     parts::{PartCount, PartEvent, Shape},
-    print_line, remark,
+    print_line,
+    remarks::Remarks,
     rows::{Row, Rows},
     stage::{Count, Stage},
 };
@@ -20,7 +21,7 @@ const OTHER_LINES: usize = 6;
 const NAME_COLUMNS: usize = 30;
 
 pub(super) struct Bars {
-    shape: Shape,
+    remarks: Remarks,
     all: MultiProgress,
     rows: Rows,
     /// By number of the part, or by place of the stage.
@@ -30,13 +31,16 @@ pub(super) struct Bars {
 }
 
 impl Bars {
-    /// Bars on stderr; `None` if stderr cannot show them.
-    pub(super) fn new(shape: Shape) -> Option<Self> {
+    /// Bars on stderr.
+    ///
+    /// # Errors
+    /// The remarks, if stderr cannot show bars.
+    pub(super) fn new(remarks: Remarks) -> Result<Self, Remarks> {
         let all = MultiProgress::new();
         if all.is_hidden() {
-            return None;
+            return Err(remarks);
         }
-        let total = match shape {
+        let total = match remarks.shape {
             Shape::OneFit => None,
             Shape::Many { noun, total, done } => {
                 let bar = all.add(ProgressBar::new(total as u64));
@@ -50,7 +54,7 @@ impl Bars {
                 Some((bar, more))
             }
         };
-        Some(Self { shape, all, rows: Rows::default(), bars: BTreeMap::new(), total })
+        Ok(Self { remarks, all, rows: Rows::default(), bars: BTreeMap::new(), total })
     }
 
     /// The bar of a stage of the only fit.
@@ -89,7 +93,7 @@ impl Bars {
 impl Display for Bars {
     fn event(&mut self, event: &RunEvent) {
         if let Some((number, row, stage, count)) = self.rows.note(event) {
-            match self.shape {
+            match self.remarks.shape {
                 Shape::OneFit => {
                     let bar = self.bars.entry(u32::from(stage.place()));
                     show_stage(bar.or_insert_with(|| Self::stage_bar(&self.all, stage)), row, stage, count);
@@ -97,7 +101,7 @@ impl Display for Bars {
                 Shape::Many { .. } => self.bars.get(&number).into_iter().for_each(|bar| show_part(bar, row)),
             }
         }
-        if let Some(text) = remark(event, self.shape) {
+        if let Some(text) = self.remarks.line(event) {
             self.say(&text);
         }
     }

@@ -4,14 +4,15 @@
 use super::{
     Display, Ending, FIRST, PAUSE,
     parts::{PartCount, PartEvent, Shape},
-    print_line, remark,
+    print_line,
+    remarks::Remarks,
     rows::Rows,
 };
 use lookalike_coordinator::events::RunEvent;
 use std::time::Instant;
 
 pub(super) struct Lines {
-    shape: Shape,
+    remarks: Remarks,
     count: PartCount,
     rows: Rows,
     began: Instant,
@@ -20,9 +21,9 @@ pub(super) struct Lines {
 }
 
 impl Lines {
-    pub(super) fn new(shape: Shape) -> Self {
+    pub(super) fn new(remarks: Remarks) -> Self {
         let (count, rows, now) = (PartCount::default(), Rows::default(), Instant::now());
-        Self { shape, count, rows, began: now, told: None }
+        Self { remarks, count, rows, began: now, told: None }
     }
 
     fn tell(&mut self, text: &str) {
@@ -60,19 +61,19 @@ impl Lines {
 
 impl Display for Lines {
     fn event(&mut self, event: &RunEvent) {
-        match self.shape {
+        match self.remarks.shape {
             Shape::OneFit => self.stage(event),
             Shape::Many { noun, .. } if self.count.running > 0 => self.counts(noun),
             Shape::Many { .. } => {}
         }
-        if let Some(text) = remark(event, self.shape) {
+        if let Some(text) = self.remarks.line(event) {
             self.say(&text);
         }
     }
 
     fn part(&mut self, event: &PartEvent, count: PartCount) {
         self.count = count;
-        match self.shape {
+        match self.remarks.shape {
             Shape::OneFit => self.rows.part(event),
             Shape::Many { noun, total, .. } => match event.line() {
                 Some(line) => {

@@ -5,6 +5,7 @@ mod bars;
 mod json;
 mod lines;
 mod parts;
+mod remarks;
 mod rows;
 mod stage;
 
@@ -13,8 +14,10 @@ pub(crate) use parts::{PartCount, PartEvent, PartScores, Shape};
 
 use crate::settings::ProgressKind;
 use lookalike_coordinator::events::RunEvent;
+use remarks::Remarks;
 use std::{
     io::{self, IsTerminal, Write as _},
+    path::PathBuf,
     time::Duration,
 };
 
@@ -55,14 +58,15 @@ pub(crate) fn print_line(text: &str) {
     let _ = io::stderr().write_all(format!("{text}\n").as_bytes());
 }
 
-/// The display of this kind for a run of this shape.
-pub(crate) fn display(kind: ProgressKind, shape: Shape) -> Box<dyn Display> {
+/// The display of this kind for a run of this shape, whose workers use this access file.
+pub(crate) fn display(kind: ProgressKind, shape: Shape, access: PathBuf) -> Box<dyn Display> {
+    let remarks = Remarks { shape, access };
     match kind {
-        ProgressKind::Auto if !io::stderr().is_terminal() => Box::new(lines::Lines::new(shape)),
+        ProgressKind::Auto if !io::stderr().is_terminal() => Box::new(lines::Lines::new(remarks)),
         // Print lines where bars cannot be drawn (a pipe, a dumb terminal).
-        ProgressKind::Bar | ProgressKind::Auto => match bars::Bars::new(shape) {
-            Some(bars) => Box::new(bars),
-            None => Box::new(lines::Lines::new(shape)),
+        ProgressKind::Bar | ProgressKind::Auto => match bars::Bars::new(remarks) {
+            Ok(bars) => Box::new(bars),
+            Err(remarks) => Box::new(lines::Lines::new(remarks)),
         },
         ProgressKind::Json => Box::new(json::JsonLines::new(shape)),
         ProgressKind::None => Box::new(Silent),
@@ -86,44 +90,4 @@ impl Display for Silent {
     }
 
     fn finish(&mut self, _ending: Ending<'_>) {}
-}
-
-/// A line about an unexpected event; `None` for all other events.
-fn remark(event: &RunEvent, shape: Shape) -> Option<String> {
-    match event {
-        RunEvent::Resumed { results, .. } => Some(format!("resuming the run: its journal holds {results} results")),
-        RunEvent::Listening { address, local_workers: 0 } => Some(format!(
-            "listening for workers, which connect to {address}; start one with `lookalike worker --access OUT/access.json`"
-        )),
-        RunEvent::WaitingForWorkers { waited, limit } => Some(format!(
-            "waiting for workers: {} s of at most {} s; start one with `lookalike worker --access OUT/access.json`",
-            waited.as_secs(),
-            limit.as_secs()
-        )),
-        RunEvent::LocalWorkerEnded { process, status, restart_after } => {
-            let next = restart_after.map_or("it is not restarted", |_| "starting another one");
-            Some(format!("warning: local worker {process} ended ({status}); {next}"))
-        }
-        RunEvent::WorkerDraining { worker } => {
-            Some(format!("{worker} was asked to end: it finishes its nodes and gets no more"))
-        }
-        RunEvent::NodeSuspected { name, deaths } => Some(format!(
-            "warning: {deaths} workers died while they computed {}: it runs alone from now on",
-            name.label
-        )),
-        RunEvent::AnswersDiffer { name, first, second, error } => Some(format!(
-            "warning: {} has an output and an error ({error}), one from {first} and one from {second}: one of these machines computes \
-             wrongly",
-            name.label
-        )),
-        RunEvent::NodeSpeculated { name, worker } => {
-            Some(format!("{} is slow: {worker} computes it too, and the first result counts", name.label))
-        }
-        RunEvent::NodeRequeued { name, .. } => Some(format!("retrying {} on another worker", name.label)),
-        RunEvent::NodeFailed { reason, .. } if reason.is_cancellation() => None,
-        // Reported as a failed part.
-        RunEvent::NodeFailed { .. } if shape != Shape::OneFit => None,
-        RunEvent::NodeFailed { name, reason } => Some(format!("error: {} failed: {reason}", name.label)),
-        _ => None,
-    }
 }

@@ -10,4 +10,4 @@ pub(crate) use clock::{Clock, cpu_seconds};
 pub(crate) use failure::journal_failed;
 pub(crate) use metrics::listen;
 pub(crate) use resume::missing;
-pub(crate) use session::Session;
+pub(crate) use session::{Session, access_file};

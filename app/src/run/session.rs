@@ -17,6 +17,11 @@ use lookalike_coordinator::{
 };
 use std::{path::PathBuf, sync::Arc};
 
+/// The access file for the workers of a run: the given one, or the one that the run creates in its folder.
+pub(crate) fn access_file(cluster: &ClusterSettings, out: &OutFolder) -> PathBuf {
+    cluster.access.clone().unwrap_or_else(|| out.file(ACCESS_FILE))
+}
+
 /// A run in a folder of results, whose lock is held.
 pub(crate) struct Session<'a> {
     pub(crate) cluster: &'a ClusterSettings,

@@ -29,7 +29,7 @@ use crate::{
     inputs::{load_environment, show_warnings},
     outputs::{Claim, ClaimedFolder, counted, print_result},
     progress::{Activity, Display, Ending, PartCount, Shape, display, print_line},
-    run::{Session, listen},
+    run::{Session, access_file, listen},
     settings::{EnvironmentSettings, OldFiles, ProgressKind, StudySettings},
 };
 use anyhow::Context;
@@ -88,7 +88,8 @@ pub(crate) fn run(settings: StudySettings) -> anyhow::Result<ExitCode> {
     // Refuses to resume the run of another study, even if nothing is left to compute.
     session.finished()?;
     let PartCount { total, done, .. } = lock(&tally).count;
-    let mut display = display(settings.progress, Shape::Many { noun: "cell", total, done });
+    let shape = Shape::Many { noun: "cell", total, done };
+    let mut display = display(settings.progress, shape, access_file(&settings.cluster, &inputs.out));
     let run = || -> anyhow::Result<Vec<String>> {
         if !supply.is_complete() || !inputs.out.file(JOURNAL_FILE).exists() {
             let workers = run_cells(&session, &mut *display, &tally, (supply, &mut seconds))?;
