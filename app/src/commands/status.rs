@@ -1,6 +1,10 @@
 //! `lookalike status`: shows the state of a run from its journal, without disturbing the run.
 
-use crate::{outputs::print_result, settings::StatusSettings, wrap::wrap};
+use crate::{
+    outputs::{counted, print_result},
+    settings::StatusSettings,
+    wrap::wrap,
+};
 use anyhow::Context;
 use lookalike_coordinator::journal::{
     PartStatus,
@@ -102,7 +106,7 @@ fn fits(all: &[PartStatus]) -> String {
     }
     match all.len() - shown.len() {
         0 => {}
-        more => text.push_str(&format!("and {more} more fits (--json lists them all)\n")),
+        more => text.push_str(&format!("and {} (--json lists them all)\n", counted(more, "more fit"))),
     }
     text
 }
@@ -160,7 +164,7 @@ fn workers(status: &Status) -> String {
     }
     match status.workers.len().saturating_sub(MOST_WORKERS) {
         0 => {}
-        more => text.push_str(&format!("and {more} more workers (--json lists them all)\n")),
+        more => text.push_str(&format!("and {} (--json lists them all)\n", counted(more, "more worker"))),
     }
     text
 }

@@ -1,7 +1,7 @@
 //! Text for stdout: printing a result, aligned columns, counts with their nouns.
 
 use std::{
-    fmt::Write as _,
+    fmt::{Display, Write as _},
     io::{self, Write as _},
 };
 
@@ -32,13 +32,20 @@ pub(crate) fn aligned(rows: &[Vec<String>]) -> String {
 }
 
 /// `1 gamma`, `2 gammas`.
-pub(crate) fn counted(count: usize, noun: &str) -> String {
-    format!("{count} {noun}{}", if count == 1 { "" } else { "s" })
+pub(crate) fn counted<N: Display + PartialEq + From<u8>>(count: N, noun: &str) -> String {
+    let ending = if count == N::from(1) { "" } else { "s" };
+    format!("{count} {noun}{ending}")
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn one_thing_is_not_plural() {
+        assert_eq!([0_u64, 1, 2].map(|count| counted(count, "result")), ["0 results", "1 result", "2 results"]);
+        assert_eq!(counted(1_usize, "more fit"), "1 more fit");
+    }
 
     #[test]
     fn columns_line_up() {

@@ -1,6 +1,7 @@
 //! Lines about unexpected events of a run.
 
 use super::Shape;
+use crate::outputs::counted;
 use lookalike_coordinator::events::RunEvent;
 use std::path::PathBuf;
 
@@ -16,7 +17,9 @@ impl Remarks {
     pub(super) fn line(&self, event: &RunEvent) -> Option<String> {
         let access = self.access.display();
         match event {
-            RunEvent::Resumed { results, .. } => Some(format!("resuming the run: its journal holds {results} results")),
+            RunEvent::Resumed { results, .. } => {
+                Some(format!("resuming the run: its journal holds {}", counted(*results, "result")))
+            }
             RunEvent::Listening { address, local_workers: 0 } => Some(format!(
                 "listening for workers, which connect to {address}; start one with `lookalike worker --access {access}`"
             )),
@@ -33,7 +36,8 @@ impl Remarks {
                 Some(format!("{worker} was asked to end: it finishes its nodes and gets no more"))
             }
             RunEvent::NodeSuspected { name, deaths } => Some(format!(
-                "warning: {deaths} workers died while they computed {}: it runs alone from now on",
+                "warning: {} died while computing {}: it runs alone from now on",
+                counted(*deaths, "worker"),
                 name.label
             )),
             RunEvent::AnswersDiffer { name, first, second, error } => Some(format!(
@@ -58,6 +62,13 @@ impl Remarks {
 mod tests {
     use super::*;
     use std::time::Duration;
+
+    #[test]
+    fn journal_with_one_result_is_not_plural() {
+        let remarks = Remarks { shape: Shape::OneFit, access: PathBuf::new() };
+        let line = remarks.line(&RunEvent::Resumed { epoch: 2, results: 1 }).unwrap();
+        assert_eq!(line, "resuming the run: its journal holds 1 result");
+    }
 
     #[test]
     fn advice_names_the_access_file_of_the_run() {

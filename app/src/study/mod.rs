@@ -101,7 +101,7 @@ pub(crate) fn run(settings: StudySettings) -> anyhow::Result<ExitCode> {
         let failed = std::mem::take(&mut lock(&tally).failed);
         match failed.len() {
             0 => session.finish(inputs.out.hashes(["results.md", "results.json", "report.html"])?)?,
-            count => session.settle(Some(&format!("{count} cells of the study failed")))?,
+            count => session.settle(Some(&format!("{} of the study failed", counted(count, "cell"))))?,
         }
         Ok(failed)
     };
