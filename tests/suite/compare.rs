@@ -162,6 +162,19 @@ fn read(path: &Path) -> Image {
 }
 
 #[test]
+fn score_of_the_object_comes_first() {
+    let folder = folder();
+    fs::write(folder.path().join("alpha.exr"), openexr::write(&ball(0.2), Some(&disk()), &[]).unwrap()).unwrap();
+    let found = json(&lookalike(folder.path(), "compare a.exr alpha.exr --json").done());
+    let table = lookalike(folder.path(), "compare a.exr alpha.exr").done().stdout;
+    let line = |start: &str| table.lines().find(|line| line.trim_start().starts_with(start)).expect(start).to_owned();
+    assert_eq!(line("on ").trim(), "on object   on image");
+    let scores = [&found["score_object"], &found["score"]].map(|score| format!("{:.6}", score.as_f64().unwrap()));
+    assert_ne!(scores[0], scores[1]);
+    assert_eq!(line("cssim  ").split_whitespace().skip(1).collect::<Vec<_>>(), scores);
+}
+
+#[test]
 fn default_output_is_a_table_of_the_five_features() {
     let folder = folder();
     let answer = lookalike(folder.path(), "compare a.exr b.exr").done();

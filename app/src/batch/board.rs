@@ -134,11 +134,11 @@ impl Board {
     /// The results of a fit are written.
     pub(super) fn finished(self: &Arc<Self>, number: u32, scores: Scores) {
         let mut inner = self.lock();
-        let Scores { cssim, cssim_object, is_missed, .. } = scores;
+        let Scores { cssim, cssim_object, judge, is_missed, .. } = scores;
         inner.set(number, State::Done(scores));
         let name = inner.name(number);
         let seconds = inner.end(number);
-        let scores = Some(PartScores { cssim, cssim_object, is_missed, seconds });
+        let scores = Some(PartScores { cssim, cssim_object, judge, is_missed, seconds });
         let event = PartEvent::Finished { number, name, scores };
         inner.show(number, &event);
         drop(inner);

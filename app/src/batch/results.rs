@@ -122,6 +122,7 @@ fn write(out: &OutFolder, out_name: String, fitted: &Fitted) -> anyhow::Result<S
     Ok(Scores {
         cssim,
         cssim_object,
+        judge: inputs.method.judge,
         gamma: outcome.judged[outcome.winner].candidate.gamma,
         parameters: final_parameters(outcome).to_vec(),
         is_polished: outcome.polished.is_some(),

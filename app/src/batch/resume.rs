@@ -76,6 +76,7 @@ fn complete_fit(out: &OutFolder, fit: &BatchFit, files: &[(String, String)]) -> 
     let scores = Scores {
         cssim,
         cssim_object,
+        judge: fit.method.judge,
         gamma: stage_two["gamma"].as_f64()?,
         parameters: flat(fit.method.model, &last["parameters"])?,
         is_polished: !polished.is_null(),

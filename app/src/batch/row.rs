@@ -1,6 +1,6 @@
 //! A fit of a batch: its state and its scores.
 
-use lookalike::brdf::Model;
+use lookalike::{brdf::Model, fit::JudgedBy};
 use lookalike_coordinator::journal::{PartRow, PartStatus};
 
 /// A fit, as the summaries show it.
@@ -55,7 +55,7 @@ impl Row {
         let status = PartStatus {
             name: self.name.clone(),
             state: self.state.name().to_owned(),
-            score: scores.map(|scores| scores.cssim),
+            score: scores.map(Scores::judged),
             seconds: self.seconds,
             error,
         };
@@ -71,6 +71,8 @@ pub(super) const STATES: [&str; 6] = ["waiting", "running", "done", "missed", "f
 pub(super) struct Scores {
     pub(super) cssim: f64,
     pub(super) cssim_object: f64,
+    /// Which of them the fit was judged by.
+    pub(super) judge: JudgedBy,
     /// The gamma of the winner of stage two.
     pub(super) gamma: f64,
     /// The final flat parameter vector.
@@ -80,4 +82,11 @@ pub(super) struct Scores {
     pub(super) is_missed: bool,
     /// The files that were written, each with the BLAKE3 of its bytes.
     pub(super) files: Vec<(String, String)>,
+}
+
+impl Scores {
+    /// The score that the fit was judged by.
+    pub(super) fn judged(&self) -> f64 {
+        self.judge.pick(self.cssim, self.cssim_object)
+    }
 }

@@ -2,7 +2,7 @@
 
 use super::row::{Row, State};
 use crate::{
-    outputs::{BATCH_MARK, OutFolder, aligned, parameters_json},
+    outputs::{BATCH_MARK, CSSIM_HINT, OutFolder, aligned, parameters_json},
     progress::PartCount,
     wrap::wrap,
 };
@@ -98,15 +98,15 @@ impl Summary {
 
     /// The table for the terminal.
     pub(super) fn table(&self) -> String {
-        let header = ["fit", "state", "CSSIM", "on object", "gamma", "seconds"];
+        let header = ["fit", "state", "CSSIM on object", "CSSIM on image", "gamma", "seconds"];
         let mut rows = vec![header.map(str::to_owned).to_vec()];
         let has_begun = |row: &&Row| !matches!(row.state, State::Waiting | State::Stopped);
         for row in self.rows.iter().filter(has_begun) {
             let mut cells = vec![row.name.clone(), row.state.name().to_owned()];
             match &row.state {
                 State::Done(scores) => cells.extend([
-                    format!("{:.4}", scores.cssim),
                     format!("{:.4}", scores.cssim_object),
+                    format!("{:.4}", scores.cssim),
                     scores.gamma.to_string(),
                 ]),
                 _ => cells.extend(std::iter::repeat_n(String::new(), 3)),
@@ -115,6 +115,7 @@ impl Summary {
             rows.push(cells);
         }
         let mut text = aligned(&rows);
+        let _ = writeln!(text, "\n  {CSSIM_HINT}");
         for row in &self.rows {
             if let State::Failed(error) = &row.state {
                 let _ = writeln!(text, "\n{}", wrap(&format!("{} failed: {error}", row.name)));
@@ -165,7 +166,7 @@ fn quoted(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::{super::row::Scores, *};
-    use lookalike::brdf;
+    use lookalike::{brdf, fit::JudgedBy};
 
     fn row(name: &str, model: &str, state: State) -> Row {
         let (photo, env) = ("a, b.exr".to_owned(), "m.hdr".to_owned());
@@ -174,7 +175,9 @@ mod tests {
 
     fn scores(parameters: Vec<f64>, is_missed: bool) -> State {
         let (cssim, cssim_object, gamma) = (0.25, 0.125, 1.5);
-        State::Done(Scores { cssim, cssim_object, gamma, parameters, is_polished: true, is_missed, files: Vec::new() })
+        let judge = JudgedBy::Object;
+        let files = Vec::new();
+        State::Done(Scores { cssim, cssim_object, judge, gamma, parameters, is_polished: true, is_missed, files })
     }
 
     fn summary() -> Summary {
@@ -211,6 +214,23 @@ mod tests {
         );
         assert_eq!((&json["fits"][1]["state"], &json["fits"][1]["error"]), (&json!("missed"), &Value::Null));
         assert_eq!((&json["fits"][2]["cssim"], &json["fits"][2]["parameters"]), (&Value::Null, &Value::Null));
+    }
+
+    #[test]
+    fn score_of_the_object_comes_first_and_the_table_says_how_to_read_it() {
+        let table = summary().table();
+        let lines: Vec<Vec<&str>> = table.lines().map(|line| line.split("  ").map(str::trim).collect()).collect();
+        let cells = |line: &[&str]| line.iter().filter(|cell| !cell.is_empty()).map(|it| (*it).to_owned()).collect();
+        let rows: Vec<Vec<String>> = lines.iter().map(|line| cells(line)).collect();
+        assert_eq!(rows[0], ["fit", "state", "CSSIM on object", "CSSIM on image", "gamma", "seconds"]);
+        assert_eq!(rows[1], ["one", "done", "0.1250", "0.2500", "1.5", "1.2"]);
+        assert!(table.contains("\n\n  CSSIM is a difference: 0 = identical, larger = worse.\n"), "{table}");
+        assert!(table.lines().all(|line| line.len() <= crate::wrap::COLUMNS), "{table}");
+    }
+
+    #[test]
+    fn score_in_the_journal_is_the_judged_one() {
+        assert_eq!(summary().rows[0].journal_row(0).status.score, Some(0.125));
     }
 
     #[test]

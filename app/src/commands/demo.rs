@@ -87,20 +87,24 @@ fn write_scene(out: &OutFolder, photo: &Image, map: &Image) -> anyhow::Result<()
 /// The strip: photo, candidates of a few gammas, winner, polished match, difference.
 fn picture(outcome: &FitOutcome, pictures: &Pictures) -> Image {
     let winner = &outcome.judged[outcome.winner];
-    let score = |gamma: f64| outcome.judged.iter().find(|j| j.candidate.gamma == gamma).map_or(f64::NAN, |j| j.cssim);
-    let mut panels: Vec<(Image, [String; 2])> =
-        vec![(pictures.displayed(&pictures.reference), ["photo".to_owned(), "measured-like noise".to_owned()])];
+    let scored = |title: String, object: f64, image: f64| {
+        [title, format!("object CSSIM {object:.4}"), format!("image CSSIM {image:.4}")]
+    };
+    let reference = ["photo".to_owned(), "measured-like noise".to_owned(), String::new()];
+    let mut panels: Vec<(Image, [String; 3])> = vec![(pictures.displayed(&pictures.reference), reference)];
     for (gamma, image) in outcome.extra.iter().filter(|(gamma, _)| SHOWN.contains(gamma)) {
-        let label = if *gamma == 1.0 { "gamma 1 (L2)".to_owned() } else { format!("gamma {gamma}") };
-        panels.push((pictures.displayed(image), [label, format!("CSSIM {:.4}", score(*gamma))]));
+        let title = if *gamma == 1.0 { "gamma 1 (L2)".to_owned() } else { format!("gamma {gamma}") };
+        let found = outcome.judged.iter().find(|j| j.candidate.gamma == *gamma);
+        let (object, whole) = found.map_or((f64::NAN, f64::NAN), |j| (j.cssim_object, j.cssim));
+        panels.push((pictures.displayed(image), scored(title, object, whole)));
     }
-    let won = [format!("winner: gamma {}", winner.candidate.gamma), format!("CSSIM {:.4}", winner.cssim)];
+    let won = scored(format!("winner: gamma {}", winner.candidate.gamma), winner.cssim_object, winner.cssim);
     panels.push((pictures.displayed(&outcome.winner_image), won));
     if let Some(polished) = &outcome.polished {
-        let label = ["polished".to_owned(), format!("CSSIM {:.4}", polished.cssim)];
+        let label = scored("polished".to_owned(), polished.cssim_object, polished.cssim);
         panels.push((pictures.displayed(&pictures.matched), label));
     }
-    let label = ["difference".to_owned(), format!("yellow: {} and up", pictures.difference_scale)];
+    let label = ["difference".to_owned(), format!("yellow: {} and up", pictures.difference_scale), String::new()];
     panels.push((pictures.difference.clone(), label));
     let panels: Vec<Panel<'_>> = panels.iter().map(|(image, label)| Panel { image, label: label.clone() }).collect();
     strip(&panels)

@@ -1,7 +1,7 @@
 //! `lookalike status`: shows the state of a run from its journal, without disturbing the run.
 
 use crate::{
-    outputs::{counted, print_result},
+    outputs::{CSSIM_HINT, counted, print_result},
     settings::StatusSettings,
     wrap::wrap,
 };
@@ -50,6 +50,9 @@ fn table(status: &Status, folder: &str) -> String {
         line("fits", fit_count(&status.parts));
     }
     text.push_str(&fits(&status.parts));
+    if status.best_score.is_some() || status.parts.iter().any(|fit| fit.score.is_some()) {
+        text.push_str(&format!("\n{CSSIM_HINT}\n"));
+    }
     text.push_str(&kinds(status));
     text.push_str(&workers(status));
     for failure in &status.failures {
@@ -223,6 +226,8 @@ nodes       21 of 30 done (5 by an earlier coordinator), 1 running, 4 ready, 3 w
 attempts    40, 2 of them lost with their workers
 best CSSIM  0.0372
 
+CSSIM is a difference: 0 = identical, larger = worse.
+
 kind       done  running    ready  waiting   failed
 search       21        1        4        3        1
 
@@ -232,6 +237,9 @@ stopped: interrupted
 to resume it, repeat the command with --resume
 ";
         assert_eq!(table(&status, "run"), expected);
+        let fit = PartStatus { name: "a".to_owned(), state: "done".to_owned(), ..PartStatus::default() };
+        let listed = fits(&vec![fit; MOST_FITS + 1]);
+        assert!(listed.ends_with("\nand 1 more fit (--json lists them all)\n"), "{listed}");
         assert_eq!([1, 2, 3, 11, 22, 112].map(ordinal), ["1st", "2nd", "3rd", "11th", "22nd", "112th"]);
     }
 }

@@ -18,7 +18,7 @@ pub(crate) use folder::{ClaimedFolder, OutFolder};
 pub(crate) use pictures::{Pictures, write_pictures};
 pub(crate) use strip::{Panel, strip};
 pub(crate) use summary::print_summary;
-pub(crate) use table::{aligned, counted, print_result};
+pub(crate) use table::{CSSIM_HINT, aligned, counted, print_result};
 
 pub(crate) use candidates_csv::candidates_csv;
 

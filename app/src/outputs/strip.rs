@@ -13,12 +13,12 @@ use std::convert::Infallible;
 #[derive(Debug)]
 pub(crate) struct Panel<'a> {
     pub(crate) image: &'a Image,
-    /// One or two lines of text below it.
-    pub(crate) label: [String; 2],
+    /// Lines of text below it.
+    pub(crate) label: [String; 3],
 }
 
 const MARGIN: usize = 12;
-const LABEL_HEIGHT: usize = 44;
+const LABEL_HEIGHT: usize = 62;
 /// Linear grey values of the background and the text.
 const GROUND: f32 = 0.006;
 const INK: f32 = 0.7;

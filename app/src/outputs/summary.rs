@@ -2,7 +2,7 @@
 
 use super::{
     FitRecord, Timing,
-    table::{aligned, counted, print_result},
+    table::{CSSIM_HINT, aligned, counted, print_result},
 };
 use crate::wrap::wrap;
 use lookalike::{
@@ -23,7 +23,7 @@ fn summary(record: &FitRecord<'_>, timing: &Timing, out: &str) -> String {
     let gammas = counted(record.method.gammas.len(), "gamma");
     let _ = writeln!(text, ", {gammas}, seed {}\n", record.method.seed);
     text.push_str(&aligned(&rows(model, outcome)));
-    text.push_str("\n  CSSIM is a difference: 0 = identical, larger = worse.\n");
+    let _ = writeln!(text, "\n  {CSSIM_HINT}");
     for note in record.notes {
         let _ = writeln!(text, "\n{}", wrap(&format!("note: {note}")));
     }

@@ -5,6 +5,9 @@ use std::{
     io::{self, Write as _},
 };
 
+/// How to read a score. It follows every table with scores.
+pub(crate) const CSSIM_HINT: &str = "CSSIM is a difference: 0 = identical, larger = worse.";
+
 /// Writes a result to stdout. A closed pipe (`| head`) is not an error.
 pub(crate) fn print_result(text: &str) -> io::Result<()> {
     let mut stdout = io::stdout().lock();

@@ -3,7 +3,7 @@
 
 use super::{
     Display, Ending,
-    parts::{PartCount, PartEvent, Shape},
+    parts::{HINT, PartCount, PartEvent, Shape},
     print_line,
     remarks::Remarks,
     rows::{Row, Rows},
@@ -17,6 +17,8 @@ use std::{collections::BTreeMap, time::Duration};
 const MOST_ROWS: usize = 10;
 /// Lines of the terminal that are not used for parts.
 const OTHER_LINES: usize = 6;
+/// The columns of a terminal that has room for how to read a score.
+const WIDE_COLUMNS: u16 = 80;
 /// The width of a part's name, in columns.
 const NAME_COLUMNS: usize = 30;
 
@@ -60,8 +62,11 @@ impl Bars {
     /// The bar of a stage of the only fit.
     fn stage_bar(all: &MultiProgress, stage: Stage) -> ProgressBar {
         let bar = all.insert(stage.place().into(), ProgressBar::new(0));
-        // The bar takes the rest of the line: 11 columns on a terminal of 60.
-        bar.set_style(style("{prefix:<20} {msg:<17} {elapsed:>4} {percent:>3}% {wide_bar:.cyan/blue}"));
+        // The bar takes the rest of the line: 11 columns on a terminal of 60, 15 on one of 80.
+        let message = if is_wide() { "{msg:<33}" } else { "{msg:<17}" };
+        bar.set_style(style(&format!(
+            "{{prefix:<20}} {message} {{elapsed:>4}} {{percent:>3}}% {{wide_bar:.cyan/blue}}"
+        )));
         bar.set_prefix(stage.title());
         bar.enable_steady_tick(Duration::from_millis(200));
         bar
@@ -152,7 +157,8 @@ fn show_stage(bar: &ProgressBar, row: &Row, stage: Stage, count: Count) {
     bar.set_length(count.planned * 1000);
     bar.set_position((count.done * 1000 + count.permille).min(count.planned * 1000));
     let nodes = || if count.planned > 1 { format!("{} of {}", count.done, count.planned) } else { String::new() };
-    bar.set_message(row.best_at(stage).map_or_else(nodes, |score| format!("best CSSIM {score:.4}")));
+    let hint = if is_wide() { HINT } else { "" };
+    bar.set_message(row.best_at(stage).map_or_else(nodes, |score| format!("best CSSIM {score:.4}{hint}")));
     if count.is_complete() {
         bar.disable_steady_tick();
         bar.abandon();
@@ -162,11 +168,16 @@ fn show_stage(bar: &ProgressBar, row: &Row, stage: Stage, count: Count) {
 fn show_part(bar: &ProgressBar, row: &Row) {
     let Some((stage, count)) = row.latest() else { return };
     bar.set_message(match (row.best_at(stage), count.planned) {
-        (Some(best), _) => format!("{}, best {best:.4}", stage.title()),
+        (Some(best), _) => format!("{}, best CSSIM {best:.4}", stage.title()),
         (None, 0..=1) => stage.title().to_owned(),
         (None, planned) => format!("{}, {} of {planned}", stage.title(), count.done),
     });
     bar.set_position(count.thousandths());
+}
+
+/// Whether the terminal has room for how to read a score.
+fn is_wide() -> bool {
+    console::Term::stderr().size().1 >= WIDE_COLUMNS
 }
 
 /// A name cut to the width of its column.

@@ -3,7 +3,7 @@
 
 use super::{
     Display, Ending, FIRST, PAUSE,
-    parts::{PartCount, PartEvent, Shape},
+    parts::{HINT, PartCount, PartEvent, Shape},
     print_line,
     remarks::Remarks,
     rows::Rows,
@@ -46,7 +46,7 @@ impl Lines {
             false if is_due => format!(": {} %", count.thousandths() / 10),
             false => return,
         };
-        let best = row.best_at(stage).map(|score| format!(", best CSSIM so far {score:.4}")).unwrap_or_default();
+        let best = row.best_at(stage).map(|score| format!(", best CSSIM so far {score:.4}{HINT}")).unwrap_or_default();
         self.tell(&format!("{}{state}{best}", stage.title()));
     }
 

@@ -1,6 +1,7 @@
 //! Events about the parts of a run, in addition to those about their nodes: the fits of a batch, the cells of a study.
 
-use lookalike::fit::BestScore;
+use crate::wrap::COLUMNS;
+use lookalike::fit::{BestScore, JudgedBy};
 use std::sync::Arc;
 
 /// The shape of a run.
@@ -58,6 +59,8 @@ pub(crate) struct PartScores {
     pub(crate) cssim: f64,
     /// Its final score of the object.
     pub(crate) cssim_object: f64,
+    /// Which of them it was judged by.
+    pub(crate) judge: JudgedBy,
     /// Whether its score lies above its `max-cssim`.
     pub(crate) is_missed: bool,
     /// From its start until its last file was written.
@@ -98,10 +101,39 @@ impl PartEvent {
         match self {
             Self::Started { .. } | Self::Finished { scores: None, .. } => None,
             Self::Finished { name, scores: Some(scores), .. } => {
-                let missed = if scores.is_missed { ", above its max-cssim" } else { "" };
-                Some(format!("{name}: CSSIM {:.4}{missed} ({:.1} s)", scores.cssim, scores.seconds))
+                let PartScores { cssim, cssim_object, judge, is_missed, seconds } = *scores;
+                let missed = if is_missed { ", above its max-cssim" } else { "" };
+                let line = |hint| {
+                    let score = judge.pick(cssim, cssim_object);
+                    format!("{name}: CSSIM {score:.4} on {judge}{hint}{missed} ({seconds:.1} s)")
+                };
+                let hinted = line(HINT);
+                Some(if hinted.chars().count() <= COLUMNS - PREFIX_COLUMNS { hinted } else { line("") })
             }
             Self::Failed { name, error, .. } => Some(format!("{name}: failed: {error}")),
         }
+    }
+}
+
+/// How to read a score, where it fits.
+pub(super) const HINT: &str = " (0 = identical)";
+
+/// Columns for what is printed before a line about a part: the time and the count, such as `1234.5 s  100 of 400  `.
+const PREFIX_COLUMNS: usize = 23;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn line_shows_the_judged_score_and_how_to_read_it_where_there_is_room() {
+        let line = |name: &str, judge| {
+            let scores = PartScores { cssim: 0.25, cssim_object: 0.125, judge, is_missed: true, seconds: 12.34 };
+            PartEvent::Finished { number: 0, name: name.to_owned(), scores: Some(scores) }.line().unwrap()
+        };
+        let expected = "a: CSSIM 0.1250 on object (0 = identical), above its max-cssim (12.3 s)";
+        assert_eq!(line("a", JudgedBy::Object), expected);
+        let long = "gold-metallic-paint3-grace_cross-cook-torrance";
+        assert_eq!(line(long, JudgedBy::Image), format!("{long}: CSSIM 0.2500 on image, above its max-cssim (12.3 s)"));
     }
 }

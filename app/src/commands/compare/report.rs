@@ -66,14 +66,15 @@ impl Report<'_> {
         let metric = self.settings.metric.to_string();
         let (reference, image) = (self.settings.reference.display(), self.settings.image.display());
         let mut text = wrap(&format!("{metric} of {image} against {reference}: 0 is equal, larger is worse")) + "\n\n";
-        let mut row = |name: &str, [a, b]: [f64; 2]| text.push_str(&format!("{name:<10} {a:>10.6} {b:>10.6}\n"));
-        row(&metric, [score, score_object]);
+        let mut row =
+            |name: &str, object: f64, image: f64| text.push_str(&format!("{name:<10} {object:>10.6} {image:>10.6}\n"));
+        row(&metric, score_object, score);
         if let Some([image, object]) = features {
             for (i, name) in FEATURES.iter().enumerate() {
-                row(name, [image[i], object[i]]);
+                row(name, object[i], image[i]);
             }
         }
-        let heading = format!("{:<10} {:>10} {:>10}\n", "", "image", "object");
+        let heading = format!("{:<10} {:>10} {:>10}\n", "", "on object", "on image");
         text.insert_str(text.find("\n\n").map_or(0, |end| end + 2), &heading);
         text.push_str(&format!("\nobject: {object}\n"));
         if features.is_some() {
