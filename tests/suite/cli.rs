@@ -1,6 +1,6 @@
 //! The command line as scripts use it: the real program, exact exit codes, and the contents of stdout and stderr.
 
-use lookalike::brdf::DEFAULT_MODEL;
+use lookalike::{brdf::DEFAULT_MODEL, choice::Choice as _, metric::MetricKind};
 use std::{
     fs,
     path::Path,
@@ -86,6 +86,8 @@ fn every_default_of_a_fit_is_in_its_help() {
 #[test]
 fn bad_usage_is_code_two_and_lists_what_is_possible() {
     let fit = "fit ball.exr --env garden.hdr --out run";
+    let metrics =
+        format!("[possible values: {}]", MetricKind::TABLE.iter().map(|row| row.1).collect::<Vec<_>>().join(", "));
     for (arguments, phrases) in [
         ("fitt".to_owned(), &["unrecognized subcommand 'fitt'", "'fit'"][..]),
         ("fit ball.exr".into(), &["required arguments", "--env <MAP>", "--out <DIR>"]),
@@ -111,7 +113,7 @@ fn bad_usage_is_code_two_and_lists_what_is_possible() {
         (format!("{fit} --env-rotation east"), &["--env-rotation", "a finite number"]),
         (format!("{fit} --log lookalike=loud"), &["--log"]),
         ("compare a.exr".into(), &["required arguments", "<IMAGE>"]),
-        ("compare a.exr b.exr --metric no-such-metric".into(), &["'no-such-metric'", "[possible values: cssim, icid]"]),
+        ("compare a.exr b.exr --metric no-such-metric".into(), &["'no-such-metric'", &metrics]),
         ("render --env g.hdr -o a.exr".into(), &["no material"]),
         ("render --env g.hdr -o a.exr --model ggx --params alpha=x".into(), &["alpha must be a number"]),
         ("worker".into(), &["--access <FILE>"]),
