@@ -6,6 +6,7 @@ mod circles;
 mod contracts;
 mod documents;
 mod files;
+mod imports;
 mod models;
 mod paths;
 mod source;
@@ -14,25 +15,6 @@ use std::collections::BTreeSet;
 
 use paths::{Found, calls, chain, paths, words};
 use source::{Source, sources};
-
-/// The modules of `common` that each module may import; the longest path that fits a file counts. Keep it tight: widen it in the commit
-/// that explains why.
-const MAY_IMPORT: [(&str, &[&str]); 14] = [
-    ("choice", &[]),
-    ("math", &[]),
-    ("image", &["math"]),
-    ("brdf", &["math"]),
-    ("light", &["choice", "image", "math"]),
-    ("scene", &["image", "light", "math"]),
-    ("render", &["brdf", "choice", "image", "light", "math", "scene"]),
-    ("metric", &["choice", "image", "math"]),
-    ("search", &["math"]),
-    ("fit", &["brdf", "choice", "image", "light", "math", "metric", "render", "scene", "search"]),
-    ("nodes", &["brdf", "fit", "graph", "image", "light", "math", "metric", "protocol", "render", "scene", "search"]),
-    ("plan", &["brdf", "fit", "graph", "image", "light", "math", "metric", "nodes", "render", "scene", "search"]),
-    ("graph", &[]),
-    ("protocol", &["graph"]),
-];
 
 /// Parts of the standard library that `common` must not use: it opens, waits for and prints nothing.
 const WORLD: [&str; 8] = [
@@ -89,36 +71,6 @@ fn at(source: &Source, found: &Found, what: &str) -> String {
 /// Whether a path lies in [`WORLD`].
 fn is_outside(path: &str) -> bool {
     WORLD.iter().any(|world| path.strip_prefix(world).is_some_and(|rest| rest.is_empty() || rest.starts_with("::")))
-}
-
-#[test]
-fn modules_of_the_library_import_in_one_direction() {
-    let mut offences = Vec::new();
-    for source in common() {
-        let Some(module) = source.module_of_common() else { continue };
-        let fits = |name: &str| {
-            source.path["common/src/".len()..].strip_prefix(name).is_some_and(|r| r.starts_with(['/', '.']))
-        };
-        let Some((name, allowed)) = MAY_IMPORT.iter().filter(|(name, _)| fits(name)).max_by_key(|(name, _)| name.len())
-        else {
-            offences.push(format!("{}: the module {module} is not in MAY_IMPORT; give it its place", source.path));
-            continue;
-        };
-        for found in paths(&source.code, "crate") {
-            let target = found.name.split("::").nth(1).unwrap_or("*");
-            if target != module && !allowed.contains(&target) {
-                offences.push(at(&source, &found, &format!("must not be imported by {name}")));
-            }
-        }
-        // A path of `super` that leaves its module would not be seen by the check above.
-        let folders = source.path.matches('/').count() - 2 + usize::from(!source.path.ends_with("/mod.rs"));
-        for found in paths(&source.code, "super") {
-            if found.name.split("::").filter(|name| *name == "super").count() >= folders.max(1) {
-                offences.push(at(&source, &found, "leaves its module; write crate::"));
-            }
-        }
-    }
-    none("the order is math <- image <- {brdf, light} <- scene <- render, see MAY_IMPORT", offences);
 }
 
 #[test]
@@ -204,34 +156,6 @@ fn state_machines_use_neither_sockets_nor_clocks() {
     }
     assert_eq!(seen.len(), PURE.len(), "a file of {PURE:?} was moved: follow it here");
     none("state changes are plain functions of (state, event)", offences);
-}
-
-/// What each member may import from other members, except in tests. A name that ends with `::` stands for everything in it.
-const MEMBERS_MAY_IMPORT: [(&str, &[&str]); 3] = [
-    ("worker/src/", &["lookalike::graph::", "lookalike::protocol::"]),
-    ("coordinator/src/", &["lookalike::graph::", "lookalike::protocol::", "lookalike_worker::"]),
-    ("report/src/", &["lookalike::brdf::", "lookalike::image::", "lookalike::math::"]),
-];
-
-#[test]
-fn members_import_what_their_role_allows() {
-    const OURS: [&str; 5] =
-        ["lookalike", "lookalike_app", "lookalike_coordinator", "lookalike_report", "lookalike_worker"];
-    let mut offences = Vec::new();
-    for source in sources().iter().filter(|source| source.path != "worker/src/main.rs") {
-        let of = MEMBERS_MAY_IMPORT.iter().find(|(member, _)| source.path.starts_with(member));
-        let Some((_, allowed)) = of else { continue };
-        for found in OURS.iter().flat_map(|root| paths(&source.code, root)) {
-            let name = format!("{}::", found.name);
-            if !allowed.iter().any(|allowed| name.starts_with(allowed)) {
-                offences.push(at(source, &found, &format!("(its member may import {allowed:?})")));
-            }
-        }
-    }
-    none(
-        "worker and coordinator know no rendering, only worker/src/main.rs names node types, and the report reads rows",
-        offences,
-    );
 }
 
 #[test]

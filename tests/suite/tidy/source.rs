@@ -24,12 +24,12 @@ impl Source {
         text[..place].matches('\n').count() + 1
     }
 
-    /// The first folder or file below `common/src`; `None` elsewhere and for `lib.rs` itself.
-    pub(super) fn module_of_common(&self) -> Option<&str> {
-        let inside = self.path.strip_prefix("common/src/")?;
+    /// The first folder or file below `src` of a member; `None` elsewhere, for `lib.rs` itself and for a program.
+    pub(super) fn module_of(&self, member: &str) -> Option<&str> {
+        let inside = self.path.strip_prefix(member)?.strip_prefix("/src/")?;
         let first = inside.split('/').next()?;
         let name = first.strip_suffix(".rs").unwrap_or(first);
-        (name != "lib").then_some(name)
+        (!["lib", "main"].contains(&name)).then_some(name)
     }
 }
 
@@ -170,13 +170,13 @@ fn block_comment_end(bytes: &[u8], open: usize) -> usize {
     i
 }
 
-/// Blanks the items under `#[cfg(test)]`, and names the modules among them that are files of their own.
+/// Blanks the items that exist in tests only, and names the modules among them that are files of their own.
 fn without_test_items(code: String) -> (String, Vec<String>) {
-    const GATE: &str = "#[cfg(test)]";
+    const GATES: [&str; 2] = ["#[cfg(test)]", "#[cfg(all(test, unix))]"];
     let (mut code, mut modules) = (code, Vec::new());
-    while let Some(place) = code.find(GATE) {
-        let end = item_end(code.as_bytes(), place + GATE.len());
-        let item = &code[place + GATE.len()..end];
+    while let Some((place, gate)) = GATES.iter().find_map(|gate| Some((code.find(gate)?, gate))) {
+        let end = item_end(code.as_bytes(), place + gate.len());
+        let item = &code[place + gate.len()..end];
         if let Some((_, name)) = item.trim().strip_suffix(';').and_then(|head| head.rsplit_once("mod ")) {
             modules.push(name.trim().to_owned());
         }
