@@ -72,6 +72,13 @@ fn render_and_compare_replace_no_input_and_follow_no_link() {
         lookalike(folder.path(), &line).refused(&phrases);
     }
     assert!(before == ["a.png", "b.png", "map.exr", "precious.png", "other.png.partial"].map(old));
+    let mut protected = fs::metadata(at("kept.png")).unwrap().permissions();
+    protected.set_readonly(true);
+    fs::set_permissions(at("kept.png"), protected).unwrap();
+    lookalike(folder.path(), "compare a.png b.png --map kept.png")
+        .refused(&["cannot write kept.png", "write-protected"]);
+    fs::remove_file(at("kept.png")).unwrap();
+    write_png(&at("kept.png"), &grey);
     // Another old file is replaced.
     lookalike(folder.path(), "compare a.png b.png --map kept.png").done();
     assert!(old("kept.png") != before[0] && !at("kept.png.partial").exists());

@@ -14,6 +14,7 @@ pub(crate) fn check_writable(path: &Path, inputs: &[&Path]) -> anyhow::Result<()
             }
             Ok(it) if it.is_dir() => bail!("expected a file, found a folder; give the path of a file in it"),
             Ok(it) if !it.is_file() => bail!("expected a file, found a device or a pipe; choose another place"),
+            Ok(it) if it.permissions().readonly() => bail!("the file there is write-protected; choose another place"),
             _ => {}
         }
         if !folder.is_dir() {
