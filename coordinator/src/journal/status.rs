@@ -341,8 +341,9 @@ fn failures(connection: &Connection, epoch: u64) -> rusqlite::Result<Vec<NodeErr
         "SELECT kind, label, ifnull(error, '') FROM nodes WHERE id >= ?1 AND state = 5 ORDER BY id LIMIT {MOST_FAILURES}"
     );
     let mut statement = connection.prepare_cached(&sql)?;
-    let rows = statement
-        .query_map([epoch], |row| Ok(NodeError { kind: row.get(0)?, label: row.get(1)?, error: row.get(2)? }))?;
+    let rows = statement.query_map([node_id(epoch, 0)], |row| {
+        Ok(NodeError { kind: row.get(0)?, label: row.get(1)?, error: row.get(2)? })
+    })?;
     rows.collect()
 }
 

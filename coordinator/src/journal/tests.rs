@@ -300,6 +300,31 @@ fn status_reports_counts_workers_and_whether_a_coordinator_runs() {
 }
 
 #[test]
+fn status_of_a_resumed_run_lists_no_failures_of_earlier_epochs() {
+    let folder = tempfile::tempdir().unwrap();
+    let failed = |error: &str| {
+        let row = completed(1).nodes.remove(&1).unwrap();
+        let mut batch = Batch::default();
+        batch.nodes.insert(1, NodeRow { state: State::Failed, error: Some(error.into()), ..row });
+        batch
+    };
+    let errors = || -> Vec<String> {
+        Status::of(folder.path()).unwrap().failures.into_iter().map(|failure| failure.error).collect()
+    };
+    let mut first = begun(&folder);
+    write(&mut first, [failed("black")]);
+    assert_eq!(errors(), ["black"]);
+    first.close(None).unwrap();
+    let mut second = begun(&folder);
+    write(&mut second, [completed(1)]);
+    assert!(errors().is_empty());
+    second.close(None).unwrap();
+    let mut third = begun(&folder);
+    write(&mut third, [failed("no light")]);
+    assert_eq!(errors(), ["no light"]);
+}
+
+#[test]
 fn status_is_read_from_its_file_while_the_journal_is_locked() {
     let folder = tempfile::tempdir().unwrap();
     let _lock = RunLock::take(folder.path()).unwrap();
