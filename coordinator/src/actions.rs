@@ -51,7 +51,7 @@ pub enum Action {
         /// The blob.
         blob: Blob,
     },
-    /// A worker asked for a blob that is needed no more: nothing is sent.
+    /// A worker requested a blob that none of its leases reads any more: nothing is sent.
     ForgoBlob {
         /// The worker.
         worker: WorkerId,

@@ -340,10 +340,10 @@ impl Graph {
         self.get(node)?.spec.inputs.iter().map(blob_of).collect()
     }
 
-    /// The key of a node; `None` while an input has no output. It remains available after blobs are dropped.
+    /// The hashes of a node's inputs, in the order of its specification; `None` while an input has no output. They remain available
+    /// after the blobs are dropped.
     #[must_use]
-    pub fn key(&self, node: NodeId) -> Option<NodeKey> {
-        let spec = self.spec(node)?;
+    pub fn input_hashes(&self, node: NodeId) -> Option<Vec<BlobHash>> {
         let hash_of = |input: &Input| match *input {
             Input::Blob(hash) => Some(hash),
             Input::OutputOf(source) => match self.state(source)? {
@@ -351,8 +351,14 @@ impl Graph {
                 _ => None,
             },
         };
-        let inputs: Vec<BlobHash> = spec.inputs.iter().map(hash_of).collect::<Option<_>>()?;
-        Some(NodeKey::of(&spec.kind, &spec.parameters, inputs))
+        self.spec(node)?.inputs.iter().map(hash_of).collect()
+    }
+
+    /// The key of what a node computes; `None` while an input has no output. It remains available after blobs are dropped.
+    #[must_use]
+    pub fn key(&self, node: NodeId) -> Option<NodeKey> {
+        let spec = self.spec(node)?;
+        Some(NodeKey::of(&spec.kind, &spec.parameters, self.input_hashes(node)?))
     }
 
     /// Whether a node has neither an output nor a failure yet.

@@ -2,7 +2,7 @@
 //! for 10.
 
 use std::cmp::Ordering;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::{BTreeMap, BTreeSet, btree_map::Entry};
 use std::time::Duration;
 
 use lookalike::graph::{BlobHash, NodeId, WorkerId};
@@ -46,8 +46,8 @@ pub(crate) struct Member {
     waiting_bytes: usize,
     /// The time that they take one after the other.
     waiting_time: Duration,
-    /// The inputs of every node that it was given, which it may read. (It may still ask for those of a node that was taken back.)
-    pub(crate) readable: BTreeSet<BlobHash>,
+    /// The blobs that its leases read, each with the number of times that they read it. It may fetch only these.
+    inputs: BTreeMap<BlobHash, usize>,
     /// It is lost, with its leases, if it sends nothing before this time.
     pub(crate) deadline: Duration,
     /// It was asked to end: it finishes the nodes that it executes and gets no others.
@@ -92,7 +92,7 @@ impl Member {
             waiting: BTreeSet::new(),
             waiting_bytes: 0,
             waiting_time: Duration::ZERO,
-            readable: BTreeSet::new(),
+            inputs: BTreeMap::new(),
             deadline,
             is_draining: false,
             is_clearing: false,
@@ -123,6 +123,34 @@ impl Member {
         self.waiting_bytes += assignment.bytes;
         self.waiting_time += assignment.time;
         self.last_move = now;
+    }
+
+    /// A lease that was added reads these blobs.
+    pub(crate) fn add_inputs(&mut self, hashes: &[BlobHash]) {
+        hashes.iter().for_each(|hash| *self.inputs.entry(*hash).or_default() += 1);
+    }
+
+    /// A lease that was removed read these blobs.
+    pub(crate) fn remove_inputs(&mut self, hashes: &[BlobHash]) {
+        for hash in hashes {
+            if let Entry::Occupied(mut count) = self.inputs.entry(*hash) {
+                *count.get_mut() -= 1;
+                if *count.get() == 0 {
+                    count.remove();
+                }
+            }
+        }
+    }
+
+    /// Whether a lease of it reads this blob.
+    pub(crate) fn reads(&self, hash: BlobHash) -> bool {
+        self.inputs.contains_key(&hash)
+    }
+
+    /// The number of different blobs that its leases read.
+    #[cfg(test)]
+    pub(crate) fn input_count(&self) -> usize {
+        self.inputs.len()
     }
 
     /// Mark a lease as executing; `false` if there is no such lease or the worker executes it already.

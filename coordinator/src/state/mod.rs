@@ -10,7 +10,7 @@ mod waiting;
 use std::collections::VecDeque;
 use std::time::Duration;
 
-use lookalike::graph::{Blob, Graph, NodeId, NodeKey, WorkerId};
+use lookalike::graph::{Blob, BlobHash, Graph, NodeId, NodeKey, WorkerId};
 use lookalike::protocol::ProcessName;
 
 pub use self::deaths::Deaths;
@@ -251,15 +251,15 @@ impl Core {
 
     /// Record a lease of a node for a worker.
     pub(crate) fn give(&mut self, worker: WorkerId, node: NodeId, attempt: u32, now: Duration) {
-        let inputs = self.graph.input_blobs(node).unwrap_or_default();
+        let inputs = self.graph.input_hashes(node).unwrap_or_default();
         let spec = self.graph.spec(node);
         let parameters = spec.map_or(0, |spec| spec.parameters.len());
         let named = spec.map_or(0, |spec| spec.kind.len() + spec.label.len());
-        let bytes = ASSIGNMENT_BYTES + parameters + named + inputs.len() * size_of::<[u8; 32]>();
+        let bytes = ASSIGNMENT_BYTES + parameters + named + inputs.len() * size_of::<BlobHash>();
         let size = Size { bytes, time: weight(spec.and_then(|spec| self.pace.established(&spec.kind))) };
         self.members.change(worker, |member| {
             member.give(node, attempt, size, now);
-            member.readable.extend(inputs.iter().map(Blob::hash));
+            member.add_inputs(&inputs);
         });
         if let Some(record) = self.record(node) {
             record.holders.push(worker);
@@ -269,7 +269,13 @@ impl Core {
 
     /// End a lease.
     pub(crate) fn end_lease(&mut self, worker: WorkerId, node: NodeId, now: Duration) -> Option<Held> {
-        let held = self.members.change(worker, |member| member.end(node, now)).flatten()?;
+        let inputs = self.graph.input_hashes(node).unwrap_or_default();
+        let end = |member: &mut Member| {
+            let held = member.end(node, now)?;
+            member.remove_inputs(&inputs);
+            Some(held)
+        };
+        let held = self.members.change(worker, end).flatten()?;
         self.forget_holder(worker, node);
         Some(held)
     }
