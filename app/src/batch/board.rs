@@ -9,7 +9,7 @@ use crate::{
     exit::Exit,
     outputs::{OutFolder, Timing},
     progress::{Display, Ending, PartCount, PartEvent, PartScores},
-    run::Clock,
+    run::{Clock, FITS},
     settings::BatchFit,
 };
 use lookalike::{fit::BestScore, graph::split_label};
@@ -301,7 +301,7 @@ impl Inner {
     fn show_metrics(&self) {
         if let Some(metrics) = &self.watchers.metrics {
             let of = |state: &str| self.rows.iter().filter(|row| row.state.name() == state).count();
-            metrics.set_fits(&STATES.map(|state| (state, of(state))));
+            metrics.set_parts(FITS, &STATES.map(|state| (state, of(state))));
         }
     }
 }

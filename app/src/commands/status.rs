@@ -2,6 +2,7 @@
 
 use crate::{
     outputs::{CSSIM_HINT, counted, print_result},
+    run::NAMES,
     settings::StatusSettings,
     wrap::wrap,
 };
@@ -20,9 +21,9 @@ const FIRST_STATES: [&str; 3] = ["running", "failed", "missed"];
 const MOST_WORKERS: usize = 20;
 
 pub(crate) fn run(settings: &StatusSettings) -> anyhow::Result<ExitCode> {
-    let status = Status::of(&settings.run)?;
+    let status = Status::of(&settings.run, NAMES)?;
     let text = if settings.json {
-        serde_json::to_string_pretty(&status).context("the status as JSON")? + "\n"
+        status.to_json(NAMES).context("the status as JSON")?
     } else {
         table(&status, &settings.run.display().to_string())
     };
@@ -209,13 +210,13 @@ mod tests {
             json!({ "total": 30, "waiting": 3, "ready": 4, "running": 1, "completed": 21, "recalled": 5, "failed": 1 });
         let mut kind = counts.clone();
         kind["kind"] = json!("search");
-        let status: Status = serde_json::from_value(json!({
+        let status = json!({
             "schema": "lookalike.status/1", "state": "stopped", "error": "interrupted", "run": "00", "epoch": 2,
             "process": 7, "host": "h", "started_at": "2026-11-22T09:20:11.123Z", "updated_at": "2026-11-22T09:21:11.123Z",
             "finished_at": null, "elapsed_s": 3723.5, "nodes": counts, "kinds": [kind], "workers": [], "attempts": 40,
             "requeued": 2, "best_cssim": 0.03721, "failures": [{ "kind": "search", "label": "gamma 1", "error": "black" }],
-        }))
-        .unwrap();
+        });
+        let status = Status::from_json(status.to_string().as_bytes(), NAMES).unwrap();
         let expected = "\
 run: stopped, not finished
 

@@ -1,6 +1,6 @@
 //! A run on the job graph in a folder of results: what a fit, a batch and a study have in common.
 
-use super::{failure::journal_failed, resume::missing};
+use super::{failure::journal_failed, names::NAMES, resume::missing};
 use crate::{
     exit::Exit,
     outputs::{ACCESS_FILE, OutFolder},
@@ -85,6 +85,7 @@ impl Session<'_> {
             resume: self.resume,
             score: self.score.clone(),
             parts: self.parts.clone(),
+            names: NAMES,
         });
         options
     }
@@ -122,11 +123,11 @@ impl Session<'_> {
 
     /// Records in the journal how the parts of the run ended, and the problem if all have ended and some failed.
     pub(crate) fn settle(&self, problem: Option<&str>) -> anyhow::Result<()> {
-        journal::settle(&self.journal(), &self.parts, problem).map_err(journal_failed)
+        journal::settle(&self.journal(), NAMES, &self.parts, problem).map_err(journal_failed)
     }
 
     /// Records in the journal that the run is finished and has written these files.
     pub(crate) fn finish(&self, outputs: Vec<(String, String)>) -> anyhow::Result<()> {
-        journal::finish(&self.journal(), &Finished { outputs }).map_err(journal_failed)
+        journal::finish(&self.journal(), NAMES, &Finished { outputs }).map_err(journal_failed)
     }
 }

@@ -128,7 +128,7 @@ pub(super) fn ms(at: Duration) -> i64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::journal::schema;
+    use crate::journal::{Names, schema};
 
     const AT: Duration = Duration::from_millis(5);
 
@@ -143,7 +143,7 @@ mod tests {
     #[test]
     fn every_attempt_is_written_once_with_its_outcome() {
         let folder = tempfile::tempdir().unwrap();
-        let connection = schema::create(&folder.path().join("run.sqlite"), |_| Ok(())).unwrap();
+        let connection = schema::create(&folder.path().join("run.sqlite"), Names::default(), |_| Ok(())).unwrap();
         let mut deferred = Deferred::new(1);
         let mut write = |attempts: Vec<AttemptChange>| -> Vec<(u64, u64, u32, Option<u8>)> {
             deferred.take(&Batch { attempts, ..Batch::default() });
@@ -167,7 +167,7 @@ mod tests {
     #[test]
     fn rolled_back_entries_are_written_by_the_next_transaction() {
         let folder = tempfile::tempdir().unwrap();
-        let mut connection = schema::create(&folder.path().join("run.sqlite"), |_| Ok(())).unwrap();
+        let mut connection = schema::create(&folder.path().join("run.sqlite"), Names::default(), |_| Ok(())).unwrap();
         let mut deferred = Deferred::new(1);
         deferred.take(&Batch { attempts: vec![begun(7, 1, 2)], ..Batch::default() });
         let transaction = connection.transaction().unwrap();

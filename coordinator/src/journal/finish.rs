@@ -6,6 +6,7 @@ use rusqlite::{OptionalExtension, params};
 
 use super::error::JournalError;
 use super::identity::RunIdentity;
+use super::names::Names;
 use super::parts::{self, PartLedger};
 use super::time::unix_ms;
 use super::{past, schema, status};
@@ -18,7 +19,7 @@ pub struct Finished {
 }
 
 /// Mark a run as finished, and drop the outputs of its nodes: they are large, and the results are written.
-pub fn finish(path: &Path, finished: &Finished) -> Result<(), JournalError> {
+pub fn finish(path: &Path, names: Names, finished: &Finished) -> Result<(), JournalError> {
     let connection = schema::open(path)?;
     let outputs = parts::files_json(&finished.outputs);
     let write = || -> rusqlite::Result<()> {
@@ -33,7 +34,7 @@ pub fn finish(path: &Path, finished: &Finished) -> Result<(), JournalError> {
     };
     write().map_err(|source| JournalError::writing(path, source))?;
     // The run is finished now, so an error below does not matter.
-    let _ = status::write(&connection, path);
+    let _ = status::write(&connection, path, names);
     let _ = connection.execute("VACUUM", []);
     let _ = connection.pragma_update(None, "journal_mode", "DELETE");
     Ok(())
@@ -41,7 +42,7 @@ pub fn finish(path: &Path, finished: &Finished) -> Result<(), JournalError> {
 
 /// Record how the parts of a run ended, after its journal was closed. `ended` is the message about failed parts, if all have
 /// ended and some failed.
-pub fn settle(path: &Path, ledger: &PartLedger, ended: Option<&str>) -> Result<(), JournalError> {
+pub fn settle(path: &Path, names: Names, ledger: &PartLedger, ended: Option<&str>) -> Result<(), JournalError> {
     let mut connection = schema::open(path)?;
     let rows = ledger.take();
     let mut write = || -> rusqlite::Result<()> {
@@ -59,7 +60,7 @@ pub fn settle(path: &Path, ledger: &PartLedger, ended: Option<&str>) -> Result<(
     };
     write().map_err(|source| JournalError::writing(path, source))?;
     // The parts are recorded now, so an error below does not matter.
-    let _ = status::write(&connection, path);
+    let _ = status::write(&connection, path, names);
     let _ = connection.pragma_update(None, "journal_mode", "DELETE");
     Ok(())
 }

@@ -18,7 +18,7 @@
 //! | `attempts` | lease that was given out: worker, when, how it ended |
 //! | `workers` | connection of a worker |
 //! | `results` | node key: the hash and the bytes of its output |
-//! | `parts` | part of a run of many, such as a fit of a batch: its state, what it wrote |
+//! | `parts` | part of a run of many, such as one of many independent computations: its state, what it wrote |
 //!
 //! Rows that nothing depends on are written about once a second: see `deferred.rs`.
 //!
@@ -35,6 +35,7 @@ mod error;
 mod finish;
 mod identity;
 mod lock;
+mod names;
 mod options;
 mod parts;
 mod past;
@@ -61,6 +62,7 @@ pub use self::error::JournalError;
 pub use self::finish::{Finished, finish, finished, settle};
 pub use self::identity::{Difference, RunIdentity};
 pub use self::lock::{LOCK_FILE, LockError, RunLock};
+pub use self::names::Names;
 pub use self::options::{JOURNAL_FILE, JournalOptions, Score};
 pub use self::parts::{PartLedger, PartRow, PartStatus, written};
 use self::past::{Loaded, Past};
@@ -101,7 +103,7 @@ impl Journal {
         let (connection, loaded) = if path.exists() {
             past::load(&path, &options.identity)?
         } else {
-            past::begin(&path, &options.identity, name)?
+            past::begin(&path, &options.identity, options.names, name)?
         };
         let (commands, asked) = channel();
         let (sender, committed) = unbounded_channel();

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use super::identity::RunIdentity;
+use super::names::Names;
 use super::parts::PartLedger;
 
 /// The journal's file in a folder of results.
@@ -26,22 +27,25 @@ pub struct JournalOptions {
     pub score: Option<Score>,
     /// The states of the parts, in a run of many.
     pub parts: PartLedger,
+    /// The names under which users know parts and scores.
+    pub names: Names,
 }
 
 impl JournalOptions {
     /// The options of a new run.
     #[must_use]
     pub fn new(path: PathBuf, identity: RunIdentity) -> Self {
-        Self { path, identity, resume: false, score: None, parts: PartLedger::default() }
+        Self { path, identity, resume: false, score: None, parts: PartLedger::default(), names: Names::default() }
     }
 }
 
 /// Omits the score, which is a function.
 impl fmt::Debug for JournalOptions {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { path, identity, resume, parts, .. } = self;
+        let Self { path, identity, resume, parts, names, .. } = self;
         let mut text = formatter.debug_struct("JournalOptions");
         text.field("path", path).field("identity", identity).field("resume", resume).field("parts", parts);
+        text.field("names", names);
         text.finish_non_exhaustive()
     }
 }

@@ -1,4 +1,4 @@
-//! The parts of a run of many, such as the fits of a batch, in its journal: their states, and the files that they wrote.
+//! The parts of a run of many in its journal: their states, and the files that they wrote.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -17,10 +17,9 @@ use super::{past, schema};
 pub struct PartStatus {
     /// Its name.
     pub name: String,
-    /// `waiting`, `running`, `done`, `missed`, `failed` or `stopped`, as in the summaries.
+    /// `waiting`, `running`, `done`, `missed`, `failed` or `stopped`.
     pub state: String,
     /// Its final score.
-    #[serde(rename = "cssim")]
     pub score: Option<f64>,
     /// The time from its start to its end.
     pub seconds: Option<f64>,

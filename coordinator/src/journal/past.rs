@@ -11,6 +11,7 @@ use rusqlite::{Connection, OptionalExtension, params};
 use super::error::JournalError;
 use super::identity::RunIdentity;
 use super::lock::host;
+use super::names::Names;
 use super::schema;
 use super::time::unix_ms;
 use crate::state::Deaths;
@@ -35,8 +36,13 @@ pub(super) struct Loaded {
 }
 
 /// Create a journal.
-pub(super) fn begin(path: &Path, identity: &RunIdentity, run: RunName) -> Result<(Connection, Loaded), JournalError> {
-    let connection = schema::create(path, |connection| {
+pub(super) fn begin(
+    path: &Path,
+    identity: &RunIdentity,
+    names: Names,
+    run: RunName,
+) -> Result<(Connection, Loaded), JournalError> {
+    let connection = schema::create(path, names, |connection| {
         connection.execute(
             "INSERT INTO run (id, name, identity, started_ms) VALUES (1, ?1, ?2, ?3)",
             params![run.0, identity.to_json(), unix_ms()],

@@ -8,6 +8,7 @@ use std::time::Duration;
 use rusqlite::{Connection, OpenFlags};
 
 use super::error::JournalError;
+use super::names::Names;
 use super::place;
 use crate::atomic;
 
@@ -17,7 +18,7 @@ pub(super) const FORMAT: i64 = 3;
 /// Marks the file as a journal of this program: `PRAGMA application_id`, the letters `Look`.
 pub(super) const APPLICATION: i64 = 0x4c6f_6f6b;
 
-/// docs/journal.md explains them. Rows about nodes are appended or found by number, so there are no further indices.
+/// docs/journal.md explains them. [`Names::view`] is the view of the parts. Rows about nodes are appended or found by number, so there are no further indices.
 const TABLES: &str = "
 CREATE TABLE run (
     id          INTEGER PRIMARY KEY CHECK (id = 1),
@@ -86,8 +87,6 @@ CREATE TABLE parts (
     error       TEXT,
     outputs     TEXT
 ) WITHOUT ROWID;
-CREATE VIEW fits AS
-    SELECT name, number, state, score AS cssim, seconds, error, outputs FROM parts;
 CREATE VIEW node_list AS
     SELECT id >> 32 AS epoch, id & 0xffffffff AS node, kind, label,
            CASE state WHEN 0 THEN 'waiting' WHEN 1 THEN 'ready' WHEN 2 THEN 'running' WHEN 3 THEN 'completed'
@@ -154,13 +153,14 @@ pub fn remove(path: &Path) -> io::Result<()> {
 /// or not at all, even if the process is killed or the disk is full.
 pub(super) fn create(
     path: &Path,
+    names: Names,
     begin: impl FnOnce(&Connection) -> rusqlite::Result<()>,
 ) -> Result<Connection, JournalError> {
     let creating = |source| JournalError::Create { path: path.to_owned(), source };
     let unfinished = unfinished(path);
     // Remove what a failed attempt left.
     remove(&unfinished).map_err(creating)?;
-    let made = make(&unfinished, begin).map_err(|error| error.about(path));
+    let made = make(&unfinished, names, begin).map_err(|error| error.about(path));
     if made.is_err() {
         // If this fails, the next attempt removes it.
         let _ = remove(&unfinished);
@@ -171,7 +171,11 @@ pub(super) fn create(
 }
 
 /// Write a new journal, in one transaction and one file.
-fn make(path: &Path, begin: impl FnOnce(&Connection) -> rusqlite::Result<()>) -> Result<(), JournalError> {
+fn make(
+    path: &Path,
+    names: Names,
+    begin: impl FnOnce(&Connection) -> rusqlite::Result<()>,
+) -> Result<(), JournalError> {
     let mut options = OpenOptions::new();
     options.write(true).create_new(true);
     #[cfg(unix)]
@@ -185,6 +189,7 @@ fn make(path: &Path, begin: impl FnOnce(&Connection) -> rusqlite::Result<()>) ->
         connection.pragma_update(None, "synchronous", "FULL")?;
         let transaction = connection.transaction()?;
         transaction.execute_batch(TABLES)?;
+        transaction.execute_batch(&names.view())?;
         transaction.pragma_update(None, "application_id", APPLICATION)?;
         transaction.pragma_update(None, "user_version", FORMAT)?;
         begin(&transaction)?;

@@ -12,6 +12,7 @@ use thiserror::Error;
 
 use super::error::JournalError;
 use super::lock::RunLock;
+use super::names::Names;
 use super::options::JOURNAL_FILE;
 use super::parts::{self, PartStatus};
 use super::schema::node_id;
@@ -44,7 +45,7 @@ pub enum RunState {
     Finished,
 }
 
-/// The status of a run.
+/// The status of a run. Its JSON has the [`Names`] of a program: see [`Status::to_json`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Status {
     /// Always `lookalike.status/1`.
@@ -79,13 +80,12 @@ pub struct Status {
     pub attempts: u64,
     /// How many attempts were lost with their workers.
     pub requeued: u64,
-    /// The best score so far. In JSON it keeps its original name, which programs read.
-    #[serde(rename = "best_cssim")]
+    /// The best score so far.
     pub best_score: Option<f64>,
     /// The nodes that failed, at most 100.
     pub failures: Vec<NodeError>,
     /// The parts of a run of many, in their order.
-    #[serde(default, rename = "fits", skip_serializing_if = "Vec::is_empty")]
+    #[serde(default, rename = "part_list", skip_serializing_if = "Vec::is_empty")]
     pub parts: Vec<PartStatus>,
 }
 
@@ -180,23 +180,40 @@ impl Status {
     ///
     /// # Errors
     /// When there is no run, or its files cannot be read.
-    pub fn of(folder: &Path) -> Result<Self, StatusError> {
+    pub fn of(folder: &Path, names: Names) -> Result<Self, StatusError> {
         let journal = folder.join(JOURNAL_FILE);
         let file = folder.join(STATUS_FILE);
         let is_running = RunLock::is_held(folder);
         let mut status = if !journal.exists() {
             return Err(StatusError::NoRun { folder: folder.display().to_string() });
         } else if place::is_shared(folder) && file.exists() {
-            read_file(&file)?
+            read_file(&file, names)?
         } else {
             match read_journal(&journal) {
                 // The journal is locked, or the folder cannot be written to.
-                Err(JournalError::Busy { .. } | JournalError::Open { .. }) if file.exists() => read_file(&file)?,
+                Err(JournalError::Busy { .. } | JournalError::Open { .. }) if file.exists() => read_file(&file, names)?,
                 read => read?,
             }
         };
         status.settle(is_running);
         Ok(status)
+    }
+
+    /// The status as JSON with these names.
+    ///
+    /// # Errors
+    /// Those of the encoder.
+    pub fn to_json(&self, names: Names) -> serde_json::Result<String> {
+        let status = names.give(serde_json::to_value(self)?);
+        Ok(serde_json::to_string_pretty(&status)? + "\n")
+    }
+
+    /// Parse the JSON of a status with these names.
+    ///
+    /// # Errors
+    /// When it is not the JSON of a status.
+    pub fn from_json(text: &[u8], names: Names) -> serde_json::Result<Self> {
+        serde_json::from_value(names.restore(serde_json::from_slice(text)?))
     }
 
     /// Correct the state: the writer of a status cannot know whether it is still running when the status is read.
@@ -227,10 +244,10 @@ impl Status {
     }
 }
 
-fn read_file(path: &Path) -> Result<Status, StatusError> {
+fn read_file(path: &Path, names: Names) -> Result<Status, StatusError> {
     let shown = || path.display().to_string();
     let text = fs::read(path).map_err(|source| StatusError::File { path: shown(), source })?;
-    serde_json::from_slice(&text).map_err(|source| StatusError::Content { path: shown(), source })
+    Status::from_json(&text, names).map_err(|source| StatusError::Content { path: shown(), source })
 }
 
 fn read_journal(path: &Path) -> Result<Status, JournalError> {
@@ -247,9 +264,8 @@ fn read_journal(path: &Path) -> Result<Status, JournalError> {
 }
 
 /// Write the status file of a journal, atomically.
-pub(super) fn write(connection: &Connection, journal: &Path) -> anyhow::Result<()> {
-    let mut text = serde_json::to_string_pretty(&read(connection)?)?;
-    text.push('\n');
+pub(super) fn write(connection: &Connection, journal: &Path, names: Names) -> anyhow::Result<()> {
+    let text = read(connection)?.to_json(names)?;
     Ok(atomic::write_unsynced(&journal.with_file_name(STATUS_FILE), text.as_bytes())?)
 }
 

@@ -201,7 +201,7 @@ fn journal_is_created_atomically() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join(JOURNAL_FILE);
     let full = |_: &Connection| Err(rusqlite::Error::InvalidQuery);
-    let error = schema::create(&path, full).unwrap_err().to_string();
+    let error = schema::create(&path, Names::default(), full).unwrap_err().to_string();
     assert!(error.contains("run.sqlite;"), "{error}");
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
     // Killed while it created the journal: the rest is not a run that could be resumed or that has to be kept.
@@ -256,7 +256,7 @@ fn finished_run_lists_its_files_and_keeps_no_outputs() {
     journal.close(None).unwrap();
     assert_eq!(finished(&path, &identity()).unwrap(), None);
     let outputs = Finished { outputs: vec![("fit.json".into(), "12ab".into())] };
-    finish(&path, &outputs).unwrap();
+    finish(&path, Names::default(), &outputs).unwrap();
     assert_eq!(finished(&path, &identity()).unwrap(), Some(outputs));
     assert!(matches!(finished(&path, &RunIdentity::default()), Err(JournalError::AnotherRun { .. })));
     assert!(fs::metadata(&path).unwrap().len() < 100_000);
@@ -272,7 +272,7 @@ fn finished_run_lists_its_files_and_keeps_no_outputs() {
 #[test]
 fn status_reports_counts_workers_and_whether_a_coordinator_runs() {
     let folder = tempfile::tempdir().unwrap();
-    assert!(Status::of(folder.path()).unwrap_err().to_string().contains("found no run.sqlite"));
+    assert!(Status::of(folder.path(), Names::default()).unwrap_err().to_string().contains("found no run.sqlite"));
     let lock = RunLock::take(folder.path()).unwrap();
     let mut journal = begun(&folder);
     let mut batch = completed(1);
@@ -281,22 +281,22 @@ fn status_reports_counts_workers_and_whether_a_coordinator_runs() {
     batch.nodes.insert(2, failed);
     batch.workers.push(WorkerRow { worker: 1, process: 99, threads: 4, at: Duration::ZERO });
     write(&mut journal, [batch]);
-    let running = Status::of(folder.path()).unwrap();
+    let running = Status::of(folder.path(), Names::default()).unwrap();
     assert_eq!((running.state, running.epoch, running.error), (RunState::Running, 1, None));
     assert_eq!((running.nodes.total, running.nodes.completed, running.nodes.failed), (2, 1, 1));
     assert_eq!((running.kinds[0].kind.as_str(), running.workers[0].process), ("search", 99));
     assert_eq!(running.failures[0].error, "black");
     drop(lock);
-    let killed = Status::of(folder.path()).unwrap();
+    let killed = Status::of(folder.path(), Names::default()).unwrap();
     assert!(killed.state == RunState::Stopped && killed.error.unwrap().contains("without a word"));
     journal.close(Some("the disk is full".into())).unwrap();
-    let stopped = Status::of(folder.path()).unwrap();
+    let stopped = Status::of(folder.path(), Names::default()).unwrap();
     assert_eq!((stopped.state, stopped.error.as_deref()), (RunState::Stopped, Some("the disk is full")));
     // If the journal cannot be read, the status file is.
     let file: Status = serde_json::from_slice(&fs::read(folder.path().join("status.json")).unwrap()).unwrap();
     assert_eq!((file.run, file.nodes), (stopped.run, stopped.nodes));
-    finish(&folder.path().join(JOURNAL_FILE), &Finished { outputs: Vec::new() }).unwrap();
-    assert_eq!(Status::of(folder.path()).unwrap().state, RunState::Finished);
+    finish(&folder.path().join(JOURNAL_FILE), Names::default(), &Finished { outputs: Vec::new() }).unwrap();
+    assert_eq!(Status::of(folder.path(), Names::default()).unwrap().state, RunState::Finished);
 }
 
 #[test]
@@ -309,7 +309,7 @@ fn status_of_a_resumed_run_lists_no_failures_of_earlier_epochs() {
         batch
     };
     let errors = || -> Vec<String> {
-        Status::of(folder.path()).unwrap().failures.into_iter().map(|failure| failure.error).collect()
+        Status::of(folder.path(), Names::default()).unwrap().failures.into_iter().map(|failure| failure.error).collect()
     };
     let mut first = begun(&folder);
     write(&mut first, [failed("black")]);
@@ -336,10 +336,10 @@ fn status_is_read_from_its_file_while_the_journal_is_locked() {
     let alone = schema::connect(&path, true).unwrap();
     alone.execute("UPDATE epochs SET ended_ms = NULL", []).unwrap();
     assert!(!folder.path().join("run.sqlite-shm").exists(), "there is no memory to share");
-    let status = Status::of(folder.path()).unwrap();
+    let status = Status::of(folder.path(), Names::default()).unwrap();
     assert_eq!((status.state, status.nodes.completed), (RunState::Running, 1));
     fs::remove_file(folder.path().join("status.json")).unwrap();
-    let error = Status::of(folder.path()).unwrap_err().to_string();
+    let error = Status::of(folder.path(), Names::default()).unwrap_err().to_string();
     assert!(error.contains("another process is using the journal"), "{error}");
 }
 
@@ -364,7 +364,7 @@ fn status_of_a_journal_with_impossible_times_does_not_panic() {
     for time in [i64::MAX, i64::MIN, 253_402_300_800_000] {
         let journal = Connection::open(&options.path).unwrap();
         journal.execute("UPDATE epochs SET seen_ms = ?1", [time]).unwrap();
-        let status = Status::of(folder.path()).unwrap();
+        let status = Status::of(folder.path(), Names::default()).unwrap();
         assert!(["1970-01-01T00:00:00.000Z", "9999-12-31T23:59:59.999Z"].contains(&status.updated_at.as_str()));
     }
 }

@@ -199,7 +199,7 @@ impl Writer {
         if let Err(error) = seen {
             warn!(%error, "cannot write the time to the journal");
         }
-        if let Err(error) = status::write(&self.connection, &self.options.path) {
+        if let Err(error) = status::write(&self.connection, &self.options.path, self.options.names) {
             warn!(%error, "cannot write the status of the run");
         }
         self.is_news = false;

@@ -1,6 +1,6 @@
 //! The values of the metrics, updated by the events of a run.
 
-use super::histogram::Histogram;
+use super::{PartsMetric, histogram::Histogram};
 use crate::events::{RunEvent, Site};
 use lookalike::graph::{NodeId, WorkerId};
 use std::{collections::BTreeMap, time::Instant};
@@ -70,7 +70,8 @@ pub(super) struct Book {
     pub(super) blobs_sent: u64,
     pub(super) blob_bytes_sent: u64,
     pub(super) output_bytes_received: u64,
-    pub(super) fits: Vec<(&'static str, usize)>,
+    /// The parts by state, if the run has parts.
+    pub(super) parts: Option<(PartsMetric, Vec<(&'static str, usize)>)>,
 }
 
 impl Book {
@@ -92,7 +93,7 @@ impl Book {
             blobs_sent: 0,
             blob_bytes_sent: 0,
             output_bytes_received: 0,
-            fits: Vec::new(),
+            parts: None,
         }
     }
 
@@ -107,10 +108,6 @@ impl Book {
     /// The number of nodes that workers hold.
     pub(super) fn leases(&self) -> usize {
         self.open.values().filter(|open| open.state == State::Leased || open.state == State::Running).count()
-    }
-
-    pub(super) fn set_fits(&mut self, fits: &[(&'static str, usize)]) {
-        self.fits = fits.to_vec();
     }
 
     /// Process an event.

@@ -1,6 +1,6 @@
 //! `--metrics`: the counters of a run for Prometheus, over HTTP in its text format.
 //!
-//! The metrics are derived from the run's events and the states of the fits, so no other module depends on metrics, and no result
+//! The metrics are derived from the run's events and the states of its parts, so no other module depends on metrics, and no result
 //! does. docs/batch.md lists their names, which are a contract.
 
 mod book;
@@ -26,7 +26,17 @@ pub struct Metrics {
     pulse: Arc<Pulse>,
 }
 
-/// A loop that has not completed a round for this long counts as hanging. The longest single step reads one photo and its light.
+/// The metric of the parts of a run by state, under the name by which users know the parts.
+#[derive(Debug, Clone, Copy)]
+pub struct PartsMetric {
+    /// Its name.
+    pub name: &'static str,
+    /// Its line of help.
+    pub help: &'static str,
+}
+
+/// A loop that has not completed a round for this long counts as hanging. The longest single step is that of a
+/// planner that reads the inputs of one part.
 const LONGEST_ROUND: Duration = Duration::from_secs(30);
 
 impl Metrics {
@@ -60,9 +70,9 @@ impl Metrics {
         Arc::clone(&self.pulse)
     }
 
-    /// Set the number of fits in each state.
-    pub fn set_fits(&self, fits: &[(&'static str, usize)]) {
-        self.with_book(|book| book.set_fits(fits));
+    /// Set the number of parts in each state.
+    pub fn set_parts(&self, metric: PartsMetric, states: &[(&'static str, usize)]) {
+        self.with_book(|book| book.parts = Some((metric, states.to_vec())));
     }
 
     /// Answer requests while the future is polled. Must be called inside a tokio runtime.

@@ -1,6 +1,7 @@
 //! The page after some events, and the server's answers.
 
 use super::{
+    PartsMetric,
     book::Book,
     health,
     http::{Pages, response},
@@ -48,7 +49,8 @@ fn run() -> String {
     book.note(&RunEvent::NodeFailed { name: name(3, "search"), reason: cancelled }, at(4.0));
     book.note(&RunEvent::NodeRequeued { name: name(1, "search"), worker, crashes: 0 }, at(5.0));
     book.note(&RunEvent::WorkerLeft { worker, departure: Departure::Lost }, at(5.0));
-    book.set_fits(&[("running", 2), ("failed", 1)]);
+    let metric = PartsMetric { name: "lookalike_parts", help: "Parts by state." };
+    book.parts = Some((metric, vec![("running", 2), ("failed", 1)]));
     page(&book, at(9.0))
 }
 
@@ -68,7 +70,7 @@ fn node_counts_follow_the_events() {
         ("lookalike_nodes_requeued_total", 1.0),
         ("lookalike_blob_bytes_sent_total", 1000.0),
         ("lookalike_output_bytes_received_total", 50.0),
-        ("lookalike_fits{state=\"running\"}", 2.0),
+        ("lookalike_parts{state=\"running\"}", 2.0),
         ("lookalike_node_queue_seconds_sum", 2.0),
         ("lookalike_node_queue_seconds_bucket{le=\"1\"}", 0.0),
         ("lookalike_node_queue_seconds_bucket{le=\"2.5\"}", 1.0),

@@ -4,6 +4,7 @@
 //! escaped. A histogram has cumulative buckets, a sum and a count.
 
 use super::{
+    PartsMetric,
     book::{Book, State},
     histogram::{BOUNDS, Histogram},
 };
@@ -20,10 +21,10 @@ pub(super) fn page(book: &Book, now: Instant) -> String {
     page.single("lookalike_run_seconds", "gauge", "Time since the run began.", (now - book.began).as_secs_f64());
     nodes(&mut page, book);
     workers(&mut page, book);
-    if !book.fits.is_empty() {
-        page.family("lookalike_fits", "gauge", "Fits of the batch by state.");
-        for (state, count) in &book.fits {
-            page.sample("lookalike_fits", &[("state", state)], *count as f64);
+    if let Some((PartsMetric { name, help }, states)) = &book.parts {
+        page.family(name, "gauge", help);
+        for (state, count) in states {
+            page.sample(name, &[("state", state)], *count as f64);
         }
     }
     page.text
