@@ -8,24 +8,23 @@ use lookalike::protocol::MAX_FRAME_BYTES;
 /// on it belongs to a worker.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Limits {
-    /// How many unauthenticated connections there may be at a time, 1 or more (default 256). Each costs at most about 150 kB: the
+    /// How many unauthenticated connections there may be at a time, 1 or more. Each costs at most about 150 kB: the
     /// 64 KiB that a TLS handshake message may have, and the buffers of its socket. If there is one more, the oldest is closed. A
     /// worker authenticates within milliseconds, so idle connections do not keep workers out.
     pub unauthenticated: usize,
-    /// How long a connection may take until its hello, the TLS handshake included (default 10 s).
+    /// How long a connection may take until its hello, the TLS handshake included.
     pub handshake_time: Duration,
-    /// How many connections there may be at a time, authenticated or not (default 4096); further ones are closed at once.
+    /// How many connections there may be at a time, authenticated or not; further ones are closed at once.
     pub connections: usize,
-    /// The longest frame a worker may send, in bytes, checked before anything is allocated (default, and at most,
-    /// [`MAX_FRAME_BYTES`]: 2 MiB).
+    /// The longest frame a worker may send, in bytes, checked before anything is allocated; at most
+    /// [`MAX_FRAME_BYTES`].
     pub frame_bytes: usize,
-    /// How many blobs a worker may have requested but not yet received (default 65536: sixteen leases of the 4096 inputs that a node
-    /// may have; those of a fit have dozens). The queue holds references; a blob's bytes are in memory once.
+    /// How many blobs a worker may have requested but not yet received. The queue holds references; a blob's bytes are in memory once.
     pub pending_blobs: usize,
-    /// How many bytes of messages may be queued for a worker (default 64 MiB); with more it is disconnected as too slow. The number of
+    /// How many bytes of messages may be queued for a worker; with more it is disconnected as too slow. The number of
     /// its leases is limited such that a worker that reads stays far below.
     pub queued_bytes: usize,
-    /// How long a worker may take to close its end after the coordinator's last message (default 2 s).
+    /// How long a worker may take to close its end after the coordinator's last message.
     pub farewell_time: Duration,
 }
 
@@ -36,6 +35,7 @@ impl Default for Limits {
             handshake_time: Duration::from_secs(10),
             connections: 4096,
             frame_bytes: MAX_FRAME_BYTES,
+            // Sixteen leases of nodes with the most inputs.
             pending_blobs: 1 << 16,
             queued_bytes: 64 << 20,
             farewell_time: Duration::from_secs(2),

@@ -1,4 +1,4 @@
-//! The policy of a run: time limits for workers, and limits on the deaths of nodes (design section 8).
+//! The policy of a run (design section 8): time limits for workers, and how many deaths of workers make a node fail.
 
 use std::time::Duration;
 
@@ -7,37 +7,36 @@ use thiserror::Error;
 /// How the coordinator treats workers and nodes. What a user may want to change has a flag of the same name.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Policy {
-    /// How often a worker shall tell that it lives (default 1 s). It does so from a thread of its own, so a node that keeps
-    /// every core busy does not delay it.
+    /// The interval of a worker's heartbeats. They come from a thread of their own, so a node that uses every core does not delay
+    /// them.
     pub heartbeat: Duration,
-    /// Declare a worker lost after it has sent nothing for this long, or has read nothing for this long though something waits for it
-    /// (default 5 s, at least two heartbeats).
+    /// Declare a worker lost after it has sent nothing for this long, or has read nothing for this long although messages for it are
+    /// queued. At least two heartbeats.
     pub lost_after: Duration,
-    /// How many leases a worker holds beyond its threads, so that it never waits for the next one (default 2); more of nodes that
-    /// take less than a millisecond.
+    /// How many leases a worker holds beyond its threads, so that it never waits for the next one. It holds more if its nodes take
+    /// less than a millisecond.
     pub spare_leases: usize,
-    /// After so many deaths of workers that were executing a node, the node is a suspect and runs alone on a fresh worker
-    /// (default 2).
+    /// A node becomes a suspect, which runs alone on a fresh worker, after this many workers have died while they executed it.
     pub suspect_after: u32,
-    /// A suspect fails once so many workers have died while they executed it alone (default 3).
+    /// A suspect fails after this many workers have died while they executed it alone.
     pub node_crashes: u32,
-    /// How long a suspect waits for a worker that has executed nothing yet, before it takes any that is idle, and makes one
-    /// idle if none is (default 2 s: a local worker is started again in less).
+    /// How long a suspect waits for a worker that has executed nothing yet. Then it takes any worker that holds no lease, and if there
+    /// is none, one is freed for it.
     pub suspect_patience: Duration,
-    /// When slow nodes are run on a second worker as well.
+    /// When a slow node also runs on a second worker.
     pub speculation: Speculation,
-    /// Which share of the nodes whose outputs the planner cannot check is run twice, to compare the outputs (default 0).
+    /// The share of the nodes with outputs that the planner cannot check that run twice, to compare the outputs.
     pub verify_fraction: f64,
-    /// Makes the choice of these nodes another one (default 0).
+    /// Changes which nodes are chosen for verification.
     pub verify_seed: u64,
-    /// How long a worker that is asked to end may take to finish what it executes (default 30 s, as Slurm waits between
-    /// SIGTERM and SIGKILL). A worker's own `--drain-time` wins.
+    /// How long a worker that is asked to end may take to finish the nodes that it executes. A worker's own `--drain-time` takes
+    /// precedence.
     pub drain_time: Duration,
-    /// How long to wait for the first worker (default 10 min).
+    /// How long to wait for the first worker.
     pub wait_for_workers: Duration,
-    /// How often to tell the user about it (default 30 s).
+    /// The interval at which the user is told that the run waits for workers.
     pub remind_every: Duration,
-    /// How long to wait for another worker after the last one was lost (default 1 min).
+    /// How long to wait for another worker after the last one was lost.
     pub grace: Duration,
 }
 
@@ -50,10 +49,12 @@ impl Default for Policy {
             spare_leases: 2,
             suspect_after: 2,
             node_crashes: 3,
+            // A local worker is restarted in less.
             suspect_patience: Duration::from_secs(2),
             speculation: Speculation::default(),
             verify_fraction: 0.0,
             verify_seed: 0,
+            // The time that Slurm leaves between SIGTERM and SIGKILL.
             drain_time: Duration::from_secs(30),
             wait_for_workers: Duration::from_mins(10),
             remind_every: Duration::from_secs(30),
@@ -62,15 +63,15 @@ impl Default for Policy {
     }
 }
 
-/// When a node is slow: a second worker runs it too if it has nothing else to do, and the first answer counts.
+/// When a node counts as slow. An idle worker then runs it too, and the first result is used.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Speculation {
-    /// A node is slow once it runs this many times as long as the median of its kind (default 2, at least 1); `None`: no node
-    /// ever is. Before a node of the kind is complete, it is so many times the longest time of any node, and at least twelve times
+    /// A node is slow after this many times the median time of its kind. At least 1; `None`: no node is slow. Until a node of its
+    /// kind has finished, the limit is this many times the longest time of any node, and at least twelve times
     /// [`after`](Self::after).
     pub factor: Option<f64>,
-    /// A node is not slow before it has run for this long (default 5 s). A worker that does not begin with the next node for
-    /// this long, though it has a thread for it, is slow with it too.
+    /// No node is slow before it has run for this long. A node that its worker has not begun for this long, although a thread is free,
+    /// is slow too.
     pub after: Duration,
 }
 
@@ -80,19 +81,19 @@ impl Default for Speculation {
     }
 }
 
-/// A policy that makes no sense.
+/// An invalid value of a policy.
 #[derive(Clone, Copy, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum PolicyError {
-    /// No heartbeat, or a very rare one.
+    /// The interval of heartbeats is too short or too long.
     #[error("--heartbeat: expected 10ms to 1h, found {}", humantime::format_duration(*.found))]
     Heartbeat {
         /// The given time.
         found: Duration,
     },
-    /// A worker would be lost because of one late heartbeat.
+    /// One late heartbeat would make a worker lost.
     #[error(
-        "--lost-after: expected at least two heartbeats, {}, found {}; wait longer, or let workers tell more often with --heartbeat",
+        "--lost-after: expected at least two heartbeats, {}, found {}; wait longer, or shorten --heartbeat",
         humantime::format_duration(*.expected), humantime::format_duration(*.found)
     )]
     LostAfter {
@@ -109,25 +110,25 @@ pub enum PolicyError {
         /// The given time.
         found: Duration,
     },
-    /// A count that has to be at least 1.
+    /// A count that must be at least 1.
     #[error("{flag}: expected 1 or more, found 0")]
     Zero {
         /// The flag.
         flag: &'static str,
     },
-    /// Too many, most likely a typing error.
+    /// Too many spare leases, most likely a typing error.
     #[error("--spare-leases: expected at most {MOST_SPARE_LEASES}, found {found}")]
     SpareLeases {
         /// The given number.
         found: usize,
     },
-    /// A factor that would run every node twice, or none at all.
+    /// A factor below 1, with which most nodes would be slow, or one that is not a number or too large.
     #[error("--speculate: expected on, off, or a factor of at least 1, found {found}")]
     Factor {
         /// The given factor.
         found: f64,
     },
-    /// Not a share.
+    /// A share outside 0 to 1.
     #[error("--verify-fraction: expected a number from 0 to 1, found {found}")]
     Fraction {
         /// The given number.
@@ -143,16 +144,16 @@ const MOST_SPARE_LEASES: usize = 1000;
 const SILENCES: u32 = 3;
 
 impl Policy {
-    /// How long a worker waits for any word of its coordinator.
+    /// How long a worker waits for a byte from its coordinator.
     #[must_use]
     pub fn silence(&self) -> Duration {
         SILENCES * self.lost_after
     }
 
-    /// That the policy makes sense.
+    /// Check the policy.
     ///
     /// # Errors
-    /// What does not.
+    /// The first invalid value.
     pub fn check(&self) -> Result<(), PolicyError> {
         let beats = Duration::from_millis(10)..=Duration::from_hours(1);
         if !beats.contains(&self.heartbeat) {
@@ -188,10 +189,10 @@ impl Policy {
     }
 }
 
-/// The longest time that a policy may name.
+/// The longest time in a policy.
 const LONGEST: Duration = Duration::from_hours(24 * 366);
 
-/// Beyond this, no node is ever slow.
+/// The largest factor. With it, no node is slow in practice.
 const MOST_FACTOR: f64 = 1e6;
 
 #[cfg(test)]

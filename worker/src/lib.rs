@@ -29,7 +29,7 @@ use lookalike::graph::Registry;
 use tracing_subscriber::EnvFilter;
 
 pub use error::WorkerError;
-pub use options::{Arguments, WorkerOptions};
+pub use options::{Arguments, Time, WorkerOptions};
 
 use crate::ending::{Wishes, watch_for_the_end};
 use crate::world::{Real, World};

@@ -35,8 +35,6 @@ const FIRST_PAUSE: Duration = Duration::from_millis(100);
 const LONGEST_PAUSE: Duration = Duration::from_secs(5);
 /// A connection that lasted this long counts as stable; a shorter one makes the next pause longer.
 const STEADY_TIME: Duration = Duration::from_secs(10);
-/// How long to finish running nodes, until the coordinator sets this time.
-const DRAIN_TIME: Duration = Duration::from_secs(30);
 /// Upper limit of the drain time, in effect unlimited.
 const LONGEST_DRAIN: Duration = Duration::from_hours(24 * 365);
 
@@ -65,7 +63,7 @@ pub(crate) async fn run<W: World>(
         threads: threads.get(),
         wishes,
         own_drain_time: options.drain_time,
-        drain_time: options.drain_time.unwrap_or(DRAIN_TIME),
+        drain_time: options.drain_time.unwrap_or_default(),
         leave_by: None,
         executor,
         completed,
@@ -105,6 +103,7 @@ struct Session<W: World> {
     wishes: Wishes,
     /// The drain time from the options, which takes precedence over the coordinator's.
     own_drain_time: Option<Duration>,
+    /// How long to finish running nodes. Zero before the first welcome, when there are none.
     drain_time: Duration,
     /// While draining, the time at which it ends at the latest.
     leave_by: Option<Instant>,

@@ -4,7 +4,8 @@
 use anyhow::bail;
 use clap::Args;
 use lookalike_coordinator::policy::{Policy, Speculation};
-use std::{fmt, str::FromStr, time::Duration};
+use lookalike_worker::Time;
+use std::{fmt, str::FromStr};
 
 #[derive(Debug, Args)]
 pub(crate) struct PolicyArgs {
@@ -37,8 +38,8 @@ pub(crate) struct PolicyArgs {
     #[arg(help_heading = "Policy", hide_short_help = true)]
     node_crashes: u32,
     /// Run a slow node on an idle worker too and take the first result: on, off, or a factor. A node is slow once it has run this factor
-    /// times the median time of its kind (on: 2)
-    #[arg(long, value_name = "on|off|FACTOR", default_value = "on")]
+    /// times the median time of its kind; on is the default factor
+    #[arg(long, value_name = "on|off|FACTOR", default_value_t = Speculate(Speculation::default().factor))]
     #[arg(help_heading = "Policy", hide_short_help = true)]
     speculate: Speculate,
     /// Shortest running time of a node that counts as slow
@@ -56,31 +57,18 @@ pub(crate) struct PolicyArgs {
     drain_time: Time,
 }
 
-/// A duration, written as in the help text: `60s`, `10min`.
+/// The factor above the median time from which a node is slow; `None`: no node is slow.
 #[derive(Clone, Copy, Debug)]
-struct Time(Duration);
+struct Speculate(Option<f64>);
 
-impl fmt::Display for Time {
+impl fmt::Display for Speculate {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self.0.as_secs() {
-            _ if self.0.subsec_nanos() > 0 => humantime::format_duration(self.0).fmt(formatter),
-            seconds if seconds >= 120 && seconds % 60 == 0 => write!(formatter, "{}min", seconds / 60),
-            seconds => write!(formatter, "{seconds}s"),
+        match self.0 {
+            Some(factor) => factor.fmt(formatter),
+            None => formatter.write_str("off"),
         }
     }
 }
-
-impl FromStr for Time {
-    type Err = humantime::DurationError;
-
-    fn from_str(text: &str) -> Result<Self, Self::Err> {
-        humantime::parse_duration(text).map(Self)
-    }
-}
-
-/// A node is slow once it has run this many times the median time of its kind. `None`: no node is slow.
-#[derive(Clone, Copy, Debug)]
-struct Speculate(Option<f64>);
 
 impl FromStr for Speculate {
     type Err = anyhow::Error;
