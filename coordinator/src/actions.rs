@@ -1,11 +1,12 @@
-//! What the reactor asks for: an [`Outbox`] of [`Action`]s. The runner performs them with its sockets and processes; a test reads them.
+//! What the reactor asks for: an [`Outbox`] of [`Action`]s. The runner performs them with its sockets and processes; tests only read
+//! them.
 
 use lookalike::graph::{Blob, NodeId, WorkerId};
 use lookalike::protocol::ProcessName;
 
 use crate::events::RunEvent;
 
-/// The right, and duty, of a worker to execute a node. It ends with an answer, with a cancellation, or when the worker is lost.
+/// The assignment of a node to a worker. It ends with an answer, with a cancellation, or when the worker is lost.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Lease {
     /// The node.
@@ -19,25 +20,25 @@ pub struct Lease {
 /// A worker's process, as its hello describes it. It has one number per connection, and one name for all of them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct WorkerProcess {
-    /// Its process id on its own machine, for people: in containers every worker may have the same.
+    /// Its process id on its own machine, for display only: in containers every worker may have the same.
     pub id: u32,
-    /// Its name, which no other process has.
+    /// Its name, which is random, so that no other process has it.
     pub name: ProcessName,
     /// Whether a coordinator has started it, on its own machine.
     pub is_local: bool,
 }
 
-/// One thing to do.
+/// An action that the reactor asks for.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Action {
     /// Send the node of this lease to the worker.
     Assign {
         /// The worker.
         worker: WorkerId,
-        /// What it gets.
+        /// The lease.
         lease: Lease,
     },
-    /// Tell the worker that the output of this lease is not wanted any more.
+    /// Tell the worker that the output of this lease is not needed any more.
     Cancel {
         /// The worker.
         worker: WorkerId,
@@ -65,7 +66,7 @@ pub enum Action {
         /// The attempt it answered for.
         attempt: u32,
     },
-    /// Close the connection of this worker at once; it is no member any more.
+    /// Close the connection of this worker at once. The worker has left.
     Drop {
         /// The worker.
         worker: WorkerId,
@@ -77,7 +78,7 @@ pub enum Action {
         /// Its output.
         output: Blob,
     },
-    /// Stop a node that runs in the coordinator's own process: its output is not wanted any more.
+    /// Stop a node that runs in the coordinator's own process, because its output is not needed any more.
     CancelHere {
         /// The node.
         node: NodeId,
@@ -89,28 +90,28 @@ pub enum Action {
         /// The attempt to answer for.
         attempt: u32,
     },
-    /// Tell the user.
+    /// Report an event to the user.
     Tell(RunEvent),
 }
 
-/// The actions that wait to be performed, in order.
+/// The actions to perform, in order.
 #[derive(Debug, Default)]
 pub struct Outbox {
     actions: Vec<Action>,
 }
 
 impl Outbox {
-    /// Add something to do.
+    /// Add an action.
     pub fn push(&mut self, action: Action) {
         self.actions.push(action);
     }
 
-    /// Add something to tell the user.
+    /// Add an event to report to the user.
     pub fn tell(&mut self, event: RunEvent) {
         self.push(Action::Tell(event));
     }
 
-    /// Take all there is to do, in order.
+    /// Take all actions, in order.
     pub fn take(&mut self) -> Vec<Action> {
         std::mem::take(&mut self.actions)
     }

@@ -1,4 +1,4 @@
-//! Atomic writes: a file appears complete or not at all, because it is written beside its place and then renamed. A reader sees the old file or the new one.
+//! Atomic writes: a file is written as a draft beside its place and then renamed. A reader sees the old file or the complete new one.
 //!
 //! The draft is a new file: a symbolic link in its place is removed, never followed.
 
@@ -14,7 +14,7 @@ pub fn write(path: &Path, content: &[u8]) -> io::Result<()> {
     write_as(path, content, Draft { mode: 0o666, is_synced: true })
 }
 
-/// Write a file with mode 0600. A process that has an older file of this name open sees nothing of the new one.
+/// Write a file with mode 0600. A process that has an older file of this name open cannot read the new one through it.
 ///
 /// # Errors
 /// When the draft or the file cannot be written.
@@ -22,7 +22,7 @@ pub fn write_private(path: &Path, content: &[u8]) -> io::Result<()> {
     write_as(path, content, Draft { mode: 0o600, is_synced: true })
 }
 
-/// Write a file that is written again soon: after a power loss, an older one may be there.
+/// Write a file that is soon written again, without waiting for the disk. A power loss may restore an older version.
 ///
 /// # Errors
 /// When the draft or the file cannot be written.
@@ -30,13 +30,13 @@ pub fn write_unsynced(path: &Path, content: &[u8]) -> io::Result<()> {
     write_as(path, content, Draft { mode: 0o666, is_synced: false })
 }
 
-/// Put a complete draft in its place.
+/// Rename a complete draft to its final name.
 ///
 /// # Errors
 /// When it cannot be renamed.
 pub fn rename(draft: &Path, path: &Path) -> io::Result<()> {
     fs::rename(draft, path)?;
-    // A file system that cannot synchronise a folder has its own way to keep names.
+    // Some file systems cannot synchronise a folder. That is no reason to fail.
     let _ = path.parent().map(File::open).transpose().and_then(|folder| folder.map_or(Ok(()), |it| it.sync_all()));
     Ok(())
 }
@@ -61,7 +61,7 @@ fn write_as(path: &Path, content: &[u8], how: Draft) -> io::Result<()> {
         return Err(io::Error::new(io::ErrorKind::InvalidInput, "expected a file name"));
     }
     let draft = draft_of(path);
-    // Of a process that was killed.
+    // A killed process may have left a draft.
     match fs::remove_file(&draft) {
         Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(error),
         _ => {}

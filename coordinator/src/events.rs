@@ -1,30 +1,30 @@
-//! What a run tells people while it goes on: [`RunEvent`]s, and the names in them.
+//! Events of a run for display: [`RunEvent`] and the names in them.
 
 use std::fmt;
 use std::time::Duration;
 
 use lookalike::graph::{FailureReason, NodeId, WorkerId};
 
-/// Why a worker is no member any more.
+/// Why a worker has left.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Departure {
-    /// Its connection ended without a word: the process died, or the network broke.
+    /// Its connection ended without a goodbye: the process died, or the network broke.
     Lost,
     /// It was silent for too long.
     Silent,
     /// It did not read what was sent to it.
     TooSlow,
-    /// Its process is back on another connection, before this one was noticed to be broken.
+    /// Its process reconnected before this connection was found to be broken.
     Replaced,
-    /// It said goodbye: somebody asked it to end.
+    /// It was asked to end, and said goodbye.
     Goodbye,
     /// It broke the protocol.
     Violation(String),
 }
 
 impl Departure {
-    /// Whether the nodes that the worker executed may have caused it. The exit status of a local process would not tell more: a node that
-    /// takes all memory and a `kill -9` from outside leave the same status.
+    /// Whether the nodes that the worker executed may have caused it. The exit status of a local process does not help: a
+    /// node that exhausts the memory and a `kill -9` from outside leave the same status.
     #[must_use]
     pub fn is_suspicious(&self) -> bool {
         match self {
@@ -97,13 +97,13 @@ impl fmt::Display for NodeName {
     }
 }
 
-/// What the user may want to know while a run goes on.
+/// An event of a run that a display may show.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum RunEvent {
     /// The coordinator listens.
     Listening {
-        /// What the access file tells the workers.
+        /// The address in the access file.
         address: String,
         /// How many local workers the coordinator starts.
         local_workers: usize,
@@ -129,14 +129,14 @@ pub enum RunEvent {
         /// Its process id on its own machine.
         process: u32,
     },
-    /// A worker is no member any more.
+    /// A worker has left.
     WorkerLeft {
         /// Its number.
         worker: WorkerId,
         /// Why.
         departure: Departure,
     },
-    /// A worker was asked to end: it finishes what it executes and gets nothing more.
+    /// A worker was asked to end: it finishes the nodes that it executes and gets no others.
     WorkerDraining {
         /// Its number.
         worker: WorkerId,
@@ -147,14 +147,14 @@ pub enum RunEvent {
         process: u32,
         /// How it ended.
         status: String,
-        /// After how long it is started again; `None`: not any more.
+        /// The pause before it is restarted; `None` if it is not restarted.
         restart_after: Option<Duration>,
     },
     /// There is work but no worker.
     WaitingForWorkers {
-        /// How long it has been so.
+        /// How long there has been no worker.
         waited: Duration,
-        /// How long it may be so.
+        /// The limit.
         limit: Duration,
     },
     /// The planner has added a node.
@@ -162,7 +162,7 @@ pub enum RunEvent {
         /// The node.
         name: NodeName,
     },
-    /// The inputs of a node are there. Only reported for runs with a journal.
+    /// All inputs of a node are available. Only reported for runs with a journal.
     NodeReady {
         /// The node.
         node: NodeId,
@@ -174,7 +174,7 @@ pub enum RunEvent {
         /// The worker.
         worker: WorkerId,
     },
-    /// A node has the output that it got from an earlier coordinator of this run.
+    /// A node was completed with the output that an earlier coordinator of this run recorded.
     NodeRecalled {
         /// The node.
         name: NodeName,
@@ -190,14 +190,14 @@ pub enum RunEvent {
     NodeStarted {
         /// The node.
         name: NodeName,
-        /// Where.
+        /// Where it runs.
         site: Site,
     },
-    /// How much of a running node is done, as far as it says; a few times a second at most.
+    /// The progress that a running node reports, at most a few times a second.
     NodeProgress {
         /// The node.
         node: NodeId,
-        /// In thousandths.
+        /// The completed share, in thousandths.
         permille: u16,
     },
     /// A node has its output.
@@ -211,7 +211,7 @@ pub enum RunEvent {
         /// The time from its start to the arrival of the output.
         elapsed: Duration,
     },
-    /// A second output of a node has come, bit for bit the first one.
+    /// A second output of a node has arrived, and is equal to the first one bit for bit.
     DuplicateResult {
         /// The node.
         node: NodeId,
@@ -234,21 +234,20 @@ pub enum RunEvent {
         /// How many workers have died while they executed it.
         crashes: u32,
     },
-    /// A worker has died while it executed this node; or its process is back, and the death is not counted any more.
+    /// A death was counted against this node, or was subtracted because the process reconnected.
     DeathsCounted {
         /// The node.
         name: NodeName,
         /// How many workers have died while they executed it.
         deaths: u32,
     },
-    /// A node has an output from one site and an error from another: one of the two machines is not to be trusted. What came
-    /// first counts.
+    /// A node has an output from one site and an error from another, so one of the two is wrong. The first answer is used.
     AnswersDiffer {
         /// The node.
         name: NodeName,
-        /// Whose answer counts.
+        /// The site of the first answer.
         first: Site,
-        /// Whose answer came second.
+        /// The site of the second answer.
         second: Site,
         /// The error of one of them.
         error: String,
@@ -257,7 +256,7 @@ pub enum RunEvent {
     NodeSuspected {
         /// The node.
         name: NodeName,
-        /// How many workers.
+        /// How many workers have died while they executed it.
         deaths: u32,
     },
     /// A slow node runs on a second worker as well.
@@ -267,7 +266,7 @@ pub enum RunEvent {
         /// The second worker.
         worker: WorkerId,
     },
-    /// A blob goes to a worker.
+    /// A blob is sent to a worker.
     BlobSent {
         /// The worker.
         worker: WorkerId,

@@ -1,4 +1,4 @@
-//! TLS on a connection: the coordinator's side. See [`lookalike_worker::tls`] for the worker's, and for why it is as it is.
+//! TLS on a connection: the coordinator's side. [`lookalike_worker::tls`] has the worker's side, and the reasons for the choices.
 
 use std::io;
 use std::sync::Arc;
@@ -11,11 +11,11 @@ use tokio_rustls::{TlsAcceptor, server};
 
 use crate::access::Identity;
 
-/// How a coordinator of this identity speaks TLS: version 1.3 only, no certificates of workers, no session ever resumed, nothing
-/// before the handshake is over.
+/// The TLS configuration of a coordinator with this identity: TLS 1.3 only, no client certificates, no resumed sessions, no early
+/// data.
 ///
 /// # Errors
-/// When the identity's key is not that of its certificate.
+/// When the key does not belong to the certificate.
 pub fn server_config(identity: &Identity) -> Result<ServerConfig, rustls::Error> {
     let mut config = ServerConfig::builder_with_provider(provider())
         .with_protocol_versions(&[&rustls::version::TLS13])?
@@ -27,10 +27,10 @@ pub fn server_config(identity: &Identity) -> Result<ServerConfig, rustls::Error>
     Ok(config)
 }
 
-/// Speak TLS as the coordinator with whoever is at the other end of `stream`.
+/// Perform the TLS handshake as the coordinator.
 ///
 /// # Errors
-/// When the stream fails, or the other side does not speak TLS 1.3.
+/// When the stream fails, or the peer does not speak TLS 1.3.
 pub async fn accept<S>(acceptor: &TlsAcceptor, stream: S) -> io::Result<server::TlsStream<Transport<S>>>
 where
     S: AsyncRead + AsyncWrite + Unpin,

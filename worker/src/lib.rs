@@ -1,7 +1,7 @@
 //! The worker: connects to a coordinator over TCP and TLS, runs nodes of the job graph on its rayon pool, returns results.
 //!
 //! Threads: the main thread communicates with the coordinator and never computes; the pool computes and never communicates; one thread
-//! triggers heartbeats; with `--leash` one more watches stdin, whose end ends the process. A worker continues to compute while its
+//! triggers heartbeats; with `--leash`, one more watches stdin and ends the process when stdin ends. A worker continues to compute while its
 //! connection is broken, and sends unacknowledged results again.
 //!
 //! The [`Registry`] given to the worker determines which nodes it can run: this crate has no rendering.

@@ -382,7 +382,8 @@ fn start_writing(
     (outgoing, announced, tokio::spawn(write(writer, queue, written)))
 }
 
-/// Write the queue, and combine what is queued at the same time: the output of a node and the start of the next fit into one packet.
+/// Write the queue. Messages that are queued at the same time share a packet, such as the output of a node and the start of the next
+/// one.
 async fn write(
     mut writer: impl AsyncWrite + Unpin,
     mut queue: UnboundedReceiver<Outgoing>,

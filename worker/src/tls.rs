@@ -58,7 +58,7 @@ pub enum TlsError {
     EarlyCertificate,
     /// The peer presents the coordinator's certificate but does not have its key.
     #[error(
-        "the other side shows the coordinator's certificate without having its key: it is an impostor; check which host answers at the address"
+        "the other side presents the coordinator's certificate but does not have its key, so it is an impostor; check which host answers at the address"
     )]
     Impostor,
     /// The peer does not speak TLS 1.3, or has no common cipher suite.

@@ -1,4 +1,4 @@
-//! The protocol on a tokio stream, for worker and coordinator: the only place that reads and writes protocol bytes on streams.
+//! The protocol on a tokio stream, for worker and coordinator. Only this file reads and writes protocol bytes on streams.
 
 use std::io;
 

@@ -46,7 +46,7 @@ impl Identity {
     /// Parse a certificate and a key in PEM.
     ///
     /// # Errors
-    /// What is missing. The message repeats nothing of the text.
+    /// What is missing. The message contains nothing of the text.
     pub fn from_pem(pem: &str) -> Result<Self, &'static str> {
         let certificate =
             CertificateDer::from_pem_slice(pem.as_bytes()).map_err(|_| "expected a CERTIFICATE in PEM, found none")?;

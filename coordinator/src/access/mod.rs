@@ -2,7 +2,7 @@
 //!
 //! ```text
 //!   access.json      address, hash of the certificate, secret: what a worker needs to join
-//!   access.key.pem   certificate and private key: what makes a process the coordinator of the access file
+//!   access.key.pem   certificate and private key: what a coordinator needs to admit these workers
 //! ```
 //! There are two files because the first one is copied to every worker: with the key in it, any of those machines could
 //! impersonate the coordinator. They lie side by side, so that a coordinator finds both when it uses an access file made
@@ -92,7 +92,7 @@ pub enum CredentialsError {
     },
     /// The key file belongs to another access file.
     #[error(
-        "the access file {} names another certificate than {} holds; take both from one `lookalike access new`",
+        "the access file {} names a certificate other than the one in {}; use two files from the same `lookalike access new`",
         access.display(), key.display()
     )]
     Mismatch {

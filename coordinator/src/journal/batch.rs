@@ -176,7 +176,7 @@ impl Batch {
         self.listen = Some(address);
     }
 
-    /// Whether the actions of the group must wait for this transaction. It need not if it only holds rows for people.
+    /// Whether the actions of the group must wait for this transaction. They need not if all its rows are only shown to users.
     pub(crate) fn is_urgent(&self) -> bool {
         let Self { nodes, workers, left, results, forgotten, released, listen, .. } = self;
         let rows = nodes.len() + workers.len() + left.len();

@@ -1,6 +1,6 @@
-//! Rows that are written about once a second: attempts, and nodes that start or complete. Only people read them (that a node is
-//! completed also follows from its result), most of them change again before they are written, and a transaction over fewer
-//! tables is cheaper.
+//! Rows that are written about once a second: attempts, and nodes that start or complete. Only users read them, most of them change
+//! again before they are written, and a transaction over fewer tables is cheaper. Resuming does not need them: that a node is completed
+//! follows from its result.
 
 use std::collections::BTreeMap;
 use std::time::Duration;

@@ -13,7 +13,7 @@ use super::identity::Difference;
 #[non_exhaustive]
 pub enum JournalError {
     /// The file holds a run, and `--resume` was not given.
-    #[error("{} already holds a run; continue it with --resume, choose another --out, or remove it first", path.display())]
+    #[error("{} already holds a run; resume it with --resume, choose another --out, or remove it first", path.display())]
     Exists {
         /// The journal.
         path: PathBuf,
@@ -56,7 +56,7 @@ pub enum JournalError {
     },
     /// The disk is full.
     #[error(
-        "cannot write the journal {}: the disk is full; free some space there and continue with --resume: nothing that was acknowledged is lost",
+        "cannot write the journal {}: the disk is full; free some space there and resume with --resume; acknowledged results are kept",
         path.display()
     )]
     DiskFull {
@@ -65,7 +65,7 @@ pub enum JournalError {
     },
     /// The journal cannot be written.
     #[error(
-        "cannot write the journal {}; fix the cause and continue with --resume: nothing that was acknowledged is lost",
+        "cannot write the journal {}; fix the cause and resume with --resume; acknowledged results are kept",
         path.display()
     )]
     Write {
@@ -84,7 +84,7 @@ pub enum JournalError {
     },
     /// The thread that writes the journal has panicked, which is a bug of this program.
     #[error(
-        "the thread that writes the journal {} has panicked; continue with --resume, and please report this",
+        "the thread that writes the journal {} has panicked; resume with --resume, and please report this",
         path.display()
     )]
     Thread {
@@ -150,7 +150,7 @@ impl JournalError {
     }
 }
 
-/// The most differences that are shown; a batch may have many.
+/// The most differences that are shown; there may be many.
 const MOST_SHOWN: usize = 10;
 
 fn listed(differences: &[Difference]) -> String {

@@ -11,7 +11,7 @@ use thiserror::Error;
 /// The lock's file in a folder of results.
 pub const LOCK_FILE: &str = "run.lock";
 
-/// How often to try, and the pause in between: `lookalike status` holds the lock briefly to test whether another process does.
+/// How often to try, and the pause between two attempts: `lookalike status` holds the lock briefly to test whether another process does.
 const TRIES: u32 = 10;
 const PAUSE: Duration = Duration::from_millis(20);
 
@@ -67,7 +67,7 @@ impl RunLock {
         Ok(Self { _file: file })
     }
 
-    /// Whether a process holds the lock of a folder; `None` if the file system does not say.
+    /// Whether a process holds the lock of a folder; `None` if the file system has no locks.
     #[must_use]
     pub fn is_held(folder: &Path) -> Option<bool> {
         let file = File::open(folder.join(LOCK_FILE)).ok()?;
@@ -88,7 +88,7 @@ fn words_of(file: &mut File) -> String {
     let mut words = String::new();
     // The file may be empty.
     let _ = file.take(256).read_to_string(&mut words);
-    if words.is_empty() { "it does not say which".into() } else { words }
+    if words.is_empty() { "unknown process".into() } else { words }
 }
 
 #[cfg(test)]

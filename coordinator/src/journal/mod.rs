@@ -23,8 +23,7 @@
 //! Rows that nothing depends on are written about once a second: see `deferred.rs`.
 //!
 //! Keys and hashes have no index: they are random, so each insertion into an index would write another page. A resuming
-//! coordinator reads all keys once. The journal does not contain the access file's secret; it is readable by its owner only
-//! nevertheless.
+//! coordinator reads all keys once. The journal does not contain the access file's secret. Still, only its owner can read it.
 //!
 //! On a network file system this process locks the journal for itself, and other processes read `status.json`.
 

@@ -24,7 +24,8 @@ const NETWORK: [(&str, u32); 14] = [
     ("ceph", 0x00C3_6400),
     ("cifs", 0xFF53_4D42),
     ("coda", 0x7375_7245),
-    // sshfs, gluster, s3fs and many more. On a local one, other processes only lose the direct view of the journal.
+    // sshfs, gluster, s3fs and many more. If such a file system is local, other processes only
+    // read `status.json` instead of the journal.
     ("fuse", 0x6573_5546),
     ("gpfs", 0x4750_4653),
     ("lustre", 0x0BD0_0BD0),

@@ -149,7 +149,7 @@ pub fn remove(path: &Path) -> io::Result<()> {
     Ok(())
 }
 
-/// Create a journal that only its owner can read, and open it. It appears with all its tables and the rows that `begin` writes,
+/// Create a journal that only its owner can read, and open it. The file appears with all its tables and the rows that `begin` writes,
 /// or not at all, even if the process is killed or the disk is full.
 pub(super) fn create(
     path: &Path,

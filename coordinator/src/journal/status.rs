@@ -19,7 +19,7 @@ use super::schema::node_id;
 use super::{place, schema};
 use crate::atomic;
 
-/// The status file beside the journal, for cases in which other processes cannot read the journal.
+/// The status file beside the journal. It is read where other processes cannot read the journal.
 pub const STATUS_FILE: &str = "status.json";
 
 /// The schema of the JSON.
@@ -28,7 +28,7 @@ const SCHEMA: &str = "lookalike.status/1";
 /// The most failures that are listed.
 const MOST_FAILURES: usize = 100;
 
-/// How long to wait for a writer that holds a lock.
+/// How long to wait if the writer has locked the journal.
 const BUSY_TIME: Duration = Duration::from_secs(1);
 
 /// The state of a run.
@@ -37,7 +37,7 @@ const BUSY_TIME: Duration = Duration::from_secs(1);
 pub enum RunState {
     /// A coordinator is running.
     Running,
-    /// No coordinator is running, and the run is not finished: `--resume` continues it.
+    /// No coordinator is running, and the run is not finished: `--resume` resumes it.
     Stopped,
     /// Every part has ended, and some of them failed: `--resume` retries those.
     Ended,
@@ -60,7 +60,7 @@ pub struct Status {
     pub epoch: u64,
     /// The process id of the last one.
     pub process: u32,
-    /// Its machine.
+    /// The machine of that process.
     pub host: String,
     /// When the run began.
     pub started_at: String,
@@ -76,7 +76,7 @@ pub struct Status {
     pub kinds: Vec<KindCounts>,
     /// The workers that are connected, by number.
     pub workers: Vec<WorkerStatus>,
-    /// How many leases all epochs gave out, plus how often nodes ran in a coordinator.
+    /// How many leases were given out in all epochs, plus how often nodes ran in a coordinator.
     pub attempts: u64,
     /// How many attempts were lost with their workers.
     pub requeued: u64,
@@ -144,7 +144,7 @@ pub struct NodeError {
     pub error: String,
 }
 
-/// There is no status to show.
+/// Why the status of a run cannot be read.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum StatusError {
@@ -232,9 +232,7 @@ impl Status {
             }
             Some(false) => {
                 self.state = RunState::Stopped;
-                self.error.get_or_insert_with(|| {
-                    "its coordinator ended without a word: it was killed, or the machine stopped".into()
-                });
+                self.error.get_or_insert_with(|| "its coordinator was killed, or its machine stopped".into());
                 self.workers.clear();
                 let open = self.parts.iter_mut().filter(|part| matches!(part.state.as_str(), "waiting" | "running"));
                 open.for_each(|part| part.state = "stopped".into());

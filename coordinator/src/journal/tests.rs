@@ -234,7 +234,7 @@ fn file_of_another_kind_version_or_run_is_refused_by_name() {
     begun(&folder).close(None).unwrap();
     let fresh = JournalOptions { resume: false, ..options(&folder) };
     let error = Journal::open(&fresh, NAME, None).unwrap_err().to_string();
-    assert!(error.contains("already holds a run; continue it with --resume"), "{error}");
+    assert!(error.contains("already holds a run; resume it with --resume"), "{error}");
     let other = JournalOptions { identity: RunIdentity::default().with("--seed", "3"), ..options(&folder) };
     let error = Journal::open(&other, NAME, None).unwrap_err().to_string();
     assert!(error.contains("--seed is 0 there and 3 here"), "{error}");
@@ -288,7 +288,7 @@ fn status_reports_counts_workers_and_whether_a_coordinator_runs() {
     assert_eq!(running.failures[0].error, "black");
     drop(lock);
     let killed = Status::of(folder.path(), Names::default()).unwrap();
-    assert!(killed.state == RunState::Stopped && killed.error.unwrap().contains("without a word"));
+    assert!(killed.state == RunState::Stopped && killed.error.unwrap().contains("was killed"));
     journal.close(Some("the disk is full".into())).unwrap();
     let stopped = Status::of(folder.path(), Names::default()).unwrap();
     assert_eq!((stopped.state, stopped.error.as_deref()), (RunState::Stopped, Some("the disk is full")));

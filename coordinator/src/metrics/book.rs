@@ -142,7 +142,7 @@ impl Book {
             RunEvent::NodeReady { node } => self.wait(*node, now),
             RunEvent::NodeAssigned { node, .. } => {
                 self.attempts += 1;
-                // A running node stays so when a second worker also gets it.
+                // A running node stays running when a second worker also gets it.
                 if self.open.get(node).is_some_and(|open| open.state < State::Leased) {
                     self.change(*node, State::Leased);
                 }

@@ -14,7 +14,7 @@ use tracing::debug;
 /// The most requests that are answered at a time; others wait in the system's queue.
 const AT_A_TIME: usize = 8;
 /// How long a request and its answer may take.
-const PATIENCE: Duration = Duration::from_secs(5);
+const REQUEST_TIME: Duration = Duration::from_secs(5);
 /// The longest head of a request.
 const MOST_HEAD_BYTES: usize = 8 << 10;
 /// The pause after the system fails to accept a connection, for example when file descriptors run out.
@@ -42,7 +42,7 @@ pub(super) async fn serve(listener: TcpListener, pages: impl Pages) {
                 let pages = Arc::clone(&pages);
                 tokio::spawn(async move {
                     // Errors are ignored, because only the scraper is affected.
-                    let _ = timeout(PATIENCE, answer(stream, &*pages)).await;
+                    let _ = timeout(REQUEST_TIME, answer(stream, &*pages)).await;
                     drop(place);
                 });
             }

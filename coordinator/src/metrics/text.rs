@@ -42,7 +42,11 @@ fn nodes(page: &mut Page, book: &Book) {
     for (kind, of_kind) in &book.kinds {
         page.histogram("lookalike_node_seconds", Some(("kind", kind)), &of_kind.seconds);
     }
-    page.family("lookalike_node_queue_seconds", "histogram", "Time from a node's inputs being there to its start.");
+    page.family(
+        "lookalike_node_queue_seconds",
+        "histogram",
+        "Time from the moment when a node's inputs are complete to its start.",
+    );
     page.histogram("lookalike_node_queue_seconds", None, &book.queue_seconds);
     for (name, help, value) in [
         (
@@ -67,12 +71,12 @@ fn nodes(page: &mut Page, book: &Book) {
         ),
         (
             "lookalike_nodes_suspected_total",
-            "Times that a node was set apart because workers had died while they executed it.",
+            "Times that a node was quarantined because workers had died while they executed it.",
             book.suspected,
         ),
         (
             "lookalike_duplicate_results_total",
-            "Outputs that came a second time, bit for bit the same.",
+            "Outputs that arrived a second time, bit for bit the same.",
             book.duplicates,
         ),
     ] {
@@ -86,7 +90,7 @@ fn workers(page: &mut Page, book: &Book) {
     page.single(
         "lookalike_leases",
         "gauge",
-        "Nodes that are held by a worker or run by the coordinator.",
+        "Nodes that a worker holds or the coordinator runs.",
         book.leases() as f64,
     );
     page.single("lookalike_workers_joined_total", "counter", "Workers that have joined.", book.joined as f64);

@@ -24,13 +24,13 @@ pub enum Stop {
         /// How long there was work but no worker.
         waited: Duration,
     },
-    /// Every time a local worker is started, it dies.
-    #[error("the local worker processes keep dying, the last one with {last_status}; see their lines on stderr")]
+    /// The local workers died repeatedly soon after their start, and no other worker can join.
+    #[error("the local worker processes keep dying, the last one with {last_status}; see their messages on stderr")]
     LocalWorkersKeepDying {
         /// How the last one ended.
         last_status: String,
     },
-    /// Two computations of one node gave different outputs.
+    /// Two computations of one node had different results.
     #[error(
         "two results of {name} differ ({first} from {first_site}, {second} from {second_site}), so neither can be trusted; use the same build everywhere, check the memory of these machines, and report this"
     )]

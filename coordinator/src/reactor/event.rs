@@ -8,7 +8,7 @@ use crate::events::{Departure, Site};
 /// An event.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Event {
-    /// A worker has said hello and was accepted.
+    /// A worker was accepted.
     WorkerJoined {
         /// Its number, which is never reused.
         worker: WorkerId,
@@ -29,7 +29,7 @@ pub enum Event {
         /// The worker.
         worker: WorkerId,
     },
-    /// A worker lives: bytes of it have arrived that are no event yet, such as a part of an output.
+    /// Bytes have arrived from a worker that do not form a complete message yet.
     Alive {
         /// The worker.
         worker: WorkerId,

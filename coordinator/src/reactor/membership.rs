@@ -49,7 +49,7 @@ pub(super) fn found(
     if earlier != Some(&attempt) {
         return;
     }
-    if may_go_on(core, worker, node) {
+    if may_continue(core, worker, node) {
         adopt(core, worker, node, now, outbox);
     } else {
         let lease = Lease { node, attempt, epoch: core.epoch };
@@ -58,7 +58,7 @@ pub(super) fn found(
 }
 
 /// Whether a worker may continue a node: the node is open and not a suspect, and at most one other worker executes it.
-fn may_go_on(core: &Core, worker: WorkerId, node: NodeId) -> bool {
+fn may_continue(core: &Core, worker: WorkerId, node: NodeId) -> bool {
     let (Some(member), Some(record)) = (core.members.get(worker), core.look(node)) else { return false };
     let is_begun =
         |holder: &&WorkerId| core.members.get(**holder).is_some_and(|holder| !holder.waiting.contains(&node));
@@ -129,7 +129,7 @@ pub(super) fn drain(core: &mut Core, worker: WorkerId, now: Duration, outbox: &m
     }
 }
 
-/// Re-queue a node that was taken from this worker, unless another worker holds it or it is queued already.
+/// Re-queue a node whose lease this worker has lost, unless another worker holds it or it is queued already.
 fn requeue(core: &mut Core, node: NodeId, worker: WorkerId, now: Duration, outbox: &mut Outbox) {
     let Some(record) = core.look(node) else { return };
     let is_cared_for = !record.holders.is_empty() || record.place != Place::Nowhere;

@@ -1,7 +1,7 @@
 //! The state machine: plain functions from state and event to state and actions. No sockets, no clock, no waiting: time is an
 //! argument, and every action goes out through the [`Outbox`].
 //!
-//! Scheduling reacts to events: when a node is ready and a worker has a place, the lease is given out at once. A lease may end
+//! Scheduling reacts to events: a lease is given out as soon as a node is ready and a worker has a place. A lease may end
 //! without a result (its worker left), or the result of another attempt may arrive first. The result of any attempt is accepted,
 //! because nodes are pure functions; results that differ end the run.
 //!
@@ -192,7 +192,7 @@ fn make_ready(core: &mut Core, planner: &impl Planner, node: NodeId, now: Durati
     }
 }
 
-/// If there is work but no worker, remind the user, and end the run at the limit.
+/// While nodes wait and there is no worker, remind the user, and end the run at the limit.
 fn watch_starvation(core: &mut Core, now: Duration, outbox: &mut Outbox) -> Result<(), Stop> {
     if core.waiting.is_empty() || !core.members.is_empty() {
         core.starving = None;

@@ -205,7 +205,10 @@ impl<R: AsyncRead + Unpin> Reader<R> {
             }
             ToCoordinator::Fetch { hash } => {
                 if self.pending_blobs.fetch_add(1, Ordering::Relaxed) >= self.max_pending_blobs {
-                    return Err(unexpected("a worker that reads what it asked for", "still more requests for blobs"));
+                    return Err(unexpected(
+                        "a worker that reads the blobs it requested",
+                        "too many requests for blobs",
+                    ));
                 }
                 Event::BlobRequested { worker, hash: BlobHash(hash) }
             }

@@ -1,7 +1,7 @@
 //! The sockets: accepts connections, admits workers that know the secret, and turns their messages into events.
 //!
-//! A connection that has not proved the secret gets few resources: a place that a newer one may take, a short time, a TLS
-//! handshake, fixed lengths, no decoder. A worker gets two tasks, one that reads and one that writes, so that a large blob
+//! A connection that has not proved the secret gets few resources: a place that a newer connection may take, a short time, a
+//! TLS handshake, and messages of fixed length that need no decoder. A worker gets two tasks, one that reads and one that writes, so that a large blob
 //! in one direction never blocks the other. [`Limits`](crate::limits::Limits) holds the bounds for both.
 
 mod gate;
@@ -83,8 +83,8 @@ pub(crate) async fn serve_forever<W: World>(listener: W::Listener, gate: Gate<W>
     connections.shutdown().await;
 }
 
-/// Report a failed handshake. A wrong secret or version comes from a Lookalike worker, so the user is warned. Anything else is
-/// logged as noise.
+/// Report a failed handshake. If the peer is a Lookalike worker with a wrong secret or version, the user is warned. Other failures
+/// are only logged for debugging.
 fn report_refusal(peer: SocketAddr, error: &WireError) {
     if means_us(error) {
         warn!(%peer, "refused: {error}");

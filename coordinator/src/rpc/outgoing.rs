@@ -8,6 +8,6 @@ use lookalike::protocol::ToWorker;
 pub(crate) enum Outgoing {
     Message(ToWorker),
     Blob(Blob),
-    /// The requested blob does not exist.
+    /// The requested blob is not sent, because no lease of the worker reads it any more.
     NoBlob,
 }

@@ -50,7 +50,7 @@ pub enum RunError {
     /// The journal cannot be written, or the run in it cannot be resumed.
     #[error(transparent)]
     Journal(#[from] JournalError),
-    /// There is no usable access file, or none can be written.
+    /// The access file is not usable or cannot be written.
     #[error(transparent)]
     Credentials(#[from] CredentialsError),
     /// The coordinator's key does not match its certificate.

@@ -154,7 +154,7 @@ impl<W: World, P: Planner, O: FnMut(&RunEvent)> Driver<W, P, O> {
         mut results: UnboundedReceiver<Event>,
         interrupted: CancellationToken,
     ) -> Result<(), RunError> {
-        // Dropped at the return of this function, so that connections that wait for room do not wait for ever.
+        // Dropped when this function returns, so that connections that wait for room in the queue end.
         let (sender, mut inbound) = channel(INBOUND_CAPACITY);
         let (wake, pulse) = (begin.options.wake.clone(), begin.options.pulse.clone());
         let mut failure = self.begin(begin, sender).await?;

@@ -27,10 +27,10 @@ use crate::events::RunEvent;
 use crate::reactor::Event;
 use crate::rpc::Inbound;
 
-/// A worker that lived this long, or that has executed a node, resets the count of quick deaths. (If a node kills its workers,
+/// The count of quick deaths is reset by a worker that lived this long or has executed a node. (If a node kills its workers,
 /// that node eventually fails.)
 const HEALTHY_LIFE: Duration = Duration::from_secs(10);
-/// After this many consecutive deaths soon after the start, a worker is not started again.
+/// A worker is not restarted after this many consecutive quick deaths.
 const MAX_QUICK_DEATHS: u32 = 8;
 /// The pause after the first death. It doubles with each further one.
 const FIRST_PAUSE: Duration = Duration::from_millis(100);
@@ -55,7 +55,7 @@ pub struct WorkerCommand {
 }
 
 impl WorkerCommand {
-    /// This very program as a worker: `lookalike worker`.
+    /// This program as a worker: `lookalike worker`.
     ///
     /// # Errors
     /// When the system does not provide the path of this program.
@@ -219,7 +219,7 @@ impl Process {
             let _ = leash.write_all(RUN_IS_OVER).await;
         }
         if timeout(FAREWELL_TIME, self.child.wait()).await.is_err() {
-            warn!(process = self.id, "a local worker does not end by itself: killing it");
+            warn!(process = self.id, "a local worker did not end in time: killing it");
             // An error means that it has ended meanwhile.
             let _ = self.child.kill().await;
         }

@@ -112,7 +112,7 @@ impl KindPace {
         let factor = speculation.factor?;
         let (known, least) = match self.usual() {
             Some(median) => (median, speculation.after),
-            // The only node of its kind may hang, too.
+            // Without this limit, the only node of its kind would never be slow.
             None => (longest, speculation.after.saturating_mul(UNKNOWN_IS_SLOW_AFTER)),
         };
         // The factor of a policy is finite. A time that overflows is replaced by one that is never reached.

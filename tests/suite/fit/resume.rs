@@ -201,7 +201,7 @@ fn full_disk_ends_the_run_with_its_name_and_loses_no_acknowledged_node() {
     MANY_NODES_FIT.copy_to(&folder.path().join("whole"));
     let full = resume(folder.path(), "small/out", MANY_NODES);
     assert_eq!(full.code, Some(3), "{}", full.stderr);
-    for phrase in ["cannot write the journal small/out/run.sqlite: the disk is full", "continue with --resume"] {
+    for phrase in ["cannot write the journal small/out/run.sqlite: the disk is full", "resume with --resume"] {
         assert!(full.stderr.contains(phrase), "{}", full.stderr);
     }
     disk.grow("64m");
