@@ -4,6 +4,9 @@ use std::time::Duration;
 
 use lookalike::protocol::MAX_FRAME_BYTES;
 
+/// The pause after the system fails to accept a connection, for example when file descriptors run out.
+pub(crate) const ACCEPT_PAUSE: Duration = Duration::from_millis(100);
+
 /// Bounds on what connections may cost. A connection is unauthenticated until it has proved the secret and sent its hello; from then
 /// on it belongs to a worker.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

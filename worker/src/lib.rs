@@ -28,7 +28,7 @@ use clap::Parser;
 use lookalike::graph::Registry;
 use tracing_subscriber::EnvFilter;
 
-pub use error::WorkerError;
+pub use error::{WorkerError, with_causes};
 pub use options::{Arguments, Time, WorkerOptions};
 
 use crate::ending::{Wishes, watch_for_the_end};
@@ -98,14 +98,14 @@ pub fn run_and_report(options: &WorkerOptions, registry: Registry) -> ExitCode {
     match run(options, registry) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            print_line(&format!("error: {}", error.with_causes()));
+            print_line(&format!("error: {}", with_causes(&error)));
             ExitCode::from(error.exit_code())
         }
     }
 }
 
-/// Prints a line on stderr, in one piece: others write there too. It may be closed.
-fn print_line(text: &str) {
+/// Print a line on stderr, in one piece, because other processes write there too. A closed stderr is ignored.
+pub fn print_line(text: &str) {
     let _ = std::io::stderr().write_all(format!("{text}\n").as_bytes());
 }
 

@@ -226,7 +226,7 @@ impl<W: World> Session<W> {
         let mut incoming = Incoming::new(reader);
         match incoming.message().await? {
             ToWorker::Welcome(welcome) => Ok((incoming, writer, welcome)),
-            other => Err(WireError::Unexpected { expected: "a welcome", found: format!("{other:?}") }),
+            other => Err(WireError::unexpected("a welcome", format!("{other:?}"))),
         }
     }
 
@@ -286,16 +286,16 @@ impl<W: World> Session<W> {
             Received::Message(ToWorker::Heartbeat) => {}
             Received::Message(ToWorker::Blob { hash, length }) => {
                 if connection.transfer.is_some() {
-                    return Err(unexpected("the rest of a blob", "another blob"));
+                    return Err(WireError::unexpected("the rest of a blob", "another blob"));
                 }
                 connection.transfer = Some(IncomingBlob::begin(BlobHash(hash), length)?);
             }
             Received::Message(message @ (ToWorker::Welcome(_) | ToWorker::Stop { .. })) => {
-                return Err(unexpected("work", &format!("{message:?}")));
+                return Err(WireError::unexpected("work", format!("{message:?}")));
             }
             Received::Part(part) => match &mut connection.transfer {
                 Some(blob) => blob.push(&part)?,
-                None => return Err(unexpected("a message", "a part of a blob")),
+                None => return Err(WireError::unexpected("a message", "a part of a blob")),
             },
         }
         match connection.take_complete()? {
@@ -354,10 +354,6 @@ impl<W: World> Connection<W> {
     fn take_complete(&mut self) -> Result<Option<Blob>, TransferError> {
         self.transfer.take_if(|blob| blob.is_complete()).map(IncomingBlob::finish).transpose()
     }
-}
-
-fn unexpected(expected: &'static str, found: &str) -> WireError {
-    WireError::Unexpected { expected, found: found.to_owned() }
 }
 
 enum Outgoing {

@@ -61,6 +61,11 @@ pub enum WireError {
 }
 
 impl WireError {
+    /// [`WireError::Unexpected`].
+    pub fn unexpected(expected: &'static str, found: impl Into<String>) -> Self {
+        Self::Unexpected { expected, found: found.into() }
+    }
+
     /// Whether the peer violated the protocol; false if the stream failed or ended.
     #[must_use]
     pub fn is_violation(&self) -> bool {
@@ -158,9 +163,7 @@ impl<R: AsyncRead + Unpin> Incoming<R> {
     pub async fn message<T: DeserializeOwned>(&mut self) -> Result<T, WireError> {
         match self.next().await? {
             Some(Received::Message(message)) => Ok(message),
-            Some(Received::Part(_)) => {
-                Err(WireError::Unexpected { expected: "a message", found: "a part of a blob".into() })
-            }
+            Some(Received::Part(_)) => Err(WireError::unexpected("a message", "a part of a blob")),
             None => Err(WireError::Ended),
         }
     }

@@ -14,9 +14,10 @@ pub(crate) use parts::{PartCount, PartEvent, PartScores, Shape};
 
 use crate::settings::ProgressKind;
 use lookalike_coordinator::events::RunEvent;
+pub(crate) use lookalike_worker::print_line;
 use remarks::Remarks;
 use std::{
-    io::{self, IsTerminal, Write as _},
+    io::{self, IsTerminal},
     path::PathBuf,
     time::Duration,
 };
@@ -51,11 +52,6 @@ pub(crate) trait Display: Send {
 
     /// The run is over, and all its files are written. Stops all animation.
     fn finish(&mut self, ending: Ending<'_>);
-}
-
-/// Prints a line on stderr, in one piece: workers and scripts write there too. A closed stderr does not stop the run.
-pub(crate) fn print_line(text: &str) {
-    let _ = io::stderr().write_all(format!("{text}\n").as_bytes());
 }
 
 /// The display of this kind for a run of this shape, whose workers use this access file.

@@ -2,6 +2,7 @@
 //! bounded, because anyone may connect.
 
 use super::text::MEDIA_TYPE;
+use crate::limits::ACCEPT_PAUSE;
 use std::{io, sync::Arc, time::Duration};
 use tokio::{
     io::{AsyncReadExt, AsyncWriteExt},
@@ -17,8 +18,6 @@ const AT_A_TIME: usize = 8;
 const REQUEST_TIME: Duration = Duration::from_secs(5);
 /// The longest head of a request.
 const MOST_HEAD_BYTES: usize = 8 << 10;
-/// The pause after the system fails to accept a connection, for example when file descriptors run out.
-const ACCEPT_PAUSE: Duration = Duration::from_millis(100);
 
 /// The pages that are served.
 pub(super) trait Pages: Send + Sync + 'static {

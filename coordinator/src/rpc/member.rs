@@ -187,7 +187,7 @@ impl<R: AsyncRead + Unpin> Reader<R> {
             Received::Message(message) => message,
             Received::Part(part) => {
                 let Some((_, output)) = &mut self.output else {
-                    return Err(unexpected("a message", "a part of an output"));
+                    return Err(WireError::unexpected("a message", "a part of an output"));
                 };
                 output.push(&part)?;
                 return Ok(Some(self.output()?.unwrap_or_else(|| Inbound::Event(self.life()))));
@@ -205,7 +205,7 @@ impl<R: AsyncRead + Unpin> Reader<R> {
             }
             ToCoordinator::Fetch { hash } => {
                 if self.pending_blobs.fetch_add(1, Ordering::Relaxed) >= self.max_pending_blobs {
-                    return Err(unexpected(
+                    return Err(WireError::unexpected(
                         "a worker that reads the blobs it requested",
                         "too many requests for blobs",
                     ));
@@ -214,7 +214,7 @@ impl<R: AsyncRead + Unpin> Reader<R> {
             }
             ToCoordinator::Finished { lease, hash, length } => {
                 if self.output.is_some() {
-                    return Err(unexpected("the rest of an output", "another output"));
+                    return Err(WireError::unexpected("the rest of an output", "another output"));
                 }
                 self.check_epoch(lease)?;
                 self.output = Some((lease, IncomingBlob::begin(BlobHash(hash), length)?));
@@ -227,7 +227,9 @@ impl<R: AsyncRead + Unpin> Reader<R> {
                 Event::Failed { site: Site::Worker(worker), node: NodeId(lease.node), attempt: lease.attempt, failure }
             }
             ToCoordinator::Draining => Event::WorkerDrains { worker },
-            ToCoordinator::Hello(_) | ToCoordinator::Goodbye => return Err(unexpected("work", "a greeting")),
+            ToCoordinator::Hello(_) | ToCoordinator::Goodbye => {
+                return Err(WireError::unexpected("work", "a greeting"));
+            }
         })))
     }
 
@@ -236,10 +238,8 @@ impl<R: AsyncRead + Unpin> Reader<R> {
         if lease.epoch == self.epoch {
             return Ok(());
         }
-        Err(WireError::Unexpected {
-            expected: "a lease of this coordinator",
-            found: format!("one of epoch {} in epoch {}", lease.epoch, self.epoch),
-        })
+        let found = format!("one of epoch {} in epoch {}", lease.epoch, self.epoch);
+        Err(WireError::unexpected("a lease of this coordinator", found))
     }
 
     fn executing(&self, node: &protocol::Executing) -> Result<Executing, WireError> {
@@ -266,7 +266,7 @@ impl<R: AsyncRead + Unpin> Reader<R> {
         match answered.await {
             Ok(false) => {
                 let found = format!("one for node {}, attempt {}", lease.node, lease.attempt);
-                Err(unexpected("an output for a lease that was given out", &found))
+                Err(WireError::unexpected("an output for a lease that was given out", found))
             }
             // An error means that the run is over.
             Ok(true) | Err(_) => Ok(()),
@@ -291,10 +291,6 @@ fn failure(kind: FailureKind, message: String) -> NodeFailure {
         FailureKind::Panic => NodeFailure::Panicked { message },
         FailureKind::UnknownKind => NodeFailure::UnknownKind { message },
     }
-}
-
-fn unexpected(expected: &'static str, found: &str) -> WireError {
-    WireError::Unexpected { expected, found: found.to_owned() }
 }
 
 #[cfg(test)]

@@ -15,7 +15,6 @@ use std::io;
 use std::net::SocketAddr;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::time::Duration;
 
 use lookalike::graph::WorkerId;
 use lookalike::protocol::{FrameReader, HandshakeError, ProofKey, ToCoordinator, bounded_text};
@@ -34,10 +33,8 @@ pub(crate) use self::inbound::Inbound;
 pub(crate) use self::mailbox::Mailbox;
 pub(crate) use self::outgoing::Outgoing;
 use self::places::{Place, Places};
+use crate::limits::ACCEPT_PAUSE;
 use crate::tls::accept;
-
-/// The pause after the system fails to accept a connection, for example when file descriptors run out.
-const ACCEPT_PAUSE: Duration = Duration::from_millis(100);
 
 /// Accept workers until `stop`, then give the connected ones some time to close.
 pub(crate) async fn serve_forever<W: World>(listener: W::Listener, gate: Gate<W>, stop: CancellationToken) {
@@ -122,7 +119,7 @@ async fn handshake<W: World>(stream: W::Stream, gate: &Gate<W>) -> Result<Greete
     let mut incoming = Incoming::with_frames(reader, FrameReader::with_limit(gate.limits.frame_bytes));
     match incoming.message().await? {
         ToCoordinator::Hello(hello) => Ok(Greeted { incoming, writer, hello }),
-        other => Err(WireError::Unexpected { expected: "a hello", found: bounded_text(&format!("{other:?}")) }),
+        other => Err(WireError::unexpected("a hello", bounded_text(&format!("{other:?}")))),
     }
 }
 

@@ -19,13 +19,15 @@ mod memory;
 mod options;
 mod pulse;
 
-use std::error::Error as _;
 use std::sync::Arc;
 use std::time::Duration;
 
 use lookalike::graph::{NodeId, Planner, Registry, WorkerId};
 use lookalike::protocol::{Assignment, LeaseName, RunName, ToWorker};
-use lookalike_worker::world::{Real, World};
+use lookalike_worker::{
+    with_causes,
+    world::{Real, World},
+};
 use tokio::sync::Notify;
 use tokio::sync::mpsc::{Receiver, UnboundedReceiver, channel, unbounded_channel};
 use tokio::time::{Instant, MissedTickBehavior, interval, sleep_until};
@@ -122,7 +124,7 @@ pub async fn run_in<W: World, P: Planner>(
     if let Some(cluster) = driver.cluster.take() {
         cluster.stop(reason).await;
     }
-    let closed = driver.memory.close(outcome.as_ref().err().map(with_causes));
+    let closed = driver.memory.close(outcome.as_ref().err().map(|error| with_causes(error)));
     // The first error is the one to report.
     outcome.and(closed).map(|()| (driver.planner, driver.core.summary()))
 }
@@ -388,17 +390,6 @@ fn more(inbound: &mut Receiver<Inbound>, events: &mut Vec<Inbound>) {
         let Ok(event) = inbound.try_recv() else { return };
         events.push(event);
     }
-}
-
-/// An error and its causes in one line.
-fn with_causes(error: &RunError) -> String {
-    let mut text = error.to_string();
-    let mut cause = error.source();
-    while let Some(error) = cause {
-        text = format!("{text}: {error}");
-        cause = error.source();
-    }
-    text
 }
 
 /// How often to read the progress of the nodes that run here.

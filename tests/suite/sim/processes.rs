@@ -136,7 +136,7 @@ pub(super) async fn work(stage: Arc<Stage>, index: usize, threads: NonZeroUsize,
     let ended = run_in(world, &options, registry(), wishes.clone()).await;
     stage.say(place, &format!("process {process} ends: {ended:?}"));
     if let Err(error) = ended {
-        stage.wrong(format!("{place:?} has ended: {}", error.with_causes()));
+        stage.wrong(format!("{place:?} has ended: {}", lookalike_worker::with_causes(&error)));
     }
     let was_asked = wishes.drain.is_cancelled();
     stage.state().ended.push((index, was_asked));
