@@ -10,8 +10,9 @@ use lookalike::graph::{Blob, GraphEdit, NodeId, NodeSpec, Placement, PlanError, 
 use lookalike::protocol::ProcessName;
 use lookalike_coordinator::actions::{Action, Outbox, WorkerProcess};
 use lookalike_coordinator::events::Site;
+use lookalike_coordinator::policy::Policy;
 use lookalike_coordinator::reactor::{Event, handle, start};
-use lookalike_coordinator::state::{Core, Policy};
+use lookalike_coordinator::state::Core;
 
 const NODES: usize = 100_000;
 

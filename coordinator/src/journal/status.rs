@@ -175,6 +175,20 @@ pub enum StatusError {
     },
 }
 
+/// The status file cannot be written.
+#[derive(Debug, Error)]
+pub(super) enum WriteError {
+    /// The journal cannot be read.
+    #[error("cannot read the journal")]
+    Journal(#[from] rusqlite::Error),
+    /// The status cannot be encoded.
+    #[error("cannot encode the status")]
+    Encode(#[from] serde_json::Error),
+    /// The file cannot be written.
+    #[error("cannot write {STATUS_FILE}")]
+    File(#[from] io::Error),
+}
+
 impl Status {
     /// Read the status of the run in a folder, from its journal or, where other processes cannot read that, from its status file.
     ///
@@ -262,7 +276,7 @@ fn read_journal(path: &Path) -> Result<Status, JournalError> {
 }
 
 /// Write the status file of a journal, atomically.
-pub(super) fn write(connection: &Connection, journal: &Path, names: Names) -> anyhow::Result<()> {
+pub(super) fn write(connection: &Connection, journal: &Path, names: Names) -> Result<(), WriteError> {
     let text = read(connection)?.to_json(names)?;
     Ok(atomic::write_unsynced(&journal.with_file_name(STATUS_FILE), text.as_bytes())?)
 }

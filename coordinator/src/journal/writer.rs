@@ -5,6 +5,7 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender};
 use std::time::{Duration, Instant};
 
 use lookalike::graph::{Blob, BlobHash, NodeKey};
+use lookalike_worker::with_causes;
 use rusqlite::{Connection, Transaction, params};
 use tokio::sync::mpsc::UnboundedSender;
 use tracing::warn;
@@ -200,7 +201,7 @@ impl Writer {
             warn!(%error, "cannot write the time to the journal");
         }
         if let Err(error) = status::write(&self.connection, &self.options.path, self.options.names) {
-            warn!(%error, "cannot write the status of the run");
+            warn!(error = with_causes(&error), "the status of the run is out of date");
         }
         self.is_news = false;
         self.next_status = Instant::now() + STATUS_INTERVAL.max(began.elapsed() * STATUS_SHARE);

@@ -9,8 +9,9 @@ use super::tests::{Script, node, process};
 use super::{Event, Stop, handle, start};
 use crate::actions::{Action, Outbox};
 use crate::events::{Departure, RunEvent, Site};
+use crate::policy::Policy;
 use crate::state::past_outputs::{Memory, PastOutputs};
-use crate::state::{Core, Deaths, Policy};
+use crate::state::{Core, Deaths};
 
 const A: WorkerId = WorkerId(1);
 

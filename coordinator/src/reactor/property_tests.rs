@@ -11,8 +11,9 @@ use super::tests::{Script, node, process};
 use super::{Event, Executing, handle, start};
 use crate::actions::{Action, Outbox};
 use crate::events::{Departure, Site};
+use crate::policy::Policy;
 use crate::policy::Speculation;
-use crate::state::{Core, Policy};
+use crate::state::Core;
 use lookalike::graph::FailureReason;
 
 /// An event from outside. A number selects one of the present objects (modulo their count).

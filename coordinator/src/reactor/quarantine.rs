@@ -1,9 +1,9 @@
 //! Quarantine of nodes that may kill their workers: which nodes a death is counted against.
 //!
 //! Only a node that a worker was executing can have killed it. After
-//! [`Policy::suspect_after`](crate::state::Policy::suspect_after) deaths in which a node took part, it is a *suspect*: it runs
+//! [`Policy::suspect_after`](crate::policy::Policy::suspect_after) deaths in which a node took part, it is a *suspect*: it runs
 //! alone, on a worker that has executed nothing before or at least executes nothing else at the same time. Only deaths there are
-//! counted against it, and [`Policy::node_crashes`](crate::state::Policy::node_crashes) of them make it fail.
+//! counted against it, and [`Policy::node_crashes`](crate::policy::Policy::node_crashes) of them make it fail.
 //!
 //! A suspect's worker may also be killed from outside. Other deaths are the evidence: while workers die whose deaths no suspect
 //! explains, the deaths of a suspect's workers are not counted, up to a limit.

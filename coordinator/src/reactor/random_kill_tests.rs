@@ -10,7 +10,8 @@ use super::tests::{Script, node, process};
 use super::{Event, handle, start};
 use crate::actions::{Action, Outbox};
 use crate::events::{Departure, Site};
-use crate::state::{Core, Policy};
+use crate::policy::Policy;
+use crate::state::Core;
 
 /// A scheduled event.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]

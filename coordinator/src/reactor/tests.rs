@@ -11,8 +11,8 @@ use lookalike::protocol::ProcessName;
 use super::{Event, Executing, Stop, handle, handle_arrived, start};
 use crate::actions::{Action, Outbox, WorkerProcess};
 use crate::events::{Departure, RunEvent, Site};
-use crate::policy::Speculation;
-use crate::state::{Core, Policy};
+use crate::policy::{Policy, Speculation};
+use crate::state::Core;
 
 mod differing;
 mod draining;

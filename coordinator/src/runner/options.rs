@@ -10,8 +10,8 @@ use tokio::sync::Notify;
 use super::{Pulse, RunError};
 use crate::journal::JournalOptions;
 use crate::limits::Limits;
+use crate::policy::Policy;
 use crate::spawn::WorkerCommand;
-use crate::state::Policy;
 
 /// The options of a run.
 #[derive(Clone, Debug)]

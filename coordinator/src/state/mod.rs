@@ -21,7 +21,7 @@ use self::pace::Pace;
 use self::past_outputs::PastOutputs;
 pub(crate) use self::waiting::{Place, Waiting};
 use crate::events::{NodeName, Site};
-pub use crate::policy::Policy;
+use crate::policy::Policy;
 
 /// Counts of a run, to show to the user. No result may depend on them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
