@@ -89,6 +89,8 @@ pub struct NodeName {
     pub kind: String,
     /// Its label.
     pub label: String,
+    /// The number of the part that it belongs to, in a run of [`Many`](lookalike::graph::Many) planners; otherwise 0.
+    pub part: u32,
 }
 
 impl fmt::Display for NodeName {

@@ -12,7 +12,7 @@ use crate::{
     run::{Clock, FITS},
     settings::BatchFit,
 };
-use lookalike::{fit::BestScore, graph::split_label};
+use lookalike::fit::BestScore;
 use lookalike_coordinator::{events::RunEvent, journal::PartLedger, metrics::Metrics};
 use std::{
     collections::BTreeMap,
@@ -39,7 +39,6 @@ pub(super) struct Watchers {
 
 struct Inner {
     rows: Vec<Row>,
-    numbers: BTreeMap<String, u32>,
     /// The clocks of running fits.
     clocks: BTreeMap<u32, FitClock>,
     watchers: Watchers,
@@ -81,7 +80,6 @@ impl Board {
         };
         let inner = Inner {
             rows: fits.iter().zip(complete).map(row).collect(),
-            numbers: (0..).zip(fits).map(|(number, fit)| (fit.name.clone(), number)).collect(),
             clocks: BTreeMap::new(),
             watchers,
             workers_joined: 0,
@@ -268,8 +266,7 @@ impl Inner {
             | RunEvent::NodeRequeued { name, .. } => name,
             _ => return None,
         };
-        let number = self.numbers.get(split_label(&name.label).0?)?;
-        self.clocks.get_mut(number)
+        self.clocks.get_mut(&name.part)
     }
 
     fn count(&self) -> PartCount {

@@ -78,7 +78,7 @@ pub struct NodeSpec {
     /// Where it runs.
     pub placement: Placement,
     /// Ready nodes run in ascending order of priority, then in the order in which they were added. Does not affect any result. In a run
-    /// of [`Many`](super::Many) planners it is the number of the part.
+    /// of [`Many`](super::Many) planners it is the number of the part, by which events assign the node to it.
     pub priority: u32,
 }
 

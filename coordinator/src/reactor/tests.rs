@@ -543,3 +543,10 @@ fn request_for_a_released_blob_is_not_a_violation() {
     bench.finish(A, 0, 1, 0);
     assert_eq!(bench.handle(Event::BlobRequested { worker: A, hash }), ["worker 1 gets nothing"]);
 }
+
+#[test]
+fn events_name_the_part_of_a_node() {
+    let nodes = [0, 7].map(|priority| NodeSpec { priority, ..node("n", vec![], Placement::Worker) }).to_vec();
+    let bench = Bench::new(Script { nodes, ..Script::default() });
+    assert_eq!([0, 1].map(|node| bench.core.name(NodeId(node)).part), [0, 7]);
+}

@@ -10,7 +10,7 @@ mod waiting;
 use std::collections::VecDeque;
 use std::time::Duration;
 
-use lookalike::graph::{Blob, BlobHash, Graph, NodeId, NodeKey, WorkerId};
+use lookalike::graph::{Blob, BlobHash, Graph, NodeId, NodeKey, NodeSpec, WorkerId};
 use lookalike::protocol::ProcessName;
 
 pub use self::deaths::Deaths;
@@ -220,9 +220,9 @@ impl Core {
     }
 
     pub(crate) fn name(&self, node: NodeId) -> NodeName {
-        let (kind, label) =
-            self.graph.spec(node).map(|spec| (spec.kind.clone(), spec.label.clone())).unwrap_or_default();
-        NodeName { node, kind, label }
+        let of = |spec: &NodeSpec| (spec.kind.clone(), spec.label.clone(), spec.priority);
+        let (kind, label, part) = self.graph.spec(node).map(of).unwrap_or_default();
+        NodeName { node, kind, label, part }
     }
 
     /// The record of a node. The reactor adds it before any other change of the node.
