@@ -80,7 +80,7 @@ impl fmt::Display for Site {
     }
 }
 
-/// A node, as the user knows it.
+/// The name of a node in events.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct NodeName {
     /// Its number.

@@ -72,7 +72,7 @@ pub(crate) async fn run<W: World>(
     session.keep_connected(options.reconnect_for).await
 }
 
-/// Where a worker with these options connects to, if its access file says so.
+/// The address to which a worker with these options connects; `None` if its access file cannot be read.
 pub(crate) fn address(options: &WorkerOptions) -> Option<String> {
     options.address.clone().or_else(|| read_access(options).ok().map(|access| access.address))
 }

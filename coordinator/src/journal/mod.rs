@@ -18,7 +18,7 @@
 //! | `attempts` | lease that was given out: worker, when, how it ended |
 //! | `workers` | connection of a worker |
 //! | `results` | node key: the hash and the bytes of its output |
-//! | `parts` | part of a run of many, such as one of many independent computations: its state, what it wrote |
+//! | `parts` | part of a run of many planners: its state, what it wrote |
 //!
 //! Rows that nothing depends on are written about once a second: see `deferred.rs`.
 //!

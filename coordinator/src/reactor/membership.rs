@@ -132,8 +132,8 @@ pub(super) fn drain(core: &mut Core, worker: WorkerId, now: Duration, outbox: &m
 /// Re-queue a node whose lease this worker has lost, unless another worker holds it or it is queued already.
 fn requeue(core: &mut Core, node: NodeId, worker: WorkerId, now: Duration, outbox: &mut Outbox) {
     let Some(record) = core.look(node) else { return };
-    let is_cared_for = !record.holders.is_empty() || record.place != Place::Nowhere;
-    if is_cared_for || !core.graph.is_open(node) {
+    let is_placed = !record.holders.is_empty() || record.place != Place::Nowhere;
+    if is_placed || !core.graph.is_open(node) {
         return;
     }
     let deaths = record.deaths;

@@ -43,7 +43,7 @@ const RECONNECT_FOR: &str = "60s";
 /// Written to the leash when the run is over.
 const RUN_IS_OVER: &[u8] = b".";
 /// The exit code of a worker for which another attempt would also fail: bad usage, or refused.
-const HOPELESS: i32 = 2;
+const NO_RETRY: i32 = 2;
 
 /// The command that starts a worker process, without the flags that every worker gets.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -234,5 +234,5 @@ fn describe(ended: &io::Result<ExitStatus>) -> String {
 }
 
 fn is_hopeless(ended: &io::Result<ExitStatus>) -> bool {
-    ended.as_ref().is_ok_and(|status| status.code() == Some(HOPELESS))
+    ended.as_ref().is_ok_and(|status| status.code() == Some(NO_RETRY))
 }
