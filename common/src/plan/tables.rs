@@ -16,7 +16,7 @@ pub(super) const SUBSET_SHARD: usize = 32;
 pub(super) const FULL_SHARD: usize = 2048;
 
 /// Pixels per shard of the coarse picture's table: small enough to spread over several workers.
-pub(super) const COARSE_SHARD: usize = 512;
+pub(super) const COARSE_SHARD: usize = 1024;
 
 /// Knots per factor of two of width in full-resolution tables (design section 7: at least 5).
 pub(super) const FULL_PER_OCTAVE: f64 = 5.0;

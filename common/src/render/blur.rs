@@ -10,8 +10,15 @@
 //! `-2 (n.h) q.p - (q.p)^2 + (n.h)^2 |p|^2`.
 //!
 //! The means of both follow from three quadratic forms of `S`.
+//!
+//! A point may stand for a part of a pixel, over which normal and view [turn](super::point::Turn), independently of the light's spread. A
+//! turn `t` of the normal and `s` of the view turns the half vector by `g = (s - (h.s) h)/L` and changes `n.h` by `a = t.h + n.g`. As `n` and
+//! `h` stay unit vectors, `u` changes by `(n.h)^2 (|t|^2 + |g|^2) - 2 (n.h) t.g - a^2`, and its mean square change is `4 (n.h)^2 a^2`.
 
-use super::{point::Point, pyramid::Node};
+use super::{
+    point::{Point, Turn},
+    pyramid::Node,
+};
 use crate::math::{
     Vec3,
     lanes::{Lanes, Lanes3, cross, dot},
@@ -69,7 +76,7 @@ impl NodeLists {
     }
 }
 
-/// `f64` lanes of the longest register of any processor.
+/// `f64` lanes of the longest register that `pulp` uses.
 const LONGEST_REGISTER: usize = 8;
 
 struct Pass<'a> {
@@ -83,6 +90,7 @@ impl WithSimd for Pass<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
+        const { assert!(LONGEST_REGISTER.is_multiple_of(S::F64_LANES), "lists are padded to whole registers") };
         let NodeLists { centroid, covariance, radius } = self.nodes;
         let [x, y, z] = centroid.each_ref().map(|list| S::as_simd_f64s(list).0);
         let [a, b, c] = covariance.each_ref().map(|list| S::as_simd_f64s(list).0);
@@ -91,13 +99,14 @@ impl WithSimd for Pass<'_> {
         let [cos_i, cos_h, sin2_h, cos_d, du, du2] =
             [cos_i, cos_h, sin2_h, cos_d, du, du2].map(|list| S::as_mut_simd_f64s(list).0);
         let (normal, view) = (splat(simd, self.point.normal), splat(simd, self.point.view));
+        let extent = Extent::new(simd, self.point);
         for k in 0..radius.len() {
             let node = Block {
                 centroid: [Lanes::new(simd, x[k]), Lanes::new(simd, y[k]), Lanes::new(simd, z[k])],
                 covariance: [Lanes::new(simd, a[k]), Lanes::new(simd, b[k]), Lanes::new(simd, c[k])],
                 radius: Lanes::new(simd, radius[k]),
             };
-            let seen = node.seen_from(normal, view);
+            let seen = node.seen_from(normal, view, extent.as_ref());
             cos_i[k] = seen[0].value;
             cos_h[k] = seen[1].value;
             sin2_h[k] = seen[2].value;
@@ -123,7 +132,7 @@ struct Block<S: Simd> {
 impl<S: Simd> Block<S> {
     /// `cos_i`, `cos_h`, `sin2_h`, `cos_d`, `du` and `du2` at a surface point.
     #[inline(always)]
-    fn seen_from(&self, normal: Lanes3<S>, view: Lanes3<S>) -> [Lanes<S>; 6] {
+    fn seen_from(&self, normal: Lanes3<S>, view: Lanes3<S>, extent: Option<&Extent<S>>) -> [Lanes<S>; 6] {
         let centre = self.centroid;
         let half = [centre[0] + view[0], centre[1] + view[1], centre[2] + view[2]];
         let length2 = dot(half, half).max(f64::MIN_POSITIVE);
@@ -134,6 +143,12 @@ impl<S: Simd> Block<S> {
         let cos_h = dot(normal, half) * inverse;
         let sin2_h = dot(across, across) * (inverse * inverse);
         let cos_d = length2 * inverse * 0.5;
+
+        let cos2 = Lanes::splat_like(sin2_h, 1.0) - sin2_h;
+        let (of_extent, of_extent2) = match extent {
+            Some(extent) => extent.changes(half, inverse, cos_h, cos2),
+            None => (Lanes::splat_like(cos2, 0.0), Lanes::splat_like(cos2, 0.0)),
+        };
 
         let tangents = tangents(centre);
         let (normal, view) = (flat(normal, tangents), flat(view, tangents));
@@ -151,9 +166,68 @@ impl<S: Simd> Block<S> {
         let along2 = form(spread, offset, offset) * scale2;
         let step2 = (light2 - form(spread, half, half)) * scale2;
         let bend = (centroid_cos_i - cos_h * cos_d) * 0.5 * light2 * scale + form(spread, offset, half) * scale2;
-        let cos2 = Lanes::splat_like(light2, 1.0) - sin2_h;
-        let du = cos_h * bend * 2.0 + cos2 * step2 - along2;
-        [cos_i, cos_h, sin2_h, cos_d, du, cos2 * along2 * 4.0]
+        let du = cos_h * bend * 2.0 + cos2 * step2 - along2 + of_extent;
+        [cos_i, cos_h, sin2_h, cos_d, du, cos2 * along2 * 4.0 + of_extent2]
+    }
+}
+
+/// The [turn](super::point::Turn) of a point, the same in every lane.
+struct Extent<S: Simd> {
+    sides: [Side<S>; 2],
+}
+
+/// The turn along one side: `t` of the normal, `s` of the view.
+struct Side<S: Simd> {
+    normal: Lanes3<S>,
+    view: Lanes3<S>,
+    /// `n.s`, `|t|^2`, `|s|^2` and `t.s`.
+    products: [f64; 4],
+}
+
+impl<S: Simd> Extent<S> {
+    /// `None` for a point without extent.
+    #[inline(always)]
+    fn new(simd: S, point: &Point) -> Option<Self> {
+        if point.turn == Turn::default() {
+            return None;
+        }
+        Some(Self { sides: [Side::new(simd, point, 0), Side::new(simd, point, 1)] })
+    }
+
+    /// Mean and mean square change of `sin2_h`; `half` is not normalised, `inverse` is 1 over its length.
+    #[inline(always)]
+    fn changes(&self, half: Lanes3<S>, inverse: Lanes<S>, cos_h: Lanes<S>, cos2: Lanes<S>) -> (Lanes<S>, Lanes<S>) {
+        let scale = inverse.min(Lanes::splat_like(inverse, 0.5 / LEAST_COS_D));
+        let [a, b] = &self.sides;
+        let (a, b) = (a.changes(half, inverse, scale, cos_h, cos2), b.changes(half, inverse, scale, cos_h, cos2));
+        (a.0 + b.0, (a.1 + b.1) * cos2 * 4.0)
+    }
+}
+
+impl<S: Simd> Side<S> {
+    #[inline(always)]
+    fn new(simd: S, point: &Point, side: usize) -> Self {
+        let (normal, view) = (point.turn.normal[side], point.turn.view[side]);
+        let products = [point.normal.dot(view), normal.length_squared(), view.length_squared(), normal.dot(view)];
+        Self { normal: splat(simd, normal), view: splat(simd, view), products }
+    }
+
+    /// Mean change of `sin2_h` and mean square change of `cos_h`.
+    #[inline(always)]
+    fn changes(
+        &self,
+        half: Lanes3<S>,
+        inverse: Lanes<S>,
+        scale: Lanes<S>,
+        cos_h: Lanes<S>,
+        cos2: Lanes<S>,
+    ) -> (Lanes<S>, Lanes<S>) {
+        let [n_s, t2, s2, t_s] = self.products.map(|product| Lanes::splat_like(inverse, product));
+        let (t_h, s_h) = (dot(self.normal, half) * inverse, dot(self.view, half) * inverse);
+        let change = t_h + (n_s - cos_h * s_h) * scale;
+        let change2 = change * change;
+        let of_half2 = (s2 - s_h * s_h) * scale * scale;
+        (cos2 * (t2 + of_half2) - cos_h * (t_s - t_h * s_h) * scale * 2.0 - change2, change2)
     }
 }
 

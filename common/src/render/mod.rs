@@ -13,6 +13,7 @@ mod grid;
 pub mod image;
 pub mod integrator;
 pub mod knots;
+mod moments;
 pub mod point;
 pub mod pyramid;
 pub mod subset;

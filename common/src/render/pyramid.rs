@@ -5,58 +5,14 @@
 //! centre, so four quadrants suffice. The covariance of radiance and sin(theta) over a quadrant is neglected in the energy, but not in
 //! the centroid. Where a texel is too coarse for a lobe, [`Cell`]s finer than texels are computed on demand.
 
+pub use super::moments::Node;
+use super::moments::{Moments, Symmetric};
 use crate::{
     light::Environment,
-    math::{Vec3, elementary::sin_cos, frame::Frame, narrow, to_f32, widen},
+    math::{Vec3, elementary::sin_cos},
 };
-use glam::DMat3;
 use rayon::prelude::*;
 use std::f64::consts::{PI, TAU};
-
-/// Light from one node of the pyramid: a point with a spread.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Node {
-    /// Radiance integrated over solid angle, linear Rec. 709.
-    pub energy: [f32; 3],
-    /// Energy-weighted mean direction, normalised, world space.
-    pub centroid: [f32; 3],
-    /// Energy-weighted covariance of the directions about the centroid, in the tangent plane there: along the first axis of
-    /// [`Frame::from_normal`], mixed, along the second; square chords of the unit sphere.
-    pub covariance: [f32; 3],
-    /// Largest distance of a point of the node from the centroid, as a chord.
-    pub radius: f32,
-}
-
-impl Node {
-    /// Energy-weighted mean square distance from the centroid, as a chord of the unit sphere.
-    #[must_use]
-    #[inline]
-    pub fn spread2(&self) -> f64 {
-        f64::from(self.covariance[0]) + f64::from(self.covariance[2])
-    }
-
-    /// Energy-weighted mean of `(x - c)(x - c)^T` over the directions `x` of the node, `c` its centroid.
-    #[must_use]
-    #[inline]
-    pub fn spread(&self) -> DMat3 {
-        let Frame { tangent, bitangent, .. } = Frame::from_normal(widen(self.centroid));
-        let [a, b, c] = self.covariance.map(f64::from);
-        let (along, across) = (tangent * a + bitangent * b, tangent * b + bitangent * c);
-        outer(along, tangent) + outer(across, bitangent)
-    }
-
-    /// A node from the mean of its directions (not of unit length) and the mean of `(x - c)(x - c)^T`.
-    fn new(energy: [f32; 3], centroid: Vec3, spread: DMat3, radius: f64) -> Self {
-        let Frame { tangent, bitangent, .. } = Frame::from_normal(centroid);
-        let covariance =
-            [tangent.dot(spread * tangent), tangent.dot(spread * bitangent), bitangent.dot(spread * bitangent)];
-        Self { energy, centroid: narrow(centroid), covariance: covariance.map(to_f32), radius: to_f32(radius) }
-    }
-}
-
-fn outer(a: Vec3, b: Vec3) -> DMat3 {
-    DMat3::from_cols(a * b.x, a * b.y, a * b.z)
-}
 
 /// A rectangle of the map: level (negative is finer than texels), row and column at that level.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -160,56 +116,103 @@ impl LightPyramid {
     }
 
     fn sub_texel(&self, cell: Cell) -> Node {
-        let scale = f64::from(1u32 << cell.level.unsigned_abs());
-        let size = [self.environment.height() as f64 * scale, self.environment.width() as f64 * scale];
-        quadrant(&self.environment, f64::from(cell.row) / size[0], f64::from(cell.column) / size[1], size)
+        let parts = Quadrants::new(&self.environment, f64::from(1u32 << cell.level.unsigned_abs()));
+        let (row, column) = (f64::from(cell.row), f64::from(cell.column));
+        parts.moments(parts.row(row), parts.column(column)).node()
     }
 }
 
-/// The light of the rectangle whose top left corner is (v, u) and whose sides are 1/size of the map; it must lie within one
-/// bilinear patch.
-///
-/// Over a square of side 1 around 0 the density `1 + a s + b t + c s t` has the mean (a, b)/12, the mean squares 1/12 and the mean
-/// product c/144. Here `a`, `b`, `c` are the changes of the bilinear radiance over the rectangle, relative to its centre, and `b`
-/// holds that of sin(theta) too.
-fn quadrant(environment: &Environment, v: f64, u: f64, size: [f64; 2]) -> Node {
-    let (v_mid, u_mid) = (v + 0.5 / size[0], u + 0.5 / size[1]);
-    let (sin, cos) = sin_cos(PI * v_mid);
-    let (dtheta, dphi) = (PI / size[0], TAU / size[1]);
-    // Exact: integral of sin(theta) over the row is 2 sin(mid) sin(dtheta / 2).
-    let solid_angle = dphi * 2.0 * sin * sin_cos(0.5 * dtheta).0;
-    let (radiance, slopes) = environment.radiance_and_slopes(u_mid, v_mid);
-    let sum = radiance.element_sum();
-    // Slopes per texel become changes over the rectangle, relative to the radiance.
-    let side = environment.height() as f64 / size[0];
-    let [a, b, c] = if sum > 0.0 { slopes.map(|slope| slope * side / sum) } else { [0.0; 3] };
-    let (s, t) = (a / 12.0, (b + dtheta * cos / sin) / 12.0);
-    let centroid = environment.direction(u_mid + s / size[1], v_mid + t / size[0]);
+/// Equal rectangles of the map in (u, v), each within one bilinear patch: `scale` of them, a power of two, along each side of a texel.
+struct Quadrants<'a> {
+    environment: &'a Environment,
+    /// Rectangles along the map's height and width.
+    size: [f64; 2],
+    dtheta: f64,
+    dphi: f64,
+    /// Sine of half of `dtheta`.
+    half: f64,
+}
 
-    let width = sin * dphi;
-    let east = centroid.cross(Vec3::Y).normalize_or(Vec3::X);
-    let south = centroid.cross(east);
-    let mixed = width * dtheta * (c * side / 144.0 - s * t);
-    let spread = outer(east, east) * (width * width * (1.0 / 12.0 - s * s))
-        + outer(south, south) * (dtheta * dtheta * (1.0 / 12.0 - t * t))
-        + (outer(east, south) + outer(south, east)) * mixed;
-    // Rows widen towards the equator: take the wider edge. The centroid lies within 2/9 of the sides of the middle (a quadrant at a
-    // pole, whose density grows away from it and towards a bright texel).
-    let wider = width + dtheta * dphi;
-    let radius = (0.5 + 2.0 / 9.0) * (dtheta * dtheta + wider * wider).sqrt();
-    Node::new(narrow(radiance * solid_angle), centroid, spread, radius)
+/// The middle of a row or column of quadrants: its place on the map, sine and cosine of its angle.
+#[derive(Clone, Copy)]
+struct Middle {
+    place: f64,
+    sin: f64,
+    cos: f64,
+}
+
+impl<'a> Quadrants<'a> {
+    fn new(environment: &'a Environment, scale: f64) -> Self {
+        let size = [environment.height() as f64 * scale, environment.width() as f64 * scale];
+        let (dtheta, dphi) = (PI / size[0], TAU / size[1]);
+        Self { environment, size, dtheta, dphi, half: sin_cos(0.5 * dtheta).0 }
+    }
+
+    fn row(&self, row: f64) -> Middle {
+        let place = (row + 0.5) / self.size[0];
+        let (sin, cos) = sin_cos(PI * place);
+        Middle { place, sin, cos }
+    }
+
+    fn column(&self, column: f64) -> Middle {
+        let place = (column + 0.5) / self.size[1];
+        let (sin, cos) = sin_cos(TAU * place - self.environment.rotation_deg().to_radians());
+        Middle { place, sin, cos }
+    }
+
+    /// The light of one rectangle.
+    ///
+    /// Over a square of side 1 around 0 the density `1 + a s + b t + c s t` has the mean (a, b)/12, the mean squares 1/12 and the mean
+    /// product c/144. Here `a`, `b`, `c` are the changes of the bilinear radiance over the rectangle, relative to its middle, and `b`
+    /// holds that of sin(theta) too.
+    fn moments(&self, row: Middle, column: Middle) -> Moments {
+        let Self { environment, size, dtheta, dphi, half } = *self;
+        // Exact: integral of sin(theta) over the row is 2 sin(middle) sin(dtheta / 2).
+        let solid_angle = dphi * 2.0 * row.sin * half;
+        let (radiance, slopes) = environment.radiance_and_slopes(column.place, row.place);
+        let sum = radiance.element_sum();
+        // Slopes per texel become changes over the rectangle, relative to the radiance.
+        let side = environment.height() as f64 / size[0];
+        let [a, b, c] = if sum > 0.0 { slopes.map(|slope| slope * side / sum) } else { [0.0; 3] };
+        let (s, t) = (a / 12.0, (b + dtheta * row.cos / row.sin) / 12.0);
+        let ((sin_theta, cos_theta), (sin_phi, cos_phi)) = (row.turned(t * dtheta), column.turned(s * dphi));
+        let centroid = Vec3::new(sin_theta * sin_phi, cos_theta, -sin_theta * cos_phi);
+
+        let width = row.sin * dphi;
+        let east = Vec3::new(cos_phi, 0.0, sin_phi);
+        let south = centroid.cross(east);
+        let mixed = width * dtheta * (c * side / 144.0 - s * t);
+        let spread = Symmetric::square(east) * (width * width * (1.0 / 12.0 - s * s))
+            + Symmetric::square(south) * (dtheta * dtheta * (1.0 / 12.0 - t * t))
+            + Symmetric::product(east, south) * mixed;
+        // Rows widen towards the equator: take the wider edge. The centroid lies within 2/9 of the sides of the middle (a rectangle at
+        // a pole, whose density grows away from it and towards a bright texel).
+        let wider = width + dtheta * dphi;
+        let radius = (0.5 + 2.0 / 9.0) * (dtheta * dtheta + wider * wider).sqrt();
+        Moments { energy: radiance * solid_angle, centroid, spread, radius }
+    }
+}
+
+impl Middle {
+    /// Sine and cosine of the middle's angle plus a small one: of less than a radian, with an error of its ninth power / 9!.
+    fn turned(self, by: f64) -> (f64, f64) {
+        let x = by * by;
+        let sin = by * (1.0 - x / 6.0 * (1.0 - x / 20.0 * (1.0 - x / 42.0)));
+        let cos = 1.0 - x / 2.0 * (1.0 - x / 12.0 * (1.0 - x / 30.0 * (1.0 - x / 56.0)));
+        (self.sin * cos + self.cos * sin, self.cos * cos - self.sin * sin)
+    }
 }
 
 fn texel_level(environment: &Environment) -> Level {
     let (height, width) = (environment.height(), environment.width());
-    let size = [2.0 * height as f64, 2.0 * width as f64];
+    let parts = Quadrants::new(environment, 2.0);
+    let columns: Vec<Middle> = (0..2 * width).map(|j| parts.column(j as f64)).collect();
     let nodes = (0..height).into_par_iter().flat_map_iter(|i| {
+        let rows = [2 * i, 2 * i + 1].map(|row| parts.row(row as f64));
+        let (parts, columns) = (&parts, &columns);
         (0..width).map(move |j| {
-            let quadrants: [Node; 4] = std::array::from_fn(|k| {
-                let (v, u) = ((2 * i + k / 2) as f64 / size[0], (2 * j + k % 2) as f64 / size[1]);
-                quadrant(environment, v, u, size)
-            });
-            join(&quadrants)
+            let quadrant = |k: usize| parts.moments(rows[k / 2], columns[2 * j + k % 2]);
+            Moments::join(&std::array::from_fn::<_, 4, _>(quadrant)).node()
         })
     });
     let count = |n: usize| u32::try_from(n).unwrap_or(u32::MAX);
@@ -224,29 +227,13 @@ fn coarsen(fine: &Level) -> Level {
             for k in 0..4 {
                 let (r, c) = (2 * row + k / 2, 2 * column + k % 2);
                 if r < fine.rows && c < fine.columns {
-                    children.push(fine.nodes[r as usize * fine.columns as usize + c as usize]);
+                    children.push(Moments::from(&fine.nodes[r as usize * fine.columns as usize + c as usize]));
                 }
             }
-            join(&children)
+            Moments::join(&children).node()
         })
     });
     Level { rows, columns, nodes: nodes.collect() }
-}
-
-/// Joins nodes: energies add, the centroid is their energy-weighted mean, covariances add by the parallel axis theorem.
-fn join(parts: &[Node]) -> Node {
-    let weight = |n: &Node| f64::from(n.energy.iter().sum::<f32>());
-    let total: f64 = parts.iter().map(weight).sum();
-    // A node without energy still has a centroid and a spread.
-    let share = |n: &Node| if total > 0.0 { weight(n) / total } else { 1.0 / parts.len() as f64 };
-    let mean: Vec3 = parts.iter().map(|n| widen(n.centroid) * share(n)).sum();
-    let centroid = mean.normalize_or(widen(parts[0].centroid));
-    let offset = |n: &Node| widen(n.centroid) - centroid;
-    let shares = parts.iter().map(|n| (n.spread() + outer(offset(n), offset(n))) * share(n));
-    let spread = shares.fold(DMat3::ZERO, |sum, part| sum + part);
-    let radius = parts.iter().map(|n| offset(n).length() + f64::from(n.radius)).fold(0.0, f64::max);
-    let energy = std::array::from_fn(|c| parts.iter().map(|n| n.energy[c]).sum());
-    Node::new(energy, centroid, spread, radius)
 }
 
 /// The strongest channel.
@@ -258,7 +245,10 @@ pub fn strongest(energy: [f32; 3]) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{image::Image, math::Rgb};
+    use crate::{
+        image::Image,
+        math::{Rgb, widen},
+    };
 
     /// The sum over the coarsest cells.
     fn root_energy(pyramid: &LightPyramid) -> Rgb {

@@ -123,22 +123,18 @@ impl Geometry {
         self.coverage(column, row) == 1.0 && self.normal_map().is_none_or(|map| map.is_interior(column, row))
     }
 
-    /// The largest angle between normals of a pixel, in radians, of those at its centre and its corners that lie on the
-    /// object. 0 if fewer than two of these points do.
+    /// How far the normal turns over a pixel against the half vector of a distant light, in radians: between the middles of the left and right edge,
+    /// and of the top and bottom edge. The half vector turns against the normal by half as far as the direction to the camera
+    /// does (by more for light at grazing angles). 0 where an edge's middle is not on the object.
     #[must_use]
-    pub fn normal_spread(&self, column: usize, row: usize) -> f64 {
-        let (x, y) = (column as f64, row as f64);
-        let normals = [(0.5, 0.5), (0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)]
-            .map(|(dx, dy)| self.point(x + dx, y + dy).map(|point| point.normal));
-        let mut widest = 0.0_f64;
-        for (k, first) in normals.iter().enumerate() {
-            for second in &normals[..k] {
-                if let (Some(a), Some(b)) = (first, second) {
-                    widest = widest.max(angle(a.cross(*b).length(), a.dot(*b)));
-                }
-            }
-        }
-        widest
+    pub fn normal_turns(&self, column: usize, row: usize) -> [f64; 2] {
+        let at = |x: f64, y: f64| self.point(column as f64 + x, row as f64 + y);
+        [[(0.0, 0.5), (1.0, 0.5)], [(0.5, 0.0), (0.5, 1.0)]].map(|[from, to]| {
+            at(from.0, from.1).zip(at(to.0, to.1)).map_or(0.0, |(a, b)| {
+                let of_normal = angle(a.normal.cross(b.normal).length(), a.normal.dot(b.normal));
+                of_normal + 0.5 * (a.view - b.view).length()
+            })
+        })
     }
 }
 

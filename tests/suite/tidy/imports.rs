@@ -36,7 +36,7 @@ const COORDINATOR: MayImport = &[
     ("events", &[]),
     ("journal", &["actions", "atomic", "events", "state"]),
     ("limits", &[]),
-    ("metrics", &["events", "runner"]),
+    ("metrics", &["events", "limits", "runner"]),
     ("policy", &[]),
     ("reactor", &["actions", "events", "policy", "state"]),
     ("rpc", &["events", "limits", "policy", "reactor", "tls"]),
@@ -54,7 +54,7 @@ const APP: MayImport = &[
     ("cli", &["commands", "exit", "problems", "settings", "wrap"]),
     (
         "commands",
-        &["batch", "demo", "exit", "fit", "inputs", "outputs", "progress", "settings", "slurm", "study", "wrap"],
+        &["batch", "demo", "exit", "fit", "inputs", "outputs", "progress", "run", "settings", "slurm", "study", "wrap"],
     ),
     ("demo", &[]),
     ("exit", &[]),

@@ -157,6 +157,8 @@ fn every_node_of_a_fit_is_work_of_its_stage() {
     assert_eq!(places, (0..outcome.judged.len()).collect::<Vec<_>>());
     assert_eq!(of(nodes::SELECT), [Work::StageTwo]);
     assert!(of(nodes::POLISH).iter().all(|work| *work == Work::StageThree) && !of(nodes::POLISH).is_empty());
+    let coarse = of(nodes::TRANSPORT_COARSE);
+    assert!(coarse.iter().all(|work| *work == Work::StageThree) && !coarse.is_empty());
     // The table that the candidates are judged on comes before that of polish.
     let full = of(nodes::TRANSPORT_FULL);
     assert_eq!(full.first(), Some(&Work::StageTwo));

@@ -162,3 +162,38 @@ fn grazing_views_reflect_the_albedo_of_the_lobe() {
         assert!((found - expected).abs() < TOLERANCE, "alpha {alpha} cos_o {cos_o}: {found} {expected}");
     }
 }
+
+/// The mean of a lobe over a part of a pixel, against many positions in it: seen by parallel rays and by a pinhole close by.
+#[test]
+fn the_mean_over_a_turning_point_is_that_of_many_positions() {
+    for position in [None, Some(Vec3::new(0.3, 0.1, 2.2))] {
+        let at = |x: f64, y: f64| {
+            let normal = Vec3::new(0.3 + x, -0.2 + y, (1.0_f64 - (0.3 + x) * (0.3 + x) - (y - 0.2) * (y - 0.2)).sqrt());
+            let view = position.map_or(Vec3::Z, |camera: Vec3| (camera - normal).normalize());
+            Point::new(normal, view).unwrap()
+        };
+        const SIDE: f64 = 0.04;
+        let half = 0.5 * SIDE;
+        let turn = |of: fn(&Point) -> Vec3| {
+            [(half, 0.0), (0.0, half)].map(|(x, y)| (of(&at(x, y)) - of(&at(-x, -y))) / f64::sqrt(12.0))
+        };
+        let turn = Turn { normal: turn(|p| p.normal), view: turn(|p| p.view) };
+        let middle = at(0.0, 0.0);
+        let mirror = (middle.normal * (2.0 * middle.cos_o) - middle.view).normalize();
+        for offset in [Vec3::ZERO, Vec3::new(0.05, 0.0, 0.02), Vec3::new(0.0, -0.12, 0.05)] {
+            let light = node(&[(mirror + offset).normalize()]);
+            let width = 0.1;
+            let value = |point: &Point| {
+                let (angles, spread) = seen_from(&light, point).unwrap();
+                brdf::Model::lobes(&brdf::Ggx)[1].lobe.kernel(&angles, &spread, width)
+            };
+            let many: Vec<f64> = (0..400)
+                .map(|k| value(&at(SIDE * (f64::from(k % 20) - 9.5) / 20.0, SIDE * (f64::from(k / 20) - 9.5) / 20.0)))
+                .collect();
+            let exact = many.iter().sum::<f64>() / 400.0;
+            let (ours, without) = (value(&Point { turn, ..middle }), value(&middle));
+            println!("{position:?} {offset}: {exact:.4} {ours:.4} {without:.4}");
+            assert!((ours - exact).abs() < 0.15 * (without - exact).abs() + 2e-3 * exact, "{position:?} {offset}");
+        }
+    }
+}

@@ -34,20 +34,20 @@ fn a_sphere_smaller_than_a_pixel_has_its_area() {
     let geometry = Geometry::sphere(4, 4, Circle { x: 1.5, y: 1.5, radius: 0.3 }, Camera::Orthographic).unwrap();
     assert!((geometry.coverage(1, 1) - 0.283).abs() < 0.01, "{}", geometry.coverage(1, 1));
     assert_eq!(geometry.coverage(2, 1), 0.0);
-    assert_eq!(geometry.normal_spread(1, 1), 0.0);
+    assert_eq!(geometry.normal_turns(1, 1), [0.0; 2]);
 }
 
 #[test]
-fn normal_spread_has_the_designs_value_in_the_middle_and_grows_towards_the_edge() {
+fn normal_turns_have_the_designs_value_in_the_middle_and_grow_towards_the_edge() {
     // Design section 5: at 256 pixels a pixel at the centre of a mirror sphere sees 0.9 degrees of the map, so its
-    // normal changes by half of that. The spread is across the diagonal.
+    // normal changes by half of that.
     let geometry = Geometry::sphere(256, 256, Circle::inscribed(256, 256), Camera::Orthographic).unwrap();
-    let middle = geometry.normal_spread(128, 128).to_degrees();
-    assert!((middle - 0.45 * std::f64::consts::SQRT_2).abs() < 0.01, "{middle}");
-    let outer = geometry.normal_spread(128 + 115, 128).to_degrees();
-    assert!(outer > 1.9 * 0.45 && outer < 4.0 * 0.45, "{outer}");
-    let edge = geometry.normal_spread(255, 128);
-    assert!(edge.is_finite() && edge < 1.6);
+    let [x, y] = geometry.normal_turns(128, 128).map(f64::to_degrees);
+    assert!((x - 0.45).abs() < 0.01 && (y - 0.45).abs() < 0.01, "{x} {y}");
+    // Across the silhouette, not along it.
+    let [x, y] = geometry.normal_turns(128 + 115, 128).map(f64::to_degrees);
+    assert!(x > 1.9 * 0.45 && x < 4.0 * 0.45 && (y - 0.45).abs() < 0.01, "{x} {y}");
+    assert!(geometry.normal_turns(255, 128).iter().all(|turn| turn.is_finite() && *turn < 1.6));
 }
 
 #[test]
