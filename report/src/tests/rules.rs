@@ -37,7 +37,7 @@ fn with_few_gammas(more: f64) -> StudyData {
 #[test]
 fn all_pixels_of_few_exponents_are_compared_with_samples_of_the_same() {
     // At gamma 1, 2 and 3 samples are at best .009 above the base, .004 at all of their exponents.
-    let (verdict, words) = finding(&with_few_gammas(0.0095), "full", "differs from that of all pixels");
+    let (verdict, words) = finding(&with_few_gammas(0.0095), "full", "differs from that from all pixels");
     assert_eq!(verdict, Verdict::Confirmed, "{words}");
     assert!(words.contains("by 0.0005 on average over 9 cells") && words.contains("best of 3 exponents"), "{words}");
     assert_eq!(finding(&with_few_gammas(0.003), "full", "differs").0, Verdict::NotDecided);
