@@ -205,6 +205,25 @@ mod tests {
         }
     }
 
+    /// A lobe around a fixed direction, as wide as 1 / .22 nodes: also over the axis and up to the edge.
+    #[test]
+    fn lobes_are_interpolated_to_three_thousandths_of_their_peak() {
+        for viewpoint in viewpoints() {
+            let grid = Grid::new(viewpoint, 0.22 * 0.3);
+            for centre in [Vec3::Z, Vec3::new(0.1, 0.1, 1.0), Vec3::X, Vec3::new(-1.0, 0.3, 0.5)].map(Vec3::normalize) {
+                let lobe = |normal: Vec3| {
+                    let x2 = normal.cross(centre).length_squared() / 0.09;
+                    1.0 / ((1.0 + x2) * (1.0 + x2))
+                };
+                for normal in normals(viewpoint) {
+                    let value = |w: &Weighted| w.value * lobe(grid.point(w.node).unwrap().normal);
+                    let sum: f64 = grid.stencil(normal).iter().map(value).sum();
+                    assert!((sum - lobe(normal)).abs() < 3e-3, "{viewpoint:?} {normal}: {sum} {}", lobe(normal));
+                }
+            }
+        }
+    }
+
     #[test]
     fn nodes_of_a_patch_lie_together() {
         let grid = Grid::new(Viewpoint::Distant(Vec3::Z), 0.05);

@@ -76,6 +76,28 @@ fn unrequested_answers_and_false_hashes_end_the_membership() {
     }
 }
 
+/// A late request of an honest worker looks the same, so the worker stays a member.
+#[test]
+fn blobs_that_no_lease_of_the_worker_reads_are_not_sent() {
+    let gate = Gate::new();
+    let cluster = run_at_the_gate(&gate);
+    let waiting = gate.next();
+    let mut false_worker = join(&cluster.access(), 1);
+    // The second is the input of the node at the gate: it exists, but this worker was not assigned the node.
+    for hash in [[1; 32], BlobHash::of(&[]).0] {
+        say(&mut false_worker, &ToCoordinator::Fetch { hash });
+    }
+    let mut heartbeats = 0;
+    hear(&mut false_worker, |message| {
+        assert!(!matches!(message, ToWorker::Blob { .. }), "{message:?}");
+        heartbeats += usize::from(matches!(message, ToWorker::Heartbeat));
+        (heartbeats == 3).then_some(())
+    });
+    waiting.release();
+    assert!(cluster.finish().0.is_some());
+    let _ = read_to_the_end(false_worker);
+}
+
 #[test]
 fn truncated_frame_ends_only_its_connection() {
     for says_farewell in [true, false] {

@@ -77,14 +77,13 @@ pub(super) struct View<'a> {
 
 impl View<'_> {
     /// The parts of a pixel.
-    pub(super) fn parts(&self, [column, row]: Pixel, Slice { lobe, band, .. }: Slice<'_>) -> Vec<Part> {
-        let surface = |x: f64, y: f64| self.geometry.point(f64::from(column) + x, f64::from(row) + y);
-        let (c, r) = (column as usize, row as usize);
+    pub(super) fn parts(&self, pixel: Pixel, Slice { lobe, band, .. }: Slice<'_>) -> Vec<Part> {
+        let [c, r] = pixel.map(|x| x as usize);
         if self.geometry.coverage(c, r) < 1.0 {
-            return footprint::on_object(self.accuracy.silhouette(), |x, y| surface(x, y).is_some());
+            return footprint::on_object(self.accuracy.silhouette(), |x, y| self.surface(pixel, [x, y]).is_some());
         }
         let turns = self.geometry.normal_turns(c, r).map(|turn| turn / self.accuracy.footprint);
-        let cos_o = surface(0.5, 0.5).map_or(1.0, |surface| surface.normal.dot(surface.view));
+        let cos_o = self.surface(pixel, [0.5; 2]).map_or(1.0, |surface| surface.normal.dot(surface.view));
         let width = lobe.footprint(band.sharpest(), cos_o);
         if !matches!(band, Band::Glossy(..)) {
             return footprint::parts(turns, width, width);
