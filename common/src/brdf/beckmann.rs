@@ -1,6 +1,9 @@
 //! Beckmann's distribution of microfacet normals, which several models share.
 
-use super::{Angles, Spread, lobe::second_order};
+use super::{
+    Angles, Spread,
+    lobe::{LEAST_COS2, second_order},
+};
 use crate::math::elementary::exp_nonpositive;
 use std::f64::consts::PI;
 
@@ -11,7 +14,7 @@ use std::f64::consts::PI;
 #[inline(always)]
 pub(super) fn beckmann(g: &Angles, spread: &Spread, m: f64) -> (f64, f64) {
     let m2 = m * m;
-    let cos2 = (g.cos_h * g.cos_h).max(f64::MIN_POSITIVE);
+    let cos2 = (g.cos_h * g.cos_h).max(LEAST_COS2);
     let distribution = exp_nonpositive(-g.sin2_h / (cos2 * m2)) / (PI * m2 * cos2 * cos2);
     let inverse = 1.0 / cos2;
     let sharpness = inverse / m2;

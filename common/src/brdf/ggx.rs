@@ -14,7 +14,9 @@
 //! | `alpha` | microfacet width (an artist's roughness is its square root) | [0.005, 1] |
 
 use super::{
-    Angles, BasisLobe, Lambert, LinearModel, Lobe, Parameter, Split, Spread, Weight, Width, lobe::second_order,
+    Angles, BasisLobe, Lambert, Lights, LinearModel, Lobe, Parameter, Split, Spread, Weight, Width,
+    lobe::second_order,
+    single::{self, SingleLobe, single},
 };
 use std::f64::consts::FRAC_1_PI;
 
@@ -74,5 +76,43 @@ impl Lobe for GgxLobe {
         let inverse = 1.0 / (d * d * visibility);
         let excess = k * (3.0 * k * spread.du2 - 2.0 * d * spread.du);
         a2 * cos_i * second_order(excess * visibility * inverse) * inverse * (0.5 * FRAC_1_PI)
+    }
+
+    fn accumulate(&self, lights: &Lights, cos_o: f64, share: f64, widths: &[f64], sums: &mut [f64]) {
+        single::accumulate::<Self>(self.split(), lights, cos_o, share, widths, sums);
+    }
+}
+
+/// What the kernel needs of a width and the viewer, in single precision.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct SingleWidth {
+    a2: f32,
+    k: f32,
+    cos_o: f32,
+    s_o: f32,
+    scale: f32,
+}
+
+impl SingleLobe for GgxLobe {
+    type Width = SingleWidth;
+
+    fn width(alpha: f64, cos_o: f64) -> SingleWidth {
+        let a2 = alpha * alpha;
+        let k = 1.0 - a2;
+        let s_o = (a2 + k * cos_o * cos_o).sqrt();
+        let [a2, k, cos_o, s_o, scale] = single([a2, k, cos_o, s_o, a2 * 0.5 * FRAC_1_PI]);
+        SingleWidth { a2, k, cos_o, s_o, scale }
+    }
+
+    #[inline(always)]
+    fn kernel(width: SingleWidth, cos_i: f32, sin2_h: f32, du: f32, du2: f32) -> f32 {
+        let SingleWidth { a2, k, cos_o, s_o, scale } = width;
+        let d = a2 + k * sin2_h;
+        let s_i = (a2 + k * cos_i * cos_i).sqrt();
+        let visibility = cos_i * s_o + cos_o * s_i;
+        let inverse = 1.0 / (d * d * visibility);
+        let excess = k * (3.0 * k * du2 - 2.0 * d * du);
+        let second_order = (1.0 + excess * visibility * inverse).clamp(0.25, 2.0);
+        scale * cos_i * second_order * inverse
     }
 }

@@ -1,6 +1,6 @@
 //! One basis lobe, and the loop that integrates it for many widths at once.
 
-use super::Angles;
+use super::{Angles, Lights};
 use crate::math::simd;
 use std::fmt::Debug;
 
@@ -22,17 +22,6 @@ pub enum Tail {
     Long,
 }
 
-/// One direction of incoming light with the energy that arrives from it.
-#[derive(Debug, Clone, Copy)]
-pub struct Incident {
-    /// Its angles at the surface point.
-    pub angles: Angles,
-    /// Radiance times solid angle, linear Rec. 709 (times any quadrature weight).
-    pub energy: [f64; 3],
-    /// How far the light is spread around its direction.
-    pub spread: Spread,
-}
-
 /// The effect of the spread of light around its mean direction on the half vector's angle; `n.l` is that of the mean direction.
 ///
 /// With `u = sin^2(th)`, `th` the angle between half vector and normal, a lobe of distribution `D(u)` has the mean `D + D' du +
@@ -44,6 +33,9 @@ pub struct Spread {
     /// Mean square change of `sin^2(th)`.
     pub du2: f64,
 }
+
+/// The least square of `n.h` by which a kernel divides: single precision may round it to 0, and sharp lobes are dark there.
+pub(super) const LEAST_COS2: f64 = 1e-12;
 
 /// The factor `1 + x` of a second-order correction, clamped to the range in which a second-order expansion holds.
 #[inline(always)]
@@ -99,12 +91,12 @@ pub trait Lobe: Debug + Sync {
         self.kernel(angles, &Spread::default(), width)
     }
 
-    /// Adds the lobe's basis integrals over `incident`, for every width.
+    /// Adds the lobe's basis integrals over `lights`, for every width.
     ///
-    /// `sums` has shape `term x channel x width` and grows by `sum over incident of energy * split_t * lobe(width)`.
-    /// `cos_o` is that of all `incident`. It is a separate argument so that the terms that depend on it alone leave the loop.
-    fn accumulate(&self, incident: &[Incident], cos_o: f64, widths: &[f64], sums: &mut [f64]) {
-        simd::dispatch(Accumulate { lobe: self, incident, cos_o, widths, sums });
+    /// `sums` has shape `term x channel x width` and grows by `share * sum over lights of energy * split_t * lobe(width)`.
+    /// `cos_o` is the `n.v` of the surface point.
+    fn accumulate(&self, lights: &Lights, cos_o: f64, share: f64, widths: &[f64], sums: &mut [f64]) {
+        simd::dispatch(Accumulate { lobe: self, lights, cos_o, share, widths, sums });
     }
 }
 
@@ -138,8 +130,9 @@ const LANES: usize = 8;
 /// order, so all SIMD levels give the same bits.
 struct Accumulate<'a, L: ?Sized> {
     lobe: &'a L,
-    incident: &'a [Incident],
+    lights: &'a Lights,
     cos_o: f64,
+    share: f64,
     widths: &'a [f64],
     sums: &'a mut [f64],
 }
@@ -155,35 +148,34 @@ impl<L: Lobe + ?Sized> pulp::NullaryFnOnce for Accumulate<'_, L> {
             // Unused lanes repeat the last width; their sums are dropped.
             let widths: [f64; LANES] = std::array::from_fn(|k| self.widths[first + k.min(lanes - 1)]);
             let mut total = [[[0.0; LANES]; 3]; 2];
-            for light in self.incident {
+            for light in (0..self.lights.len()).filter(|&light| self.lights.cos_i[light] > 0.0) {
                 let mut value = [0.0; LANES];
-                let angles = Angles { cos_o: self.cos_o, ..light.angles };
+                let (angles, spread) = self.lights.at(light, self.cos_o);
                 for (v, &width) in value.iter_mut().zip(&widths) {
-                    *v = self.lobe.kernel(&angles, &light.spread, width);
+                    *v = self.lobe.kernel(&angles, &spread, width);
                 }
-                add(split, light, &value, &mut total);
+                let [red, green, blue] = &self.lights.energy;
+                let energy = [red[light], green[light], blue[light]].map(f64::from);
+                add(split, angles.f5(), energy, &value, &mut total);
             }
             let terms = if split == Split::Whole { 1 } else { 2 };
             for (row, lane_sums) in total[..terms].iter().flatten().enumerate() {
                 let out = &mut self.sums[row * count + first..][..lanes];
-                out.iter_mut().zip(lane_sums).for_each(|(s, t)| *s += t);
+                out.iter_mut().zip(lane_sums).for_each(|(s, t)| *s += self.share * t);
             }
         }
     }
 }
 
 #[inline(always)]
-fn add(split: Split, light: &Incident, value: &[f64; LANES], total: &mut [[[f64; LANES]; 3]; 2]) {
+fn add(split: Split, f5: f64, energy: [f64; 3], value: &[f64; LANES], total: &mut [[[f64; LANES]; 3]; 2]) {
     let parts = match split {
         Split::Whole => [1.0, 0.0],
-        Split::Schlick => {
-            let f5 = light.angles.f5();
-            [1.0 - f5, f5]
-        }
+        Split::Schlick => [1.0 - f5, f5],
     };
     let terms = if split == Split::Whole { 1 } else { 2 };
     for (part, sums) in parts[..terms].iter().zip(total) {
-        for (energy, sum) in light.energy.iter().zip(sums) {
+        for (energy, sum) in energy.iter().zip(sums) {
             let weight = part * energy;
             sum.iter_mut().zip(value).for_each(|(s, v)| *s += weight * v);
         }

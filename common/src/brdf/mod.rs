@@ -21,6 +21,7 @@ mod disney;
 mod ggx;
 mod ggx_f90;
 mod lambert;
+mod lights;
 mod linear;
 mod lobe;
 pub mod merl;
@@ -28,6 +29,7 @@ mod model;
 mod parameter;
 mod power;
 mod reflectance;
+mod single;
 mod ward;
 mod width;
 
@@ -39,8 +41,11 @@ pub use disney::Disney;
 pub use ggx::Ggx;
 pub use ggx_f90::GgxF90;
 pub use lambert::Lambert;
+#[cfg(test)]
+pub(crate) use lights::Incident;
+pub use lights::{BLOCK, Lights};
 pub use linear::{LinearModel, Weight};
-pub use lobe::{Expected, Incident, Lobe, Split, Spread, Tail};
+pub use lobe::{Expected, Lobe, Split, Spread, Tail};
 pub use model::{BasisLobe, Model, lobe_terms, term_count};
 pub use parameter::{Channels, Parameter, ParameterError, Role, Scale, flat_bounds, flat_len, flat_names, offset_of};
 pub use reflectance::{Material, Reflectance};

@@ -148,19 +148,20 @@ impl Environment {
         Rgb::new(r, g, b)
     }
 
-    /// Radiance at a point of the map, and the derivatives of its sum over the channels, per texel: along u, along v,
-    /// and the mixed second derivative.
+    /// The four texels around a point of the map (upper left, upper right, lower left, lower right) and the point's place between them:
+    /// 0 at the left and upper ones, 1 at the right and lower ones.
     #[must_use]
     #[inline]
-    pub fn radiance_and_slopes(&self, u: f64, v: f64) -> (Rgb, [f64; 3]) {
-        let place = self.place([u, v]);
-        let [r, g, b, _] = self.bilinear(place);
-        let sum = |node: usize| self.nodes[node][..3].iter().map(|&x| f64::from(x)).sum::<f64>();
-        let Place { node, s, t } = place;
-        let [upper, lower] = [node, node + self.stride].map(|left| (sum(left), sum(left + 1)));
-        let along = (1.0 - t) * (upper.1 - upper.0) + t * (lower.1 - lower.0);
-        let down = (1.0 - s) * (lower.0 - upper.0) + s * (lower.1 - upper.1);
-        (Rgb::new(r, g, b), [along, down, (lower.1 - lower.0) - (upper.1 - upper.0)])
+    pub(crate) fn corners(&self, uv: [f64; 2]) -> ([&[f32; 4]; 4], [f64; 2]) {
+        let Place { node, s, t } = self.place(uv);
+        let rows = &self.nodes[node..node + self.stride + 2];
+        ([&rows[0], &rows[1], &rows[self.stride], &rows[self.stride + 1]], [s, t])
+    }
+
+    /// A row of texels with the neighbours of its ends, and row 0 and the last beyond the poles: red, green, blue and a node of the
+    /// sampling density.
+    pub(crate) fn bordered_row(&self, row: usize) -> &[[f32; 4]] {
+        &self.nodes[row * self.stride..][..self.stride]
     }
 
     /// Solid angle in steradians of each texel of row `i`.

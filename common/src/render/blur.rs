@@ -15,13 +15,11 @@
 //! turn `t` of the normal and `s` of the view turns the half vector by `g = (s - (h.s) h)/L` and changes `n.h` by `a = t.h + n.g`. As `n` and
 //! `h` stay unit vectors, `u` changes by `(n.h)^2 (|t|^2 + |g|^2) - 2 (n.h) t.g - a^2`, and its mean square change is `4 (n.h)^2 a^2`.
 
-use super::{
-    point::{Point, Turn},
-    pyramid::Node,
-};
+use super::point::{Point, Turn};
+use crate::brdf::{BLOCK, Lights};
 use crate::math::{
     Vec3,
-    lanes::{Lanes, Lanes3, cross, dot},
+    lanes::{Lanes, Lanes3, Single, Vector, cross, dot},
     simd::dispatch,
 };
 use pulp::{Simd, WithSimd};
@@ -30,59 +28,29 @@ use pulp::{Simd, WithSimd};
 /// bound.
 pub(super) const LEAST_COS_D: f64 = 0.05;
 
-/// Nodes as one list for each of their numbers, padded to whole registers.
+/// Nodes as one list for each of their numbers but their energies, padded to whole registers.
 #[derive(Debug, Default)]
 pub(super) struct NodeLists {
-    centroid: [Vec<f64>; 3],
-    covariance: [Vec<f64>; 3],
-    radius: Vec<f64>,
-}
-
-/// How a surface point sees them: their angles and the effect of their spread, one list each.
-#[derive(Debug, Default)]
-pub(super) struct SeenLists {
-    /// 0 for a node that is below the horizon.
-    pub(super) cos_i: Vec<f64>,
-    pub(super) cos_h: Vec<f64>,
-    pub(super) sin2_h: Vec<f64>,
-    pub(super) cos_d: Vec<f64>,
-    pub(super) du: Vec<f64>,
-    pub(super) du2: Vec<f64>,
+    pub(super) centroid: [Vec<f32>; 3],
+    pub(super) covariance: [Vec<f32>; 3],
+    pub(super) radius: Vec<f32>,
 }
 
 impl NodeLists {
-    /// Replaces the nodes.
-    pub(super) fn set(&mut self, nodes: &[Node]) {
-        let padded = nodes.len().next_multiple_of(LONGEST_REGISTER);
-        let fill = |list: &mut Vec<f64>, of: &dyn Fn(&Node) -> f32| {
-            list.clear();
-            list.extend(nodes.iter().map(|node| f64::from(of(node))));
-            list.resize(padded, 0.0);
-        };
-        for axis in 0..3 {
-            fill(&mut self.centroid[axis], &|node| node.centroid[axis]);
-            fill(&mut self.covariance[axis], &|node| node.covariance[axis]);
-        }
-        fill(&mut self.radius, &|node| node.radius);
-    }
-
-    /// The nodes as light at a surface point.
-    pub(super) fn seen_from(&self, point: &Point, seen: &mut SeenLists) {
-        let SeenLists { cos_i, cos_h, sin2_h, cos_d, du, du2 } = seen;
+    /// Replaces the angles and spreads of `lights` by those of the nodes seen from a surface point.
+    pub(super) fn seen_from(&self, point: &Point, lights: &mut Lights) {
+        let Lights { cos_i, cos_h, sin2_h, cos_d, du, du2, .. } = lights;
         for list in [cos_i, cos_h, sin2_h, cos_d, du, du2] {
             list.resize(self.radius.len(), 0.0);
         }
-        dispatch(Pass { nodes: self, point, seen });
+        dispatch(Pass { nodes: self, point, lights });
     }
 }
-
-/// `f64` lanes of the longest register that `pulp` uses.
-const LONGEST_REGISTER: usize = 8;
 
 struct Pass<'a> {
     nodes: &'a NodeLists,
     point: &'a Point,
-    seen: &'a mut SeenLists,
+    lights: &'a mut Lights,
 }
 
 impl WithSimd for Pass<'_> {
@@ -90,21 +58,22 @@ impl WithSimd for Pass<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        const { assert!(LONGEST_REGISTER.is_multiple_of(S::F64_LANES), "lists are padded to whole registers") };
+        const { assert!(BLOCK.is_multiple_of(S::F32_LANES), "lists are padded to whole registers") };
+        let vector = Single(simd);
         let NodeLists { centroid, covariance, radius } = self.nodes;
-        let [x, y, z] = centroid.each_ref().map(|list| S::as_simd_f64s(list).0);
-        let [a, b, c] = covariance.each_ref().map(|list| S::as_simd_f64s(list).0);
-        let radius = S::as_simd_f64s(radius).0;
-        let SeenLists { cos_i, cos_h, sin2_h, cos_d, du, du2 } = self.seen;
+        let [x, y, z] = centroid.each_ref().map(|list| S::as_simd_f32s(list).0);
+        let [a, b, c] = covariance.each_ref().map(|list| S::as_simd_f32s(list).0);
+        let radius = S::as_simd_f32s(radius).0;
+        let Lights { cos_i, cos_h, sin2_h, cos_d, du, du2, .. } = self.lights;
         let [cos_i, cos_h, sin2_h, cos_d, du, du2] =
-            [cos_i, cos_h, sin2_h, cos_d, du, du2].map(|list| S::as_mut_simd_f64s(list).0);
-        let (normal, view) = (splat(simd, self.point.normal), splat(simd, self.point.view));
-        let extent = Extent::new(simd, self.point);
+            [cos_i, cos_h, sin2_h, cos_d, du, du2].map(|list| S::as_mut_simd_f32s(list).0);
+        let (normal, view) = (splat(vector, self.point.normal), splat(vector, self.point.view));
+        let extent = Extent::new(vector, self.point);
         for k in 0..radius.len() {
             let node = Block {
-                centroid: [Lanes::new(simd, x[k]), Lanes::new(simd, y[k]), Lanes::new(simd, z[k])],
-                covariance: [Lanes::new(simd, a[k]), Lanes::new(simd, b[k]), Lanes::new(simd, c[k])],
-                radius: Lanes::new(simd, radius[k]),
+                centroid: [Lanes::new(vector, x[k]), Lanes::new(vector, y[k]), Lanes::new(vector, z[k])],
+                covariance: [Lanes::new(vector, a[k]), Lanes::new(vector, b[k]), Lanes::new(vector, c[k])],
+                radius: Lanes::new(vector, radius[k]),
             };
             let seen = node.seen_from(normal, view, extent.as_ref());
             cos_i[k] = seen[0].value;
@@ -118,24 +87,24 @@ impl WithSimd for Pass<'_> {
 }
 
 #[inline(always)]
-fn splat<S: Simd>(simd: S, v: Vec3) -> Lanes3<S> {
-    [Lanes::splat(simd, v.x), Lanes::splat(simd, v.y), Lanes::splat(simd, v.z)]
+pub(super) fn splat<V: Vector>(vector: V, v: Vec3) -> Lanes3<V> {
+    [Lanes::splat(vector, v.x), Lanes::splat(vector, v.y), Lanes::splat(vector, v.z)]
 }
 
 /// As many nodes as a register has lanes.
-struct Block<S: Simd> {
-    centroid: Lanes3<S>,
-    covariance: Lanes3<S>,
-    radius: Lanes<S>,
+struct Block<V: Vector> {
+    centroid: Lanes3<V>,
+    covariance: Lanes3<V>,
+    radius: Lanes<V>,
 }
 
-impl<S: Simd> Block<S> {
+impl<V: Vector> Block<V> {
     /// `cos_i`, `cos_h`, `sin2_h`, `cos_d`, `du` and `du2` at a surface point.
     #[inline(always)]
-    fn seen_from(&self, normal: Lanes3<S>, view: Lanes3<S>, extent: Option<&Extent<S>>) -> [Lanes<S>; 6] {
+    fn seen_from(&self, normal: Lanes3<V>, view: Lanes3<V>, extent: Option<&Extent<V>>) -> [Lanes<V>; 6] {
         let centre = self.centroid;
         let half = [centre[0] + view[0], centre[1] + view[1], centre[2] + view[2]];
-        let length2 = dot(half, half).max(f64::MIN_POSITIVE);
+        let length2 = dot(half, half).positive();
         // `1/|l + v|`, which is also `1/(2 v.h)`.
         let inverse = length2.sqrt().inverse();
         let across = cross(normal, half);
@@ -172,31 +141,31 @@ impl<S: Simd> Block<S> {
 }
 
 /// The [turn](super::point::Turn) of a point, the same in every lane.
-struct Extent<S: Simd> {
-    sides: [Side<S>; 2],
+struct Extent<V: Vector> {
+    sides: [Side<V>; 2],
 }
 
 /// The turn along one side: `t` of the normal, `s` of the view.
-struct Side<S: Simd> {
-    normal: Lanes3<S>,
-    view: Lanes3<S>,
+struct Side<V: Vector> {
+    normal: Lanes3<V>,
+    view: Lanes3<V>,
     /// `n.s`, `|t|^2`, `|s|^2` and `t.s`.
     products: [f64; 4],
 }
 
-impl<S: Simd> Extent<S> {
+impl<V: Vector> Extent<V> {
     /// `None` for a point without extent.
     #[inline(always)]
-    fn new(simd: S, point: &Point) -> Option<Self> {
+    fn new(vector: V, point: &Point) -> Option<Self> {
         if point.turn == Turn::default() {
             return None;
         }
-        Some(Self { sides: [Side::new(simd, point, 0), Side::new(simd, point, 1)] })
+        Some(Self { sides: [Side::new(vector, point, 0), Side::new(vector, point, 1)] })
     }
 
     /// Mean and mean square change of `sin2_h`; `half` is not normalised, `inverse` is 1 over its length.
     #[inline(always)]
-    fn changes(&self, half: Lanes3<S>, inverse: Lanes<S>, cos_h: Lanes<S>, cos2: Lanes<S>) -> (Lanes<S>, Lanes<S>) {
+    fn changes(&self, half: Lanes3<V>, inverse: Lanes<V>, cos_h: Lanes<V>, cos2: Lanes<V>) -> (Lanes<V>, Lanes<V>) {
         let scale = inverse.min(Lanes::splat_like(inverse, 0.5 / LEAST_COS_D));
         let [a, b] = &self.sides;
         let (a, b) = (a.changes(half, inverse, scale, cos_h, cos2), b.changes(half, inverse, scale, cos_h, cos2));
@@ -204,24 +173,24 @@ impl<S: Simd> Extent<S> {
     }
 }
 
-impl<S: Simd> Side<S> {
+impl<V: Vector> Side<V> {
     #[inline(always)]
-    fn new(simd: S, point: &Point, side: usize) -> Self {
+    fn new(vector: V, point: &Point, side: usize) -> Self {
         let (normal, view) = (point.turn.normal[side], point.turn.view[side]);
         let products = [point.normal.dot(view), normal.length_squared(), view.length_squared(), normal.dot(view)];
-        Self { normal: splat(simd, normal), view: splat(simd, view), products }
+        Self { normal: splat(vector, normal), view: splat(vector, view), products }
     }
 
     /// Mean change of `sin2_h` and mean square change of `cos_h`.
     #[inline(always)]
     fn changes(
         &self,
-        half: Lanes3<S>,
-        inverse: Lanes<S>,
-        scale: Lanes<S>,
-        cos_h: Lanes<S>,
-        cos2: Lanes<S>,
-    ) -> (Lanes<S>, Lanes<S>) {
+        half: Lanes3<V>,
+        inverse: Lanes<V>,
+        scale: Lanes<V>,
+        cos_h: Lanes<V>,
+        cos2: Lanes<V>,
+    ) -> (Lanes<V>, Lanes<V>) {
         let [n_s, t2, s2, t_s] = self.products.map(|product| Lanes::splat_like(inverse, product));
         let (t_h, s_h) = (dot(self.normal, half) * inverse, dot(self.view, half) * inverse);
         let change = t_h + (n_s - cos_h * s_h) * scale;
@@ -236,19 +205,19 @@ const LEAST_LENGTH: f64 = 2e-9;
 
 /// A vector along two tangents.
 #[inline(always)]
-fn flat<S: Simd>(v: Lanes3<S>, tangents: [Lanes3<S>; 2]) -> [Lanes<S>; 2] {
+fn flat<V: Vector>(v: Lanes3<V>, tangents: [Lanes3<V>; 2]) -> [Lanes<V>; 2] {
     [dot(v, tangents[0]), dot(v, tangents[1])]
 }
 
 /// The bilinear form of a covariance.
 #[inline(always)]
-fn form<S: Simd>([a, b, c]: Lanes3<S>, v: [Lanes<S>; 2], w: [Lanes<S>; 2]) -> Lanes<S> {
+fn form<V: Vector>([a, b, c]: Lanes3<V>, v: [Lanes<V>; 2], w: [Lanes<V>; 2]) -> Lanes<V> {
     a * v[0] * w[0] + b * (v[0] * w[1] + v[1] * w[0]) + c * v[1] * w[1]
 }
 
 /// The tangents of [`Frame::from_normal`](crate::math::frame::Frame::from_normal).
 #[inline(always)]
-fn tangents<S: Simd>([x, y, z]: Lanes3<S>) -> [Lanes3<S>; 2] {
+pub(super) fn tangents<V: Vector>([x, y, z]: Lanes3<V>) -> [Lanes3<V>; 2] {
     let sign = z.signum();
     let minus_a = (sign + z).inverse();
     let zero = Lanes::splat_like(x, 0.0);
@@ -261,11 +230,11 @@ fn tangents<S: Simd>([x, y, z]: Lanes3<S>) -> [Lanes3<S>; 2] {
 /// farther than `radius` from its mean. Every lobe vanishes linearly at the horizon; without this mean, a node that crosses the horizon
 /// would count fully or not at all.
 #[inline(always)]
-fn above_horizon<S: Simd>(cos_i: Lanes<S>, variance: Lanes<S>, radius: Lanes<S>) -> Lanes<S> {
+fn above_horizon<V: Vector>(cos_i: Lanes<V>, variance: Lanes<V>, radius: Lanes<V>) -> Lanes<V> {
     // Rounding may make a variance of 0 negative.
     let reach = (variance.max(0.0) * 3.0).sqrt().min(radius);
     let (zero, above) = (Lanes::splat_like(reach, 0.0), cos_i + reach);
-    let partly = above * above / (reach.max(f64::MIN_POSITIVE) * 4.0);
+    let partly = above * above / (reach.positive() * 4.0);
     zero.if_less(above, cos_i.if_less(reach, partly, cos_i), zero)
 }
 

@@ -6,15 +6,23 @@
 //! pixels get similar cuts, so the error varies smoothly instead of as noise.
 
 use super::{
-    blur::{LEAST_COS_D, NodeLists, SeenLists},
+    blur::{LEAST_COS_D, NodeLists, splat},
+    moments::{NUMBERS, Quad},
     point::Point,
-    pyramid::{Cell, LightPyramid, Node, strongest},
+    pyramid::{Cell, LightPyramid},
 };
 use crate::{
-    brdf::{Angles, Incident, Spread, Tail},
-    math::{Rgb, Vec3, elementary::ln, widen},
+    brdf::{BLOCK, Lights, Tail},
+    math::{
+        Rgb, Vec3,
+        elementary::ln,
+        lanes::{Lanes, Lanes3, Single, Vector, dot},
+        simd::dispatch,
+        to_f32, widen,
+    },
 };
-use std::f64::consts::PI;
+use pulp::{Simd, WithSimd};
+use std::f64::consts::{FRAC_1_PI, PI};
 
 /// The lobes that a cut is refined for: a range of lobe widths, or the cosine lobe.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -40,12 +48,14 @@ impl Band {
 #[derive(Debug)]
 pub struct Cut<'a> {
     pyramid: &'a LightPyramid,
-    stack: Vec<Cell>,
-    nodes: Vec<Node>,
+    open: Vec<Cell>,
+    split: Vec<Cell>,
+    /// Places of the candidates that become nodes of the cut.
+    kept: Vec<usize>,
+    candidates: Candidates,
     recent: Recent,
-    lists: NodeLists,
-    seen: SeenLists,
-    lights: Vec<Incident>,
+    nodes: NodeLists,
+    lights: Lights,
 }
 
 impl<'a> Cut<'a> {
@@ -54,17 +64,18 @@ impl<'a> Cut<'a> {
     pub fn new(pyramid: &'a LightPyramid) -> Self {
         Self {
             pyramid,
-            stack: Vec::new(),
-            nodes: Vec::new(),
+            open: Vec::new(),
+            split: Vec::new(),
+            kept: Vec::new(),
+            candidates: Candidates::default(),
             recent: Recent(vec![None; RECENT]),
-            lists: NodeLists::default(),
-            seen: SeenLists::default(),
-            lights: Vec::new(),
+            nodes: NodeLists::default(),
+            lights: Lights::default(),
         }
     }
 
     /// Refines the pyramid until no node's error, for a lobe of unit weight, exceeds `tolerance` in units of the light's mean radiance (for
-    /// glossy lobes times `n.v`, and less for wide ones). The bound holds at every surface point whose normal and view lie within `reach`
+    /// glossy lobes times `n.v`, less for wide ones and more for sharp ones). The bound holds at every surface point whose normal and view lie within `reach`
     /// of those of `point` (the sum of both chords of the unit sphere); `point.cos_o` must be the lowest of all these points.
     pub fn refine(&mut self, point: &Point, reach: f64, band: Band, tolerance: f64) {
         let bound = Bound::new(point, reach, band);
@@ -73,80 +84,128 @@ impl<'a> Cut<'a> {
         let tolerance = tolerance * self.pyramid.mean_radiance();
         let tolerance = match band {
             Band::Diffuse(_) => tolerance,
-            Band::Glossy(sharpest, ..) => tolerance * point.cos_o.max(LEAST_COS_D) * (EVEN / sharpest).min(1.0),
+            Band::Glossy(sharpest, ..) => tolerance * point.cos_o.max(LEAST_COS_D) * care(sharpest),
         };
-        self.nodes.clear();
-        self.stack.clear();
-        self.stack.extend(self.pyramid.roots());
-        while let Some(cell) = self.stack.pop() {
-            let node = self.recent.node(self.pyramid, cell);
-            let centroid = widen(node.centroid);
-            let cos_i = point.normal.dot(centroid);
-            if cos_i < -(f64::from(node.radius) + reach) || strongest(node.energy) == 0.0 {
-                continue;
+        let tolerance = to_f32(tolerance);
+        let Lists(mut nodes) = Lists::of(&mut self.lights, &mut self.nodes);
+        nodes.iter_mut().for_each(|list| list.clear());
+        self.open.clear();
+        self.open.extend(self.pyramid.roots());
+        while !self.open.is_empty() {
+            self.candidates.resize(4 * self.open.len());
+            let mut lists = self.candidates.numbers.each_mut().map(|list| list.as_chunks_mut::<4>().0);
+            for (place, &cell) in self.open.iter().enumerate() {
+                let quad = self.pyramid.stored(cell).unwrap_or_else(|| self.recent.parts(self.pyramid, cell));
+                lists.iter_mut().zip(&quad.0).for_each(|(list, numbers)| list[place] = *numbers);
             }
-            if bound.error(&node, centroid, cos_i) > tolerance {
-                let before = self.stack.len();
-                self.stack.extend(self.pyramid.children(cell));
-                if self.stack.len() > before {
-                    continue;
+            self.candidates.find_errors(&bound);
+            self.split.clear();
+            self.kept.clear();
+            for (quad, (cell, errors)) in self.open.iter().zip(self.candidates.errors.as_chunks::<4>().0).enumerate() {
+                for (k, (&error, part)) in errors.iter().zip(cell.parts()).enumerate() {
+                    if error > tolerance && part.splits() {
+                        self.split.push(part);
+                    } else if error >= 0.0 {
+                        self.kept.push(4 * quad + k);
+                    }
                 }
             }
-            self.nodes.push(node);
+            for (list, numbers) in nodes.iter_mut().zip(&self.candidates.numbers) {
+                list.extend(self.kept.iter().map(|&place| numbers[place]));
+            }
+            std::mem::swap(&mut self.open, &mut self.split);
         }
-        self.lists.set(&self.nodes);
+        for list in nodes {
+            list.resize(list.len().next_multiple_of(BLOCK), 0.0);
+        }
     }
 
-    /// The nodes of the cut as light that falls on a surface point, their energies times `share`.
-    pub fn lights(&mut self, point: &Point, share: f64) -> &[Incident] {
-        self.lists.seen_from(point, &mut self.seen);
-        let SeenLists { cos_i, cos_h, sin2_h, cos_d, du, du2 } = &self.seen;
-        self.lights.clear();
-        for (k, node) in self.nodes.iter().enumerate().filter(|&(k, _)| cos_i[k] > 0.0) {
-            self.lights.push(Incident {
-                angles: Angles {
-                    cos_i: cos_i[k],
-                    cos_o: point.cos_o,
-                    cos_h: cos_h[k],
-                    sin2_h: sin2_h[k],
-                    cos_d: cos_d[k],
-                },
-                energy: node.energy.map(|e| f64::from(e) * share),
-                spread: Spread { du: du[k], du2: du2[k] },
-            });
-        }
+    /// The nodes of the cut as light that falls on a surface point.
+    pub fn lights(&mut self, point: &Point) -> &Lights {
+        self.nodes.seen_from(point, &mut self.lights);
         &self.lights
     }
 
     /// The nodes of the cut: direction of the energy's centroid (world, unit length up to rounding) and energy. For reflectances that
     /// are not basis lobes.
     pub fn directions(&self) -> impl Iterator<Item = (Vec3, Rgb)> + '_ {
-        self.nodes.iter().map(|node| (widen(node.centroid), widen(node.energy)))
+        let ([x, y, z], [red, green, blue]) = (&self.nodes.centroid, &self.lights.energy);
+        (0..x.len()).map(|k| (widen([x[k], y[k], z[k]]), widen([red[k], green[k], blue[k]])))
     }
 }
 
-/// Cells finer than a texel that were looked at last. They are computed on demand, and neighbouring points look at the same ones.
-/// By their [`Cell::slot`].
+/// The lists of every number of the nodes of a cut.
+struct Lists<'a>([&'a mut Vec<f32>; NUMBERS]);
+
+impl<'a> Lists<'a> {
+    fn of(lights: &'a mut Lights, nodes: &'a mut NodeLists) -> Self {
+        let [red, green, blue] = &mut lights.energy;
+        let NodeLists { centroid: [x, y, z], covariance: [a, b, c], radius } = nodes;
+        Self([red, green, blue, x, y, z, a, b, c, radius])
+    }
+}
+
+/// Parts of the cells no coarser than a texel that were looked at last. They are computed on demand, and neighbouring points look at the
+/// same ones. By their [`Cell::slot`].
 #[derive(Debug)]
-struct Recent(Vec<Option<(Cell, Node)>>);
+struct Recent(Vec<Option<(Cell, Quad)>>);
 
 impl Recent {
-    /// The light of a cell.
+    /// The light of the parts of a cell.
     #[inline]
-    fn node(&mut self, pyramid: &LightPyramid, cell: Cell) -> Node {
-        if cell.is_at_least_a_texel() {
-            return pyramid.node(cell);
-        }
+    fn parts(&mut self, pyramid: &LightPyramid, cell: Cell) -> &Quad {
         let slot = &mut self.0[cell.slot(RECENT)];
-        match slot {
-            Some((found, node)) if *found == cell => *node,
-            _ => slot.insert((cell, pyramid.node(cell))).1,
+        if slot.as_ref().is_none_or(|(found, _)| *found != cell) {
+            *slot = Some((cell, pyramid.sub_texels(cell)));
         }
+        &slot.get_or_insert_with(|| (cell, Quad::default())).1
     }
 }
 
 /// Number of cells that are kept: they fit into the second-level cache.
-const RECENT: usize = 4096;
+const RECENT: usize = 2048;
+
+/// Nodes that may be split, one list for each of their numbers, padded to whole registers.
+#[derive(Debug, Default)]
+struct Candidates {
+    numbers: [Vec<f32>; NUMBERS],
+    /// The largest error of each node taken as a point; -1 for one from which no light arrives.
+    errors: Vec<f32>,
+}
+
+impl Candidates {
+    fn resize(&mut self, count: usize) {
+        let count = count.next_multiple_of(BLOCK);
+        self.numbers.iter_mut().for_each(|list| list.resize(count, 0.0));
+        self.errors.resize(count, 0.0);
+    }
+
+    fn find_errors(&mut self, bound: &Bound<'_>) {
+        dispatch(Errors { candidates: self, bound });
+    }
+}
+
+struct Errors<'a, 'b> {
+    candidates: &'a mut Candidates,
+    bound: &'a Bound<'b>,
+}
+
+impl WithSimd for Errors<'_, '_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        let vector = Single(simd);
+        let numbers = self.candidates.numbers.each_ref().map(|list| S::as_simd_f32s(list).0);
+        let [red, green, blue, x, y, z, a, _, c, radius] = numbers;
+        for (k, error) in S::as_mut_simd_f32s(&mut self.candidates.errors).0.iter_mut().enumerate() {
+            let centroid = [Lanes::new(vector, x[k]), Lanes::new(vector, y[k]), Lanes::new(vector, z[k])];
+            let energy = Lanes::new(vector, simd.max_f32s(simd.max_f32s(red[k], green[k]), blue[k]));
+            let spread2 = Lanes::new(vector, a[k]) + Lanes::new(vector, c[k]);
+            *error = self.bound.error(vector, centroid, energy, spread2, Lanes::new(vector, radius[k])).value;
+        }
+    }
+}
 
 /// Bounds the error of taking a node as a point, for a band and the surface points around a given one.
 struct Bound<'a> {
@@ -180,52 +239,78 @@ impl<'a> Bound<'a> {
         Self { point, reach, band, shading, squares: [a2, upper * upper], long_peak, lower }
     }
 
-    #[inline]
-    fn error(&self, node: &Node, centroid: Vec3, cos_i: f64) -> f64 {
-        let (energy, spread2) = (f64::from(strongest(node.energy)), node.spread2());
-        let horizon = cos_i < f64::from(node.radius) + self.reach;
+    #[inline(always)]
+    fn error<V: Vector>(
+        &self,
+        vector: V,
+        centroid: Lanes3<V>,
+        energy: Lanes<V>,
+        spread2: Lanes<V>,
+        radius: Lanes<V>,
+    ) -> Lanes<V> {
+        let zero = Lanes::splat(vector, 0.0);
+        let cos_i = dot(splat(vector, self.point.normal), centroid);
+        let margin = radius + self.reach;
         let error = match self.band {
             // The cosine has curvature cos; at the horizon it has a kink, a first-order error over the part that is cut off.
-            Band::Diffuse(_) if horizon => DIFFUSE_CARE * KINK * spread2.sqrt(),
-            Band::Diffuse(bend) => DIFFUSE_CARE * 0.5 * spread2 * (cos_i.abs() + bend),
+            Band::Diffuse(bend) => {
+                let magnitude = cos_i.if_less(zero, zero - cos_i, cos_i);
+                cos_i.if_less(margin, spread2.sqrt() * KINK, spread2 * (magnitude + bend) * 0.5) * DIFFUSE_CARE
+            }
             Band::Glossy(.., tail) => {
-                let (distribution, curvature) = self.peak_over(node, centroid, tail);
-                let kink = if horizon { KINK * (spread2.sqrt() / self.lower).min(1.0) } else { 0.0 };
-                spread2 * (curvature + SLOW_FACTORS * distribution) + kink * distribution
+                let (distribution, curvature) = self.peak_over(vector, centroid, radius, tail);
+                let kink = (spread2.sqrt() * (1.0 / self.lower)).min(Lanes::splat(vector, 1.0)) * KINK;
+                let kink = cos_i.if_less(margin, kink, zero);
+                spread2 * (curvature + distribution * SLOW_FACTORS) + kink * distribution
             }
         };
-        energy * self.shading * error
+        let no_light = Lanes::splat(vector, -1.0);
+        let error = zero.if_less(energy, error * energy * self.shading, no_light);
+        cos_i.if_less(zero - margin, no_light, error)
     }
 
     /// Upper bounds over the node and the band's widths of the distribution `D` and of its curvature along the sphere of light
     /// directions (per square chord).
-    #[inline]
-    fn peak_over(&self, node: &Node, centroid: Vec3, tail: Tail) -> (f64, f64) {
-        let half = centroid + self.point.view;
-        let inverse = 1.0 / half.length_squared().max(f64::MIN_POSITIVE);
+    #[inline(always)]
+    fn peak_over<V: Vector>(
+        &self,
+        vector: V,
+        centroid: Lanes3<V>,
+        radius: Lanes<V>,
+        tail: Tail,
+    ) -> (Lanes<V>, Lanes<V>) {
+        let (zero, one) = (Lanes::splat(vector, 0.0), Lanes::splat(vector, 1.0));
+        let view = splat(vector, self.point.view);
+        let half = [centroid[0] + view[0], centroid[1] + view[1], centroid[2] + view[2]];
+        let inverse = dot(half, half).positive().inverse();
         // A step of light direction moves the half vector by at most 1 / (2 v.h) of it.
-        let turn = inverse.sqrt().min(10.0);
-        let along = self.point.normal.dot(half);
-        let sin2 = (1.0 - along * along * inverse).max(0.0);
+        let turn = inverse.sqrt().min(Lanes::splat(vector, 10.0));
+        let along = dot(splat(vector, self.point.normal), half);
+        let sin2 = (one - along * along * inverse).max(0.0);
         // A half vector below the surface counts as one in the surface; the node may still contain the mirror direction.
-        let sin = if along > 0.0 { sin2.sqrt() } else { 1.0 };
-        let nearest = (sin - f64::from(node.radius) * turn - self.reach).max(0.0);
+        let sin = zero.if_less(along, sin2.sqrt(), one);
+        let nearest = (sin - radius * turn - Lanes::splat(vector, self.reach)).max(0.0);
         let t2 = nearest * nearest;
         let [low2, high2] = self.squares;
         if tail == Tail::Long {
             // `k / d` with a factor `k` that grows slowly with the width and a divisor `d` that grows with it.
-            let d = t2 + low2 * (1.0 - t2);
-            return (self.long_peak / d, 2.0 * turn * turn * self.long_peak / (d * d));
+            let inverse = (t2 + (one - t2) * low2).inverse();
+            let distribution = inverse * self.long_peak;
+            return (distribution, turn * turn * distribution * inverse * 2.0);
         }
-        let d = |a2: f64| {
-            let q = t2 + a2 * (1.0 - t2);
-            (a2 / (PI * q * q), q)
-        };
         // a^2/q^2 is largest at a = t, a^2/q^3 at a = t / sqrt(2).
-        let (distribution, _) = d(t2.clamp(low2, high2));
-        let (sharpest, q) = d((0.5 * t2).clamp(low2, high2));
-        (distribution, 2.0 * turn * turn * sharpest / q)
+        let high2 = Lanes::splat(vector, high2);
+        let (distribution, _) = ggx(t2, t2.max(low2).min(high2));
+        let (sharpest, inverse) = ggx(t2, (t2 * 0.5).max(low2).min(high2));
+        (distribution, turn * turn * sharpest * inverse * 2.0)
     }
+}
+
+/// The distribution of GGX of squared width `a2` at the squared sine `t2` of the half vector's angle, and the inverse of the root of its divisor.
+#[inline(always)]
+fn ggx<V: Vector>(t2: Lanes<V>, a2: Lanes<V>) -> (Lanes<V>, Lanes<V>) {
+    let inverse = (t2 + a2 * (Lanes::splat_like(t2, 1.0) - t2)).inverse();
+    (a2 * inverse * inverse * FRAC_1_PI, inverse)
 }
 
 /// The cosine lobe needs few nodes, so their errors average out less: it gets a tighter tolerance.
@@ -235,8 +320,15 @@ const DIFFUSE_CARE: f64 = 6.0;
 /// than these factors.
 const SLOW_FACTORS: f64 = 4.0;
 
-/// For lobes wider than this, the second-order terms correct only about half of the error, because the factors of the distribution vary
-/// as much as the distribution. Such lobes need few nodes and get a tighter tolerance.
+/// Factor on the tolerance for bands whose sharpest lobe has this width. For lobes wider than [`EVEN`], the second-order terms correct only
+/// about half of the error, because the factors of the distribution vary as much as the distribution, and such lobes need few nodes. A
+/// sharp lobe needs many nodes, whose errors average out.
+fn care(sharpest: f64) -> f64 {
+    let wide = EVEN / sharpest;
+    if wide < 1.0 { wide } else { wide.sqrt() }
+}
+
+/// Width at which the tolerance is that of the caller.
 const EVEN: f64 = 0.1;
 
 /// Share of a node's size by which a kink at the horizon can shift its value.

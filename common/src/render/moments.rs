@@ -1,146 +1,207 @@
 //! Sums of light that keep its energy, mean direction and spread.
 
-use crate::math::{Vec3, frame::Frame, narrow, to_f32, widen};
+use super::blur::tangents;
+use crate::math::{
+    lanes::{Lanes, Lanes3, Vector, dot},
+    to_f32,
+};
 use std::ops::{Add, Mul};
 
-/// Light from one node of the pyramid: a point with a spread.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Node {
-    /// Radiance integrated over solid angle, linear Rec. 709.
-    pub energy: [f32; 3],
-    /// Energy-weighted mean direction, normalised, world space.
-    pub centroid: [f32; 3],
-    /// Energy-weighted covariance of the directions about the centroid, in the tangent plane there: along the first axis of
-    /// [`Frame::from_normal`], mixed, along the second; square chords of the unit sphere.
-    pub covariance: [f32; 3],
-    /// Largest distance of a point of the node from the centroid, as a chord.
-    pub radius: f32,
-}
+/// Four nodes: for each of their [numbers](NodeLanes) a list. A node that is not there has no energy.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Quad(pub(super) [[f32; 4]; NUMBERS]);
 
-impl Node {
-    /// Energy-weighted mean square distance from the centroid, as a chord of the unit sphere.
-    #[must_use]
+impl Quad {
+    /// Sets one of its nodes from the numbers that `number` returns.
     #[inline]
-    pub fn spread2(&self) -> f64 {
-        f64::from(self.covariance[0]) + f64::from(self.covariance[2])
+    pub(super) fn set(&mut self, k: usize, number: impl Fn(usize) -> f64) {
+        self.0.iter_mut().enumerate().for_each(|(n, list)| list[k] = to_f32(number(n)));
+    }
+
+    /// The numbers of one of its nodes.
+    #[inline]
+    pub(super) fn numbers(&self, k: usize) -> [f32; NUMBERS] {
+        self.0.map(|list| list[k])
     }
 }
 
-/// The light of a region of directions.
+/// The light of regions of directions, one in each lane.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Moments {
+pub(super) struct Moments<V: Vector> {
     /// Radiance integrated over solid angle, linear Rec. 709.
-    pub(super) energy: Vec3,
+    pub(super) energy: Lanes3<V>,
     /// Energy-weighted mean direction, of unit length.
-    pub(super) centroid: Vec3,
+    pub(super) centroid: Lanes3<V>,
     /// Energy-weighted mean of `(x - c)(x - c)^T` over the directions `x`, `c` the centroid.
-    pub(super) spread: Symmetric,
+    pub(super) spread: Symmetric<V>,
     /// Largest distance of a direction from the centroid, as a chord.
-    pub(super) radius: f64,
+    pub(super) radius: Lanes<V>,
 }
 
-/// A symmetric matrix: xx, yy, zz, xy, xz, yz.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Symmetric([f64; 6]);
+/// A symmetric matrix in each lane: xx, yy, zz, xy, xz, yz.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Symmetric<V: Vector>([Lanes<V>; 6]);
 
-impl Moments {
-    /// The sum: energies add, the centroid is their energy-weighted mean, spreads add by the parallel axis theorem.
-    pub(super) fn join(parts: &[Self]) -> Self {
-        let weight = |part: &Self| part.energy.element_sum();
-        let total: f64 = parts.iter().map(weight).sum();
+/// A node of the pyramid in each lane, light from around a point:
+/// - its energy, radiance integrated over solid angle, linear Rec. 709 (three numbers);
+/// - the energy-weighted mean direction, normalised, world space (three);
+/// - the energy-weighted covariance of the directions about it, in the tangent plane there: along the first axis of
+///   [`Frame::from_normal`](crate::math::frame::Frame::from_normal), mixed, along the second; square chords of the unit sphere (three);
+/// - the largest distance of a direction of the node from the mean, as a chord.
+pub(super) type NodeLanes<V> = [Lanes<V>; NUMBERS];
+
+/// Count of a node's numbers.
+pub(super) const NUMBERS: usize = 10;
+
+impl<V: Vector> Moments<V> {
+    /// The sum: energies add, the centroid is their energy-weighted mean, spreads add by the parallel axis theorem. `present` is 0 in lanes
+    /// in which a part is missing, else 1; the first part is never missing.
+    #[inline(always)]
+    pub(super) fn join(parts: &[Self; 4], present: [Lanes<V>; 4]) -> Self {
+        let [p, q, r, s] = parts;
+        let zero = Lanes::splat_like(p.radius, 0.0);
+        let weights = [p.weight(), q.weight(), r.weight(), s.weight()];
+        let total = weights[0] + weights[1] + weights[2] + weights[3];
         // A region without energy still has a centroid and a spread.
-        let share = |part: &Self| if total > 0.0 { weight(part) / total } else { 1.0 / parts.len() as f64 };
-        let mean: Vec3 = parts.iter().map(|part| part.centroid * share(part)).sum();
-        let centroid = mean.normalize_or(parts[0].centroid);
-        let (mut energy, mut spread, mut radius) = (Vec3::ZERO, Symmetric([0.0; 6]), 0.0_f64);
-        for part in parts {
-            let offset = part.centroid - centroid;
-            energy += part.energy;
-            spread = spread + (part.spread + Symmetric::square(offset)) * share(part);
-            radius = radius.max(offset.length() + part.radius);
+        let of_total = total.positive().inverse();
+        let of_count = (present[0] + present[1] + present[2] + present[3]).inverse();
+        let shares = [
+            zero.if_less(total, weights[0] * of_total, present[0] * of_count),
+            zero.if_less(total, weights[1] * of_total, present[1] * of_count),
+            zero.if_less(total, weights[2] * of_total, present[2] * of_count),
+            zero.if_less(total, weights[3] * of_total, present[3] * of_count),
+        ];
+        let mean = [
+            mix([p.centroid[0], q.centroid[0], r.centroid[0], s.centroid[0]], shares),
+            mix([p.centroid[1], q.centroid[1], r.centroid[1], s.centroid[1]], shares),
+            mix([p.centroid[2], q.centroid[2], r.centroid[2], s.centroid[2]], shares),
+        ];
+        let length2 = dot(mean, mean);
+        let inverse = length2.positive().sqrt().inverse();
+        let centroid = [
+            zero.if_less(length2, mean[0] * inverse, p.centroid[0]),
+            zero.if_less(length2, mean[1] * inverse, p.centroid[1]),
+            zero.if_less(length2, mean[2] * inverse, p.centroid[2]),
+        ];
+        let (mut spread, mut radius) = (Symmetric([zero; 6]), zero);
+        for k in 0..4 {
+            let part = &parts[k];
+            let offset =
+                [part.centroid[0] - centroid[0], part.centroid[1] - centroid[1], part.centroid[2] - centroid[2]];
+            spread = spread + (part.spread + Symmetric::square(offset)) * shares[k];
+            let reach = (dot(offset, offset).sqrt() + part.radius) * present[k];
+            radius = radius.if_less(reach, reach, radius);
         }
+        let energy = [
+            p.energy[0] + q.energy[0] + r.energy[0] + s.energy[0],
+            p.energy[1] + q.energy[1] + r.energy[1] + s.energy[1],
+            p.energy[2] + q.energy[2] + r.energy[2] + s.energy[2],
+        ];
         Self { energy, centroid, spread, radius }
     }
 
-    /// The node of the pyramid.
-    pub(super) fn node(&self) -> Node {
-        let Frame { tangent, bitangent, .. } = Frame::from_normal(self.centroid);
-        let along = self.spread.times(tangent);
-        let covariance = [tangent.dot(along), bitangent.dot(along), bitangent.dot(self.spread.times(bitangent))];
-        Node {
-            energy: narrow(self.energy),
-            centroid: narrow(self.centroid),
-            covariance: covariance.map(to_f32),
-            radius: to_f32(self.radius),
-        }
+    /// What a region counts in a mean.
+    #[inline(always)]
+    fn weight(&self) -> Lanes<V> {
+        self.energy[0] + self.energy[1] + self.energy[2]
     }
-}
 
-impl From<&Node> for Moments {
-    fn from(node: &Node) -> Self {
-        let centroid = widen(node.centroid);
-        let Frame { tangent, bitangent, .. } = Frame::from_normal(centroid);
-        let [a, b, c] = node.covariance.map(f64::from);
+    /// The nodes of the pyramid.
+    #[inline(always)]
+    pub(super) fn node(&self) -> NodeLanes<V> {
+        let [tangent, bitangent] = tangents(self.centroid);
+        let along = self.spread.times(tangent);
+        let [a, b, c] = [dot(tangent, along), dot(bitangent, along), dot(bitangent, self.spread.times(bitangent))];
+        let ([red, green, blue], [x, y, z]) = (self.energy, self.centroid);
+        [red, green, blue, x, y, z, a, b, c, self.radius]
+    }
+
+    /// The light of nodes of the pyramid.
+    #[inline(always)]
+    pub(super) fn of_node([red, green, blue, x, y, z, a, b, c, radius]: NodeLanes<V>) -> Self {
+        let centroid = [x, y, z];
+        let [tangent, bitangent] = tangents(centroid);
         let spread = Symmetric::square(tangent) * a
             + Symmetric::product(tangent, bitangent) * b
             + Symmetric::square(bitangent) * c;
-        Self { energy: widen(node.energy), centroid, spread, radius: f64::from(node.radius) }
+        Self { energy: [red, green, blue], centroid, spread, radius }
     }
 }
 
-impl Symmetric {
+/// A weighted sum.
+#[inline(always)]
+pub(super) fn mix<V: Vector>(values: [Lanes<V>; 4], shares: [Lanes<V>; 4]) -> Lanes<V> {
+    values[0] * shares[0] + values[1] * shares[1] + values[2] * shares[2] + values[3] * shares[3]
+}
+
+impl<V: Vector> Symmetric<V> {
     /// `v v^T`.
-    pub(super) fn square(v: Vec3) -> Self {
-        Self([v.x * v.x, v.y * v.y, v.z * v.z, v.x * v.y, v.x * v.z, v.y * v.z])
+    #[inline(always)]
+    pub(super) fn square([x, y, z]: Lanes3<V>) -> Self {
+        Self([x * x, y * y, z * z, x * y, x * z, y * z])
     }
 
     /// `a b^T + b a^T`.
-    pub(super) fn product(a: Vec3, b: Vec3) -> Self {
+    #[inline(always)]
+    pub(super) fn product(a: Lanes3<V>, b: Lanes3<V>) -> Self {
         Self([
-            2.0 * a.x * b.x,
-            2.0 * a.y * b.y,
-            2.0 * a.z * b.z,
-            a.x * b.y + b.x * a.y,
-            a.x * b.z + b.x * a.z,
-            a.y * b.z + b.y * a.z,
+            a[0] * b[0] * 2.0,
+            a[1] * b[1] * 2.0,
+            a[2] * b[2] * 2.0,
+            a[0] * b[1] + b[0] * a[1],
+            a[0] * b[2] + b[0] * a[2],
+            a[1] * b[2] + b[1] * a[2],
         ])
     }
 
-    fn times(&self, v: Vec3) -> Vec3 {
+    #[inline(always)]
+    fn times(&self, v: Lanes3<V>) -> Lanes3<V> {
         let [xx, yy, zz, xy, xz, yz] = self.0;
-        Vec3::new(xx * v.x + xy * v.y + xz * v.z, xy * v.x + yy * v.y + yz * v.z, xz * v.x + yz * v.y + zz * v.z)
+        [dot([xx, xy, xz], v), dot([xy, yy, yz], v), dot([xz, yz, zz], v)]
     }
 }
 
-impl Add for Symmetric {
+impl<V: Vector> Add for Symmetric<V> {
     type Output = Self;
 
+    #[inline(always)]
     fn add(self, other: Self) -> Self {
-        Self(std::array::from_fn(|k| self.0[k] + other.0[k]))
+        let ([a, b, c, d, e, f], [u, v, w, x, y, z]) = (self.0, other.0);
+        Self([a + u, b + v, c + w, d + x, e + y, f + z])
     }
 }
 
-impl Mul<f64> for Symmetric {
+impl<V: Vector> Mul<Lanes<V>> for Symmetric<V> {
     type Output = Self;
 
-    fn mul(self, scale: f64) -> Self {
-        Self(self.0.map(|x| x * scale))
+    #[inline(always)]
+    fn mul(self, scale: Lanes<V>) -> Self {
+        let [a, b, c, d, e, f] = self.0;
+        Self([a * scale, b * scale, c * scale, d * scale, e * scale, f * scale])
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::math::{Vec3, frame::Frame, lanes::Double};
+    use pulp::Scalar;
 
     #[test]
     fn a_node_keeps_what_moments_say_of_the_tangent_plane() {
+        let lane = |x: f64| Lanes::splat(Double(Scalar), x);
+        let lanes = |v: Vec3| [v.x, v.y, v.z].map(lane);
         let centroid = Vec3::new(0.48, 0.6, -0.64);
         let Frame { tangent, bitangent, .. } = Frame::from_normal(centroid);
-        let spread = Symmetric::square(tangent * 0.3 + bitangent * 0.1) + Symmetric::product(tangent, bitangent) * 0.02;
-        let node = Moments { energy: Vec3::new(1.0, 2.0, 3.0), centroid, spread, radius: 0.5 }.node();
-        for (found, expected) in node.covariance.into_iter().zip([0.09, 0.05, 0.01]) {
-            assert!((f64::from(found) - expected).abs() < 1e-8, "{found} {expected}");
+        let spread = Symmetric::square(lanes(tangent * 0.3 + bitangent * 0.1))
+            + Symmetric::product(lanes(tangent), lanes(bitangent)) * lane(0.02);
+        let energy = lanes(Vec3::new(1.0, 2.0, 3.0));
+        let node = Moments { energy, centroid: lanes(centroid), spread, radius: lane(0.5) }.node();
+        for (found, expected) in node[6..9].iter().zip([0.09, 0.05, 0.01]) {
+            assert!((found.value - expected).abs() < 1e-12, "{} {expected}", found.value);
         }
-        assert_eq!(Moments::from(&node).node(), node);
+        for (again, node) in Moments::of_node(node).node().iter().zip(&node) {
+            assert!((again.value - node.value).abs() < 1e-12);
+        }
     }
 }

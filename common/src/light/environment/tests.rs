@@ -173,20 +173,3 @@ fn faults_are_named_with_their_place() {
         assert_eq!(Environment::new(image), Err(LightError::Size { width, height }));
     }
 }
-
-#[test]
-fn slopes_are_those_of_the_bilinear_function() {
-    const STEP: f64 = 1e-3; // texels; differences are exact inside a cell, because the function is bilinear there
-    let map = speckled(8, 4).rotated(30.0);
-    let (width, height) = (map.width() as f64, map.height() as f64);
-    let sum = |x: f64, y: f64| map.radiance_at(x / width, y / height).element_sum();
-    for (x, y) in [(2.2, 1.3), (0.1, 2.9), (3.95, 0.2), (7.8, 3.7)] {
-        let (radiance, [along, down, mixed]) = map.radiance_and_slopes(x / width, y / height);
-        assert_eq!(radiance, map.radiance_at(x / width, y / height));
-        let difference = |a: f64, b: f64| (a - b) / (2.0 * STEP);
-        assert!((along - difference(sum(x + STEP, y), sum(x - STEP, y))).abs() < 1e-9);
-        assert!((down - difference(sum(x, y + STEP), sum(x, y - STEP))).abs() < 1e-9);
-        let down_at = |x: f64| difference(sum(x, y + STEP), sum(x, y - STEP));
-        assert!((mixed - difference(down_at(x + STEP), down_at(x - STEP))).abs() < 1e-6);
-    }
-}

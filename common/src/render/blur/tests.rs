@@ -1,6 +1,6 @@
 use super::*;
 use crate::{
-    brdf::{self, Angles, Incident, MODELS, Spread, Tail, lobe_terms},
+    brdf::{self, Angles, Incident, Lights, MODELS, Spread, Tail, lobe_terms},
     image::Image,
     light::Environment,
     math::{frame::Frame, to_f32},
@@ -11,14 +11,27 @@ use crate::{
 };
 use glam::DMat3;
 
+/// A node of energy 1, see [`NodeLanes`](super::super::moments::NodeLanes).
+struct Node {
+    centroid: [f32; 3],
+    covariance: [f32; 3],
+    radius: f32,
+}
+
 /// The angles of a node's light at a surface point, and the effect of its spread on them; `None` if all of it is below the horizon.
 fn seen_from(node: &Node, point: &Point) -> Option<(Angles, Spread)> {
-    let (mut nodes, mut seen) = (NodeLists::default(), SeenLists::default());
-    nodes.set(&[*node]);
-    nodes.seen_from(point, &mut seen);
-    let SeenLists { cos_i, cos_h, sin2_h, cos_d, du, du2 } = seen;
-    let angles = Angles { cos_i: cos_i[0], cos_o: point.cos_o, cos_h: cos_h[0], sin2_h: sin2_h[0], cos_d: cos_d[0] };
-    (angles.cos_i > 0.0).then_some((angles, Spread { du: du[0], du2: du2[0] }))
+    let (mut nodes, mut lights) = (NodeLists::default(), Lights::default());
+    let lists = nodes.centroid.iter_mut().chain(&mut nodes.covariance).chain([&mut nodes.radius]);
+    let numbers = node.centroid.iter().chain(&node.covariance).chain([&node.radius]);
+    lists.zip(numbers).for_each(|(list, number)| {
+        list.resize(BLOCK, 0.0);
+        list[0] = *number;
+    });
+    nodes.seen_from(point, &mut lights);
+    let Lights { cos_i, cos_h, sin2_h, cos_d, du, du2, .. } = lights;
+    let [cos_i, cos_h, sin2_h, cos_d] = [cos_i, cos_h, sin2_h, cos_d].map(|list| f64::from(list[0]));
+    let spread = Spread { du: f64::from(du[0]), du2: f64::from(du2[0]) };
+    (cos_i > 0.0).then_some((Angles { cos_i, cos_o: point.cos_o, cos_h, sin2_h, cos_d }, spread))
 }
 
 /// Directions on a skew grid of `size` (chord) around a direction, all of the same energy.
@@ -47,7 +60,7 @@ fn node(directions: &[Vec3]) -> Node {
     let covariance =
         [(frame.tangent, frame.tangent), (frame.tangent, frame.bitangent), (frame.bitangent, frame.bitangent)]
             .map(|(a, b)| to_f32(a.dot(spread * b)));
-    Node { energy: [1.0; 3], centroid: crate::math::narrow(centroid), covariance, radius: to_f32(radius) }
+    Node { centroid: crate::math::narrow(centroid), covariance, radius: to_f32(radius) }
 }
 
 fn points() -> Vec<Point> {
@@ -72,7 +85,8 @@ fn error(size: f64, width: f64, second_order: bool, kinked: bool) -> f64 {
             }
             let terms = lobe_terms(basis.lobe);
             let mut sums = vec![0.0; 3 * terms];
-            basis.lobe.accumulate(&[Incident { angles, energy: [1.0; 3], spread }], point.cos_o, &[width], &mut sums);
+            let lights = [Incident { angles, energy: [1.0; 3], spread }].into_iter().collect();
+            basis.lobe.accumulate(&lights, point.cos_o, 1.0, &[width], &mut sums);
             let found: f64 = sums.iter().step_by(3).sum();
             let exact = |d: &Vec3| basis.lobe.eval(&Angles::new(point.normal, *d, point.view), width);
             let mean = directions.iter().map(exact).sum::<f64>() / directions.len() as f64;
@@ -115,9 +129,9 @@ fn light_that_the_horizon_cuts_counts_only_above_it() {
         let n = 1000;
         let spread = |k: i32| cos_i + 0.1 * ((f64::from(k) + 0.5) / f64::from(n) - 0.5);
         let mean = (0..n).map(|k| spread(k).max(0.0)).sum::<f64>() / f64::from(n);
-        let [cos, variance, radius] = [cos_i, 0.01 / 12.0, 0.1].map(|x| Lanes::splat(pulp::Scalar, x));
+        let [cos, variance, radius] = [cos_i, 0.01 / 12.0, 0.1].map(|x| Lanes::splat(Single(pulp::Scalar), x));
         let found = above_horizon(cos, variance, radius).value;
-        assert!((found - mean).abs() < 1e-6, "{cos_i}: {found} {mean}");
+        assert!((f64::from(found) - mean).abs() < 1e-6, "{cos_i}: {found} {mean}");
     }
 }
 
@@ -127,7 +141,7 @@ fn light_on_a_line_or_opposite_to_the_view_gives_finite_numbers() {
     let frame = Frame::from_normal(-point.view);
     for (covariance, radius) in [([1e-4, 0.0, -1e-12], 0.03), ([-1e-12, 0.0, 1e-4], 0.03), ([0.0; 3], 0.0)] {
         for centroid in [-point.view, -point.normal, frame.tangent, frame.bitangent, point.view] {
-            let node = Node { energy: [1.0; 3], centroid: crate::math::narrow(centroid), covariance, radius };
+            let node = Node { centroid: crate::math::narrow(centroid), covariance, radius };
             let Some((angles, spread)) = seen_from(&node, &point) else { continue };
             assert!([angles.cos_i, angles.cos_h, spread.du, spread.du2].iter().all(|x| x.is_finite()), "{centroid}");
         }
@@ -157,7 +171,7 @@ fn grazing_views_reflect_the_albedo_of_the_lobe() {
         let point = Point::new(normal, Vec3::Z).unwrap();
         let (mut cut, mut sums) = (Cut::new(&pyramid), [0.0; 6]);
         cut.refine(&point, 0.0, Band::Glossy(alpha, 2.0 * alpha, Tail::Short), 1e-3);
-        lobe.accumulate(cut.lights(&point, 1.0), cos_o, &[alpha], &mut sums);
+        lobe.accumulate(cut.lights(&point), cos_o, 1.0, &[alpha], &mut sums);
         let found = sums[0] + sums[3];
         assert!((found - expected).abs() < TOLERANCE, "alpha {alpha} cos_o {cos_o}: {found} {expected}");
     }

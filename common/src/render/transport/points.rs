@@ -50,7 +50,7 @@ impl View<'_> {
             cut.refine(&centre, reach, band, tolerance);
             for seen in group {
                 let sums = &mut sums[seen.place * slice.integrals()..][..slice.integrals()];
-                lobe.accumulate(cut.lights(&seen.point, seen.share), seen.point.cos_o, widths, sums);
+                lobe.accumulate(cut.lights(&seen.point), seen.point.cos_o, seen.share, widths, sums);
             }
         }
         sums
