@@ -55,6 +55,8 @@ pub struct Cut<'a> {
     candidates: Candidates,
     recent: Recent,
     nodes: NodeLists,
+    /// Number of nodes without those that pad the lists.
+    count: usize,
     lights: Lights,
 }
 
@@ -70,6 +72,7 @@ impl<'a> Cut<'a> {
             candidates: Candidates::default(),
             recent: Recent(vec![None; RECENT]),
             nodes: NodeLists::default(),
+            count: 0,
             lights: Lights::default(),
         }
     }
@@ -115,8 +118,9 @@ impl<'a> Cut<'a> {
             }
             std::mem::swap(&mut self.open, &mut self.split);
         }
+        self.count = nodes[0].len();
         for list in nodes {
-            list.resize(list.len().next_multiple_of(BLOCK), 0.0);
+            list.resize(self.count.next_multiple_of(BLOCK), 0.0);
         }
     }
 
@@ -130,7 +134,7 @@ impl<'a> Cut<'a> {
     /// are not basis lobes.
     pub fn directions(&self) -> impl Iterator<Item = (Vec3, Rgb)> + '_ {
         let ([x, y, z], [red, green, blue]) = (&self.nodes.centroid, &self.lights.energy);
-        (0..x.len()).map(|k| (widen([x[k], y[k], z[k]]), widen([red[k], green[k], blue[k]])))
+        (0..self.count).map(|k| (widen([x[k], y[k], z[k]]), widen([red[k], green[k], blue[k]])))
     }
 }
 
