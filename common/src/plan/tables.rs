@@ -12,11 +12,11 @@ pub(super) type Span = Option<(f64, f64)>;
 /// Pixels per shard of a subset's table: small enough to spread over several workers.
 pub(super) const SUBSET_SHARD: usize = 32;
 
-/// Pixels per shard of the full-resolution table.
-pub(super) const FULL_SHARD: usize = 2048;
+/// Pixels per shard of the full-resolution table: large enough that few nodes of a grid of normals serve the pixels of two shards.
+pub(super) const FULL_SHARD: usize = 4096;
 
 /// Pixels per shard of the coarse picture's table: small enough to spread over several workers.
-pub(super) const COARSE_SHARD: usize = 1024;
+pub(super) const COARSE_SHARD: usize = 2048;
 
 /// Knots per factor of two of width in full-resolution tables (design section 7: at least 5).
 pub(super) const FULL_PER_OCTAVE: f64 = 5.0;
