@@ -12,12 +12,15 @@ use crate::{
     brdf::{Model, flat_bounds},
     math::elementary::{exp, ln},
     metric::Judge,
-    search::{Progress, SearchError},
+    search::{Progress, SearchError, Termination},
 };
 use std::ops::ControlFlow;
 
-/// Most evaluations of CSSIM on the coarse picture, from each start.
+/// Most evaluations of CSSIM on the coarse picture from the best start, and in the mean over the starts.
 pub(crate) const MAX_EXPLORATIONS: usize = 300;
+
+/// Most evaluations from each start before the best one is chosen.
+const TRIAL: usize = 80;
 
 /// The lobes that are tried in addition to the winner's, as widths of GGX.
 const WIDTHS: [f64; 2] = [0.03, 0.1];
@@ -51,7 +54,7 @@ pub(crate) fn starts(model: &dyn Model, won: &[f64]) -> Vec<Vec<f64>> {
     starts
 }
 
-/// Searches from every start and returns the result of lowest score, the first of equal ones.
+/// Searches from every start for a while and continues from the result of lowest score, the first of equal ones.
 ///
 /// # Errors
 /// When no start can be rendered and scored.
@@ -66,7 +69,7 @@ pub(crate) fn explore(
     let score = |p: &Polished| by.pick(p.cssim, p.cssim_object);
     let (mut best, mut failure, mut evaluations) = (None::<Polished>, SearchError::NoParameters, 0);
     for start in starts {
-        match polish(view, judge, by, std::slice::from_ref(start), max_evaluations, observe) {
+        match polish(view, judge, by, std::slice::from_ref(start), max_evaluations.min(TRIAL), observe) {
             Ok(found) => {
                 evaluations += found.evaluations;
                 if best.as_ref().is_none_or(|best| score(&found) < score(best)) {
@@ -76,7 +79,13 @@ pub(crate) fn explore(
             Err(error) => failure = error,
         }
     }
-    best.map(|best| Polished { evaluations, ..best }).ok_or(failure)
+    let best = best.ok_or(failure)?;
+    let left = (max_evaluations * starts.len()).saturating_sub(evaluations).min(max_evaluations);
+    if best.termination != Termination::MaxEvaluations || left == 0 {
+        return Ok(Polished { evaluations, ..best });
+    }
+    let found = polish(view, judge, by, &[best.parameters], left, observe)?;
+    Ok(Polished { evaluations: evaluations + found.evaluations, ..found })
 }
 
 /// The span of widths whose lobes differ visibly on a coarse picture; `None` for a model without widths.
