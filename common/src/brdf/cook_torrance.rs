@@ -17,8 +17,11 @@
 //! A photo determines the product `ks f0`, the specular colour at normal incidence, well, and its factors poorly.
 
 use super::{
-    Angles, BasisLobe, Lambert, LinearModel, Lobe, Parameter, Role, Split, Spread, Weight, Width, beckmann::beckmann,
+    Angles, BasisLobe, Lambert, Lights, LinearModel, Lobe, Parameter, Role, Split, Spread, Weight, Width,
+    beckmann::beckmann,
+    single::{self, Formula, Seen},
 };
+use crate::math::real::Real;
 
 /// The model `cook-torrance`.
 #[derive(Debug, Clone, Copy)]
@@ -67,12 +70,28 @@ impl Lobe for CookTorranceLobe {
         Some(width)
     }
 
-    /// `D G / (4 n.v)`; zero for light below the horizon and for half vectors below the surface.
     #[inline(always)]
     fn kernel(&self, g: &Angles, spread: &Spread, m: f64) -> f64 {
-        let cos_i = g.cos_i.max(0.0);
-        let (distribution, blur) = beckmann(g, spread, m);
-        let masking = (2.0 * g.cos_h.max(0.0) * g.cos_o.min(cos_i) / g.cos_d).min(1.0);
-        distribution * masking * blur / (4.0 * g.cos_o)
+        Self::value(&Seen::new(g, spread), m)
+    }
+
+    fn accumulate(&self, lights: &Lights, cos_o: f64, share: f64, widths: &[f64], sums: &mut [f64]) {
+        single::accumulate::<Self>(self.split(), lights, cos_o, share, widths, sums);
     }
 }
+
+impl Formula for CookTorranceLobe {
+    /// `D G / (4 n.v)`; zero for light below the horizon and for half vectors below the surface.
+    #[inline(always)]
+    fn value<T: Real>(g: &Seen<T>, m: T) -> T {
+        let zero = T::of(0.0);
+        let cos_i = g.cos_i.max(zero);
+        let (distribution, blur) = beckmann(g, m);
+        let cos_d = g.cos_d.max(T::of(LEAST_COS_D));
+        let masking = (T::of(2.0) * g.cos_h.max(zero) * g.cos_o.min(cos_i) / cos_d).min(T::of(1.0));
+        distribution * masking * blur / (T::of(4.0) * g.cos_o)
+    }
+}
+
+/// Least `v.h` by which the masking divides; lists of lights are padded with zeros.
+const LEAST_COS_D: f64 = 1e-9;

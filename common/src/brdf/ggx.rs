@@ -15,9 +15,9 @@
 
 use super::{
     Angles, BasisLobe, Lambert, Lights, LinearModel, Lobe, Parameter, Split, Spread, Weight, Width,
-    lobe::second_order,
-    single::{self, SingleLobe, single},
+    single::{self, Formula, Seen, second_order},
 };
+use crate::math::real::Real;
 use std::f64::consts::FRAC_1_PI;
 
 /// The model `ggx`.
@@ -59,23 +59,9 @@ impl Lobe for GgxLobe {
         Some(width)
     }
 
-    /// `D V n.l`: with `d = sin^2(th) + a^2 cos^2(th)` the distribution is `a^2 / (pi d^2)`, and
-    /// `V n.l = n.l / (2 (n.l s(n.v) + n.v s(n.l)))`, `s(c) = sqrt(a^2 + (1 - a^2) c^2)`.
-    ///
-    /// Spread: with `u = sin^2(th)` and `k = 1 - a^2`, `d = a^2 + k u`, so that `D'/D = -2 k / d` and `D''/D = 6 k^2 / d^2`.
     #[inline(always)]
     fn kernel(&self, g: &Angles, spread: &Spread, alpha: f64) -> f64 {
-        let a2 = alpha * alpha;
-        let k = 1.0 - a2;
-        let d = a2 + k * g.sin2_h;
-        let cos_i = g.cos_i.max(0.0);
-        let s_o = (a2 + k * g.cos_o * g.cos_o).sqrt();
-        let s_i = (a2 + k * cos_i * cos_i).sqrt();
-        // One division for both quotients: by d^2, and by d^2 times the denominator of V.
-        let visibility = cos_i * s_o + g.cos_o * s_i;
-        let inverse = 1.0 / (d * d * visibility);
-        let excess = k * (3.0 * k * spread.du2 - 2.0 * d * spread.du);
-        a2 * cos_i * second_order(excess * visibility * inverse) * inverse * (0.5 * FRAC_1_PI)
+        Self::value(&Seen::new(g, spread), alpha)
     }
 
     fn accumulate(&self, lights: &Lights, cos_o: f64, share: f64, widths: &[f64], sums: &mut [f64]) {
@@ -83,36 +69,24 @@ impl Lobe for GgxLobe {
     }
 }
 
-/// What the kernel needs of a width and the viewer, in single precision.
-#[derive(Debug, Clone, Copy, Default)]
-pub(super) struct SingleWidth {
-    a2: f32,
-    k: f32,
-    cos_o: f32,
-    s_o: f32,
-    scale: f32,
-}
-
-impl SingleLobe for GgxLobe {
-    type Width = SingleWidth;
-
-    fn width(alpha: f64, cos_o: f64) -> SingleWidth {
-        let a2 = alpha * alpha;
-        let k = 1.0 - a2;
-        let s_o = (a2 + k * cos_o * cos_o).sqrt();
-        let [a2, k, cos_o, s_o, scale] = single([a2, k, cos_o, s_o, a2 * 0.5 * FRAC_1_PI]);
-        SingleWidth { a2, k, cos_o, s_o, scale }
-    }
-
+impl Formula for GgxLobe {
+    /// `D V n.l`: with `d = sin^2(th) + a^2 cos^2(th)` the distribution is `a^2 / (pi d^2)`, and
+    /// `V n.l = n.l / (2 (n.l s(n.v) + n.v s(n.l)))`, `s(c) = sqrt(a^2 + (1 - a^2) c^2)`.
+    ///
+    /// Spread: with `u = sin^2(th)` and `k = 1 - a^2`, `d = a^2 + k u`, so that `D'/D = -2 k / d` and `D''/D = 6 k^2 / d^2`.
     #[inline(always)]
-    fn kernel(width: SingleWidth, cos_i: f32, sin2_h: f32, du: f32, du2: f32) -> f32 {
-        let SingleWidth { a2, k, cos_o, s_o, scale } = width;
-        let d = a2 + k * sin2_h;
+    fn value<T: Real>(g: &Seen<T>, alpha: T) -> T {
+        let one = T::of(1.0);
+        let a2 = alpha * alpha;
+        let k = one - a2;
+        let d = a2 + k * g.sin2_h;
+        let cos_i = g.cos_i.max(T::of(0.0));
+        let s_o = (a2 + k * g.cos_o * g.cos_o).sqrt();
         let s_i = (a2 + k * cos_i * cos_i).sqrt();
-        let visibility = cos_i * s_o + cos_o * s_i;
-        let inverse = 1.0 / (d * d * visibility);
-        let excess = k * (3.0 * k * du2 - 2.0 * d * du);
-        let second_order = (1.0 + excess * visibility * inverse).clamp(0.25, 2.0);
-        scale * cos_i * second_order * inverse
+        // One division for both quotients: by d^2, and by d^2 times the denominator of V.
+        let visibility = cos_i * s_o + g.cos_o * s_i;
+        let inverse = one / (d * d * visibility);
+        let excess = k * (T::of(3.0) * k * g.du2 - T::of(2.0) * d * g.du);
+        a2 * cos_i * second_order(excess * visibility * inverse) * inverse * T::of(0.5 * FRAC_1_PI)
     }
 }

@@ -1,6 +1,18 @@
 //! Light that falls on one surface point.
 
-use super::{Angles, Spread};
+use super::Angles;
+
+/// The effect of the spread of light around its mean direction on the half vector's angle; `n.l` is that of the mean direction.
+///
+/// With `u = sin^2(th)`, `th` the angle between half vector and normal, a lobe of distribution `D(u)` has the mean `D + D' du +
+/// D''/2 du2` to second order in the spread. With it a quadrature needs fewer directions.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Spread {
+    /// Mean change of `sin^2(th)`.
+    pub du: f64,
+    /// Mean square change of `sin^2(th)`.
+    pub du2: f64,
+}
 
 /// Lists of lights are padded to a multiple of this: as many single-precision numbers as the longest register has lanes.
 pub const BLOCK: usize = 16;

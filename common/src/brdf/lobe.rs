@@ -1,6 +1,6 @@
 //! One basis lobe, and the loop that integrates it for many widths at once.
 
-use super::{Angles, Lights};
+use super::{Angles, Lights, Spread};
 use crate::math::simd;
 use std::fmt::Debug;
 
@@ -20,27 +20,6 @@ pub enum Tail {
     Short,
     /// As `1/u`: a generalised Trowbridge-Reitz distribution of exponent 1 (Burley 2012, section B.2.1).
     Long,
-}
-
-/// The effect of the spread of light around its mean direction on the half vector's angle; `n.l` is that of the mean direction.
-///
-/// With `u = sin^2(th)`, `th` the angle between half vector and normal, a lobe of distribution `D(u)` has the mean `D + D' du +
-/// D''/2 du2` to second order in the spread. With it a quadrature needs fewer directions.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Spread {
-    /// Mean change of `sin^2(th)`.
-    pub du: f64,
-    /// Mean square change of `sin^2(th)`.
-    pub du2: f64,
-}
-
-/// The least square of `n.h` by which a kernel divides: single precision may round it to 0, and sharp lobes are dark there.
-pub(super) const LEAST_COS2: f64 = 1e-12;
-
-/// The factor `1 + x` of a second-order correction, clamped to the range in which a second-order expansion holds.
-#[inline(always)]
-pub(super) fn second_order(x: f64) -> f64 {
-    (1.0 + x).clamp(0.25, 2.0)
 }
 
 /// A lobe `f(wi, wo) cos(theta_i)` without Fresnel term, of a given width.

@@ -43,9 +43,9 @@ pub use ggx_f90::GgxF90;
 pub use lambert::Lambert;
 #[cfg(test)]
 pub(crate) use lights::Incident;
-pub use lights::{BLOCK, Lights};
+pub use lights::{BLOCK, Lights, Spread};
 pub use linear::{LinearModel, Weight};
-pub use lobe::{Expected, Lobe, Split, Spread, Tail};
+pub use lobe::{Expected, Lobe, Split, Tail};
 pub use model::{BasisLobe, Model, lobe_terms, term_count};
 pub use parameter::{Channels, Parameter, ParameterError, Role, Scale, flat_bounds, flat_len, flat_names, offset_of};
 pub use reflectance::{Material, Reflectance};

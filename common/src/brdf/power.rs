@@ -1,9 +1,6 @@
 //! The cosine of the half vector's angle to a power: the lobe of Blinn (1977) and of Ashikhmin & Shirley (2000).
 
-use super::{
-    Angles, Channels, Parameter, Role, Scale, Spread, Width,
-    lobe::{LEAST_COS2, second_order},
-};
+use super::{Angles, Channels, Parameter, Role, Scale, Spread, Width, single::second_order};
 use crate::math::elementary::{exp_nonpositive, ln_positive};
 
 /// The exponent as a parameter.
@@ -45,7 +42,8 @@ pub(super) fn beyond_kink(width: f64, cos_o: f64) -> f64 {
 /// second `k (k - 1) / (1 - u)^2`.
 #[inline(always)]
 pub(super) fn cosine(g: &Angles, spread: &Spread, alpha: f64) -> (f64, f64) {
-    let cos2 = (1.0 - g.sin2_h).max(LEAST_COS2);
+    // Near the surface 1 - u may round to 0 in single precision, in which angles are stored.
+    let cos2 = (1.0 - g.sin2_h).max(1e-12);
     let k = 0.5 * exponent(alpha);
     let inverse = 1.0 / cos2;
     let slope = k * inverse;

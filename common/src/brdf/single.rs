@@ -1,25 +1,46 @@
-//! The loop of [`Lobe::accumulate`](super::Lobe::accumulate) in single precision, for lobes that are as accurate in it.
+//! Formulas of lobes for either precision, and the loop of [`Lobe::accumulate`](super::Lobe::accumulate) in single precision.
 
 use super::{
-    Split,
+    Angles, Split, Spread,
     lights::{BLOCK, Lights},
 };
-use crate::math::{simd, to_f32};
+use crate::math::{real::Real, simd, to_f32};
+use std::marker::PhantomData;
 
-/// A lobe in single precision.
-pub(super) trait SingleLobe: Sync {
-    /// Numbers that depend on the width and the viewer only.
-    type Width: Copy + Default;
+/// Light at a surface point: angles and spread.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Seen<T> {
+    pub(super) cos_i: T,
+    pub(super) cos_o: T,
+    pub(super) cos_h: T,
+    pub(super) sin2_h: T,
+    pub(super) cos_d: T,
+    pub(super) du: T,
+    pub(super) du2: T,
+}
 
-    /// These numbers for a width and `n . v`.
-    fn width(width: f64, cos_o: f64) -> Self::Width;
+impl Seen<f64> {
+    #[inline(always)]
+    pub(super) fn new(g: &Angles, spread: &Spread) -> Self {
+        let Angles { cos_i, cos_o, cos_h, sin2_h, cos_d } = *g;
+        Self { cos_i, cos_o, cos_h, sin2_h, cos_d, du: spread.du, du2: spread.du2 }
+    }
+}
 
-    /// [`Lobe::kernel`](super::Lobe::kernel), from `n . l`, `sin^2(th)`, `du` and `du2`. Mark it `#[inline(always)]`.
-    fn kernel(width: Self::Width, cos_i: f32, sin2_h: f32, du: f32, du2: f32) -> f32;
+/// A formula of a lobe that is as accurate in single precision.
+pub(super) trait Formula: Sync {
+    /// [`Lobe::kernel`](super::Lobe::kernel). Mark it `#[inline(always)]`, or the loop over the lights is not vectorised.
+    fn value<T: Real>(g: &Seen<T>, width: T) -> T;
+}
+
+/// The factor `1 + x` of a second-order correction, clamped to the range in which a second-order expansion holds.
+#[inline(always)]
+pub(super) fn second_order<T: Real>(x: T) -> T {
+    (T::of(1.0) + x).max(T::of(0.25)).min(T::of(2.0))
 }
 
 /// Adds the basis integrals of a lobe: see [`Lobe::accumulate`](super::Lobe::accumulate).
-pub(super) fn accumulate<L: SingleLobe>(
+pub(super) fn accumulate<F: Formula>(
     split: Split,
     lights: &Lights,
     cos_o: f64,
@@ -27,17 +48,18 @@ pub(super) fn accumulate<L: SingleLobe>(
     widths: &[f64],
     sums: &mut [f64],
 ) {
+    let count = widths.len();
     for (chunk, some) in widths.chunks(WIDTHS).enumerate() {
-        let mut of_widths = [L::Width::default(); WIDTHS];
-        some.iter().zip(&mut of_widths).for_each(|(&width, of_width)| *of_width = L::width(width, cos_o));
         let mut totals = [[[0.0; BLOCK]; ROWS]; WIDTHS];
-        let of_widths = &of_widths[..some.len()];
-        simd::dispatch(Accumulate::<L> { split, lights, widths: of_widths, totals: &mut totals });
+        let widths: Vec<f32> = some.iter().map(|width| to_f32(*width)).collect();
+        let formula = PhantomData::<F>;
+        let cos_o = to_f32(cos_o);
+        simd::dispatch(Accumulate { formula, split, lights, cos_o, widths: &widths, totals: &mut totals });
         for (w, totals) in totals[..some.len()].iter().enumerate() {
             let rows = if split == Split::Whole { 3 } else { ROWS };
             for (row, lanes) in totals[..rows].iter().enumerate() {
                 let total: f64 = lanes.iter().map(|x| f64::from(*x)).sum();
-                sums[row * widths.len() + chunk * WIDTHS + w] += share * total;
+                sums[row * count + chunk * WIDTHS + w] += share * total;
             }
         }
     }
@@ -50,28 +72,30 @@ const WIDTHS: usize = 8;
 const ROWS: usize = 6;
 
 /// Blocks of lights outside, widths inside. A sum runs over every [`BLOCK`]th light, so its bits are the same at all SIMD levels.
-struct Accumulate<'a, L: SingleLobe> {
+struct Accumulate<'a, F: Formula> {
+    formula: PhantomData<F>,
     split: Split,
     lights: &'a Lights,
-    widths: &'a [L::Width],
+    cos_o: f32,
+    widths: &'a [f32],
     totals: &'a mut [[[f32; BLOCK]; ROWS]; WIDTHS],
 }
 
-impl<L: SingleLobe> pulp::NullaryFnOnce for Accumulate<'_, L> {
+impl<'a, F: Formula> pulp::NullaryFnOnce for Accumulate<'a, F> {
     type Output = ();
 
     #[inline(always)]
     fn call(self) {
-        let Lights { energy: [red, green, blue], cos_i, sin2_h, cos_d, du, du2, .. } = self.lights;
-        let blocks = cos_i.as_chunks::<BLOCK>().0.iter().zip(sin2_h.as_chunks::<BLOCK>().0);
-        let blocks = blocks.zip(du.as_chunks::<BLOCK>().0.iter().zip(du2.as_chunks::<BLOCK>().0));
-        let energies = red.as_chunks::<BLOCK>().0.iter().zip(green.as_chunks::<BLOCK>().0);
-        let energies = energies.zip(blue.as_chunks::<BLOCK>().0.iter().zip(cos_d.as_chunks::<BLOCK>().0));
-        for (((cos_i, sin2_h), (du, du2)), ((red, green), (blue, cos_d))) in blocks.zip(energies) {
-            let mut weights = [*red, *green, *blue, [0.0; BLOCK], [0.0; BLOCK], [0.0; BLOCK]];
+        let Lights { energy, cos_i, cos_h, sin2_h, cos_d, du, du2 } = self.lights;
+        let blocks = |list: &'a [f32]| list.as_chunks::<BLOCK>().0;
+        let [red, green, blue] = energy.each_ref().map(|list| blocks(list));
+        let (cos_i, cos_h, sin2_h) = (blocks(cos_i), blocks(cos_h), blocks(sin2_h));
+        let (cos_d, du, du2) = (blocks(cos_d), blocks(du), blocks(du2));
+        for block in 0..cos_i.len() {
+            let mut weights = [red[block], green[block], blue[block], [0.0; BLOCK], [0.0; BLOCK], [0.0; BLOCK]];
             if self.split == Split::Schlick {
                 for k in 0..BLOCK {
-                    let x = (1.0 - cos_d[k]).max(0.0);
+                    let x = (1.0 - cos_d[block][k]).max(0.0);
                     let f5 = x * x * (x * x) * x;
                     for channel in 0..3 {
                         let energy = weights[channel][k];
@@ -83,7 +107,16 @@ impl<L: SingleLobe> pulp::NullaryFnOnce for Accumulate<'_, L> {
             for (&width, totals) in self.widths.iter().zip(self.totals.iter_mut()) {
                 let mut value = [0.0; BLOCK];
                 for k in 0..BLOCK {
-                    value[k] = L::kernel(width, cos_i[k], sin2_h[k], du[k], du2[k]);
+                    let seen = Seen {
+                        cos_i: cos_i[block][k],
+                        cos_o: self.cos_o,
+                        cos_h: cos_h[block][k],
+                        sin2_h: sin2_h[block][k],
+                        cos_d: cos_d[block][k],
+                        du: du[block][k],
+                        du2: du2[block][k],
+                    };
+                    value[k] = F::value(&seen, width);
                 }
                 for (total, weights) in totals.iter_mut().zip(&weights) {
                     for k in 0..BLOCK {
@@ -93,9 +126,4 @@ impl<L: SingleLobe> pulp::NullaryFnOnce for Accumulate<'_, L> {
             }
         }
     }
-}
-
-/// Numbers in single precision.
-pub(super) fn single<const N: usize>(numbers: [f64; N]) -> [f32; N] {
-    numbers.map(to_f32)
 }

@@ -14,6 +14,7 @@
 
 use super::{
     Angles, BasisLobe, Lambert, LinearModel, Lobe, Parameter, Split, Spread, Weight, Width, beckmann::beckmann,
+    single::Seen,
 };
 
 /// The model `ward`.
@@ -63,7 +64,7 @@ impl Lobe for WardLobe {
     /// Zero for light below the horizon, where `v.h` may be 0; above the horizon it is at least `n.v / 2`.
     #[inline(always)]
     fn kernel(&self, g: &Angles, spread: &Spread, alpha: f64) -> f64 {
-        let (distribution, blur) = beckmann(g, spread, alpha);
+        let (distribution, blur) = beckmann(&Seen::new(g, spread), alpha);
         let cos_d2 = (g.cos_d * g.cos_d).max(f64::MIN_POSITIVE);
         distribution * blur * g.cos_i.max(0.0) / (4.0 * cos_d2)
     }

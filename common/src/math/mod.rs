@@ -8,6 +8,7 @@ pub mod elementary;
 pub mod frame;
 pub mod hermite;
 pub(crate) mod lanes;
+pub(crate) mod real;
 pub mod sampling;
 pub mod simd;
 pub mod warp;

@@ -2,8 +2,11 @@
 //!
 //! Both are `D G / (4 n.l n.v)` with separable Smith masking, `G1(c) / (2 c) = 1/(c + sqrt(g^2 + (1 - g^2) c^2))`.
 
-use super::super::{Angles, Expected, Lobe, Split, Spread, Tail, Width, lobe::second_order};
-use crate::math::elementary::ln_positive;
+use super::super::{
+    Angles, Expected, Lights, Lobe, Split, Spread, Tail, Width,
+    single::{self, Formula, Seen, second_order},
+};
+use crate::math::real::Real;
 use std::f64::consts::FRAC_1_PI;
 
 /// Smallest roughness, for a width of 0.005.
@@ -33,8 +36,9 @@ pub(super) const fn gloss(entry: usize) -> Width {
 
 /// `G1(c) / (2 c)` of Smith's masking with the squared width `g2`.
 #[inline(always)]
-fn masked(cos: f64, g2: f64) -> f64 {
-    1.0 / (cos + (g2 + (1.0 - g2) * cos * cos).sqrt())
+fn masked<T: Real>(cos: T, g2: T) -> T {
+    let one = T::of(1.0);
+    one / (cos + (g2 + (one - g2) * cos * cos).sqrt())
 }
 
 /// The specular lobe without Fresnel.
@@ -59,18 +63,35 @@ impl Lobe for Specular {
         Expected { sharp_albedo: |_, _| (1.0, 0.15), ..Expected::default() }
     }
 
+    #[inline(always)]
+    fn kernel(&self, g: &Angles, spread: &Spread, width: f64) -> f64 {
+        Self::value(&Seen::new(g, spread), width)
+    }
+
+    fn accumulate(&self, lights: &Lights, cos_o: f64, share: f64, widths: &[f64], sums: &mut [f64]) {
+        single::accumulate::<Self>(self.split(), lights, cos_o, share, widths, sums);
+    }
+}
+
+impl Formula for Specular {
     /// `D` and its mean over the spread of light are those of `ggx`.
     #[inline(always)]
-    fn kernel(&self, g: &Angles, spread: &Spread, alpha: f64) -> f64 {
+    fn value<T: Real>(g: &Seen<T>, alpha: T) -> T {
         let a2 = alpha * alpha;
-        let k = 1.0 - a2;
+        let k = T::of(1.0) - a2;
         let d = a2 + k * g.sin2_h;
-        let cos_i = g.cos_i.max(0.0);
-        let wider = 0.5 + 0.5 * alpha.sqrt();
+        let cos_i = g.cos_i.max(T::of(0.0));
+        let wider = T::of(0.5) + T::of(0.5) * alpha.sqrt();
         let g2 = wider * wider * wider * wider;
-        let inverse = 1.0 / (d * d);
-        let excess = k * (3.0 * k * spread.du2 - 2.0 * d * spread.du);
-        FRAC_1_PI * a2 * inverse * second_order(excess * inverse) * cos_i * masked(cos_i, g2) * masked(g.cos_o, g2)
+        let inverse = T::of(1.0) / (d * d);
+        let excess = k * (T::of(3.0) * k * g.du2 - T::of(2.0) * d * g.du);
+        T::of(FRAC_1_PI)
+            * a2
+            * inverse
+            * second_order(excess * inverse)
+            * cos_i
+            * masked(cos_i, g2)
+            * masked(g.cos_o, g2)
     }
 }
 
@@ -108,17 +129,29 @@ impl Lobe for Clearcoat {
         Expected { most_albedo: 1.255, sharp_albedo: |_, _| (1.0, 0.13), ..Expected::default() }
     }
 
+    #[inline(always)]
+    fn kernel(&self, g: &Angles, spread: &Spread, width: f64) -> f64 {
+        Self::value(&Seen::new(g, spread), width)
+    }
+
+    fn accumulate(&self, lights: &Lights, cos_o: f64, share: f64, widths: &[f64], sums: &mut [f64]) {
+        single::accumulate::<Self>(self.split(), lights, cos_o, share, widths, sums);
+    }
+}
+
+impl Formula for Clearcoat {
     /// `D = (1 - a^2) / (-pi ln(a^2)) / d`, `d = a^2 + (1 - a^2) u`, `u = sin^2(th)`. Spread: with `k = 1 - a^2`, `D'/D = -k/d` and
     /// `D''/D = 2 k^2/d^2`.
     #[inline(always)]
-    fn kernel(&self, g: &Angles, spread: &Spread, width: f64) -> f64 {
+    fn value<T: Real>(g: &Seen<T>, width: T) -> T {
         let a2 = width * width;
-        let k = 1.0 - a2;
-        let inverse = 1.0 / (a2 + k * g.sin2_h);
-        let cos_i = g.cos_i.max(0.0);
+        let k = T::of(1.0) - a2;
+        let inverse = T::of(1.0) / (a2 + k * g.sin2_h);
+        let cos_i = g.cos_i.max(T::of(0.0));
         let slope = k * inverse;
-        let blur = second_order(slope * (slope * spread.du2 - spread.du));
-        let peak = -0.5 * FRAC_1_PI * k / ln_positive(width);
-        peak * inverse * blur * cos_i * masked(cos_i, COAT_MASKING) * masked(g.cos_o, COAT_MASKING)
+        let blur = second_order(slope * (slope * g.du2 - g.du));
+        let peak = T::of(-0.5 * FRAC_1_PI) * k / width.ln_positive();
+        let masking = T::of(COAT_MASKING);
+        peak * inverse * blur * cos_i * masked(cos_i, masking) * masked(g.cos_o, masking)
     }
 }
