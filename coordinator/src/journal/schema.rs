@@ -135,12 +135,18 @@ fn unfinished(path: &Path) -> PathBuf {
     beside(path, ".new")
 }
 
-/// Remove a journal, if there is one. The journal itself goes last, because a log without its journal is useless and harmless.
+/// Remove a journal, if there is one. The journal itself goes last: SQLite would replay a log that is left without it into the next journal
+/// of that name.
 ///
 /// # Errors
 /// When a file cannot be removed.
 pub fn remove(path: &Path) -> io::Result<()> {
-    for file in files(path).iter().rev() {
+    remove_all(&files(path))
+}
+
+/// Remove those of the files that exist, from the last.
+fn remove_all(files: &[PathBuf]) -> io::Result<()> {
+    for file in files.iter().rev() {
         match std::fs::remove_file(file) {
             Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(error),
             _ => {}
@@ -166,6 +172,8 @@ pub(super) fn create(
         let _ = remove(&unfinished);
     }
     made?;
+    // A log of an earlier journal, which the user has removed, would be replayed into this one.
+    remove_all(&files(path)[1..]).map_err(creating)?;
     atomic::rename(&unfinished, path).map_err(creating)?;
     connect(path, is_shared(path))
 }

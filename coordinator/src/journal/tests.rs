@@ -119,6 +119,23 @@ fn torn_write_loses_only_the_unfinished_transaction() {
     }
 }
 
+/// A killed run leaves its log; then the user removes the journal alone.
+#[test]
+fn log_of_a_removed_journal_is_not_replayed_into_a_new_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut journal = begun(&folder);
+    write(&mut journal, [completed(1)]);
+    let copy = copied(&folder);
+    fs::remove_file(copy.path().join("run.sqlite")).unwrap();
+    let mut again = begun(&copy);
+    assert_eq!(again.past_outputs().of(key(1)), Memory::default());
+    write(&mut again, [completed(2)]);
+    drop(again);
+    let again = Journal::open(&options(&copy), NAME, None).unwrap();
+    let mut past = again.past_outputs();
+    assert_eq!((past.of(key(1)).output, past.of(key(2)).output), (None, Some(output(2))));
+}
+
 #[test]
 fn epoch_numbers_are_never_reused_whatever_is_left_of_the_log() {
     let folder = tempfile::tempdir().unwrap();
