@@ -82,7 +82,7 @@ pub struct Status {
     pub requeued: u64,
     /// The best score so far.
     pub best_score: Option<f64>,
-    /// The nodes that failed, at most 100.
+    /// The nodes that failed in the last epoch, at most 100.
     pub failures: Vec<NodeError>,
     /// The parts of a run of many, in their order.
     #[serde(default, rename = "part_list", skip_serializing_if = "Vec::is_empty")]

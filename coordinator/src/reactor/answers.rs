@@ -144,11 +144,11 @@ pub(super) fn is_chosen(core: &Core, spec: &NodeSpec, node: NodeId) -> bool {
     if fraction <= 0.0 {
         return false;
     }
-    let inputs = core.graph.input_blobs(node).unwrap_or_default();
+    let inputs = core.graph.input_hashes(node).unwrap_or_default();
     let mut named = core.policy.verify_seed.to_le_bytes().to_vec();
     named.extend_from_slice(spec.kind.as_bytes());
     named.extend_from_slice(&BlobHash::of(&spec.parameters).0);
-    inputs.iter().for_each(|input| named.extend_from_slice(&input.hash().0));
+    inputs.iter().for_each(|input| named.extend_from_slice(&input.0));
     let [a, b, c, d, ..] = BlobHash::of(&named).0;
     // Uniform in [0, 1).
     f64::from(u32::from_le_bytes([a, b, c, d])) / (f64::from(u32::MAX) + 1.0) < fraction
