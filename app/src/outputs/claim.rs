@@ -4,6 +4,7 @@
 //! |---|---|---|---|---|
 //! | a run (journal) | refused | resumed | replaced | replaced if it is a demo |
 //! | a file with one of our names | refused | kept if the run wrote it, else refused | replaced | as a run |
+//! | another file that an earlier run wrote, unchanged | kept | kept | removed | removed |
 //! | an input of the run with such a name | refused | refused | refused | refused |
 //! | a symbolic link or a folder with such a name | refused | refused | refused | refused |
 
@@ -109,7 +110,11 @@ impl<'a> Claim<'a> {
                 "{shown} holds a finished fit ({MARK}) without the journal of its run, so there is nothing to resume: choose \
                  another --out, or replace it with --force"
             ),
-            OldFiles::ReplaceDemo if has_journal || self.names().iter().any(|name| is_there(&self.out.join(name))) => {
+            OldFiles::ReplaceDemo
+                if has_journal
+                    || (ledger.is_begun() && !ledger.is_of("demo"))
+                    || self.names().iter().any(|name| is_there(&self.out.join(name))) =>
+            {
                 self.check_demo(ledger)?;
             }
             _ => {}
@@ -147,9 +152,8 @@ impl<'a> Claim<'a> {
     /// The existing files that the run replaces.
     pub(super) fn replaced(&self, ledger: &Ledger) -> Vec<PathBuf> {
         // The mark goes first, so that a partly removed fit does not count as finished.
-        let is_theirs =
-            |name: &String| self.old == OldFiles::ReplaceDemo && !self.is_of_run(name, &self.out.join(name), ledger);
-        let of_ledger = ledger.names().into_iter().filter(|name| !is_theirs(name));
+        // Of what this run does not write, only what another run wrote and nobody has changed.
+        let of_ledger = ledger.names().into_iter().filter(|name| self.is_of_run(name, &self.out.join(name), ledger));
         let names = [MARK.to_owned()].into_iter().chain(self.names()).chain(of_ledger);
         let mut seen = BTreeSet::new();
         names
@@ -205,7 +209,8 @@ impl<'a> Claim<'a> {
             return Ok(());
         }
         let found = [MARK, JOURNAL_FILE].into_iter().map(str::to_owned).chain(self.names());
-        let found = found.into_iter().find(|name| is_there(&self.out.join(name))).unwrap_or_default();
+        let found = found.into_iter().chain([LEDGER.to_owned()]).find(|name| is_there(&self.out.join(name)));
+        let found = found.unwrap_or_default();
         bail!(
             "{} holds files that are not from a demo ({found}): choose another folder with --out, or replace it with --force",
             self.out.display()
@@ -235,7 +240,7 @@ impl<'a> Claim<'a> {
             OldFiles::Replace => !is_folder || ledger.is_begun(),
             // Left by a run that ended before it had a journal.
             OldFiles::Refuse => is_rewritten && ledger.is_begun(),
-            // SQLite removes them.
+            // The new journal removes them.
             OldFiles::Resume if is_companion => ledger.is_begun(),
             OldFiles::Resume if is_passing => has_journal || ledger.is_begun(),
             OldFiles::Resume | OldFiles::ReplaceDemo if ledger.is_begun() => {

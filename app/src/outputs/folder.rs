@@ -97,14 +97,12 @@ impl ClaimedFolder {
 }
 
 impl Claim<'_> {
-    /// With `--force`: removes the files that the run replaces, ahead of the run.
+    /// Removes the files that the run replaces, ahead of the run.
     ///
     /// # Errors
     /// Those of [`ClaimedFolder::take`] and [`ClaimedFolder::begin`].
     pub(crate) fn replace_now(&self) -> anyhow::Result<()> {
-        if self.old == OldFiles::Replace {
-            ClaimedFolder::take(self)?.begin()?;
-        }
+        ClaimedFolder::take(self)?.begin()?;
         Ok(())
     }
 }

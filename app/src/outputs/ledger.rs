@@ -46,7 +46,8 @@ impl Ledger {
             match (line.strip_prefix("# lookalike "), line.split_once("  ")) {
                 (Some(command), _) => state.command = Some(command.to_owned()),
                 (None, Some((_, name))) if !is_inside(name) => bail!(
-                    "{} names {name:?}, where no run in this folder writes a file: choose another --out, or move {LEDGER} elsewhere",
+                    "{} lists {name:?}, which is not a file of this folder, so it is damaged or another program wrote it: choose another \
+                     --out, or move {LEDGER} elsewhere",
                     path.display()
                 ),
                 (None, Some((hash, name))) => _ = state.written.insert((name.to_owned(), hash.to_owned())),
@@ -172,7 +173,7 @@ mod tests {
         for name in ["../mine", "a/../../mine", "../../x", "/etc/hosts", "..", "a/b/c", ".", ""] {
             fs::write(&path, format!("# lookalike fit\nab  match.exr\ncd  {name}\n")).unwrap();
             let error = Ledger::read(folder.path()).unwrap_err().to_string();
-            assert!(error.contains(&format!("run.written names {name:?}")), "{error}");
+            assert!(error.contains(&format!("run.written lists {name:?}")), "{error}");
         }
     }
 }

@@ -75,16 +75,30 @@ fn demo_replaces_demos_only() {
 }
 
 #[test]
-fn demo_removes_only_files_with_the_bytes_that_its_ledger_records() {
+fn files_that_another_run_wrote_are_removed_only_with_the_bytes_that_its_ledger_records() {
+    type Next = fn(&Path) -> Claim<'_>;
+    let next: [Next; 2] = [|out| demo(out, OldFiles::ReplaceDemo), |out| fit(out, OldFiles::Replace)];
+    for next in next {
+        let folder = folder(&[]);
+        let at = |name: &str| folder.path().join(name);
+        let out = begin(&demo(folder.path(), OldFiles::ReplaceDemo));
+        out.write("old.png", b"ours").unwrap();
+        out.write("notes.txt", b"ours").unwrap();
+        drop(out);
+        fs::write(at("notes.txt"), "mine").unwrap();
+        drop(begin(&next(folder.path())));
+        assert!(!at("old.png").exists() && at("notes.txt").exists());
+    }
+}
+
+#[test]
+fn demo_refuses_the_files_of_a_batch_whose_journal_is_gone() {
     let folder = folder(&[]);
-    let at = |name: &str| folder.path().join(name);
-    let out = begin(&demo(folder.path(), OldFiles::ReplaceDemo));
-    out.write("old.png", b"ours").unwrap();
-    out.write("notes.txt", b"ours").unwrap();
-    drop(out);
-    fs::write(at("notes.txt"), "mine").unwrap();
-    drop(begin(&demo(folder.path(), OldFiles::ReplaceDemo)));
-    assert!(!at("old.png").exists() && at("notes.txt").exists());
+    let batch = Claim { command: "batch", fits: vec!["a"], ..fit(folder.path(), OldFiles::Refuse) };
+    begin(&batch).write("report.txt", b"ours").unwrap();
+    fs::remove_file(folder.path().join("run.sqlite")).ok();
+    refused(&demo(folder.path(), OldFiles::ReplaceDemo), &["holds files that are not from a demo (run.written)"]);
+    assert!(folder.path().join("report.txt").exists());
 }
 
 #[test]
@@ -95,8 +109,8 @@ fn nothing_outside_the_folder_is_removed() {
     for name in ["../mine", mine.to_str().unwrap()] {
         for command in ["fit", "demo"] {
             fs::write(out.join("run.written"), format!("# lookalike {command}\nab  {name}\n")).unwrap();
-            refused(&fit(&out, OldFiles::Replace), &["run.written names", "choose another --out"]);
-            refused(&demo(&out, OldFiles::ReplaceDemo), &["run.written names"]);
+            refused(&fit(&out, OldFiles::Replace), &["run.written lists", "choose another --out"]);
+            refused(&demo(&out, OldFiles::ReplaceDemo), &["run.written lists"]);
         }
     }
     assert_eq!(fs::read(mine).unwrap(), b"precious");
