@@ -148,12 +148,16 @@ fn claim(settings: &BatchSettings) -> Claim<'_> {
     }
 }
 
-/// Checks a batch that a job is to run, and carries out `--force`, which the job does not get.
-pub(crate) fn prepare_job(settings: &BatchSettings) -> anyhow::Result<()> {
-    let claim = claim(settings);
-    claim.check()?;
+/// Checks a batch that a job is to run.
+pub(crate) fn check_job(settings: &BatchSettings) -> anyhow::Result<()> {
+    claim(settings).check()?;
     show_warnings(&check::check(settings, &Lights::default())?.warnings);
-    claim.replace_now()
+    Ok(())
+}
+
+/// Carries out `--force`, which the job does not get.
+pub(crate) fn replace_old(settings: &BatchSettings) -> anyhow::Result<()> {
+    claim(settings).replace_now()
 }
 
 /// The files of all fits, each with its hash.

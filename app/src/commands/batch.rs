@@ -3,7 +3,7 @@
 use super::submit;
 use crate::{
     batch,
-    settings::{BatchSettings, JobSettings},
+    settings::{BatchSettings, JobSettings, OldFiles},
 };
 use std::process::ExitCode;
 
@@ -13,5 +13,6 @@ pub(crate) fn run(settings: BatchSettings) -> anyhow::Result<ExitCode> {
 
 /// Submits the batch.
 pub(crate) fn submit(settings: &BatchSettings, job: JobSettings) -> anyhow::Result<ExitCode> {
-    submit::submit(job, &settings.out, || batch::prepare_job(settings))
+    let replace = (settings.old_files == OldFiles::Replace).then_some(|| batch::replace_old(settings));
+    submit::submit(job, &settings.out, || batch::check_job(settings), replace)
 }

@@ -2,7 +2,7 @@
 
 use super::submit;
 use crate::{
-    settings::{JobSettings, StudySettings},
+    settings::{JobSettings, OldFiles, StudySettings},
     study,
 };
 use std::process::ExitCode;
@@ -13,5 +13,6 @@ pub(crate) fn run(settings: StudySettings) -> anyhow::Result<ExitCode> {
 
 /// Submits the study.
 pub(crate) fn submit(settings: &StudySettings, job: JobSettings) -> anyhow::Result<ExitCode> {
-    submit::submit(job, &settings.out, || study::prepare_job(settings))
+    let replace = (settings.old_files == OldFiles::Replace).then_some(|| study::replace_old(settings));
+    submit::submit(job, &settings.out, || study::check_job(settings), replace)
 }

@@ -9,12 +9,13 @@ use crate::{
 use anyhow::Context;
 use std::{env, path, path::Path, process::ExitCode};
 
-/// Submits a run whose results go to the folder `out`. `prepare` runs before the job is queued and reports
-/// problems of its inputs.
+/// Submits a run whose results go to the folder `out`. `check` reports problems of its inputs; `replace` removes old results, which the job
+/// would refuse, once `sbatch` has found nothing wrong with the job.
 pub(crate) fn submit(
     job: JobSettings,
     out: &Path,
-    prepare: impl FnOnce() -> anyhow::Result<()>,
+    check: impl FnOnce() -> anyhow::Result<()>,
+    replace: Option<impl FnOnce() -> anyhow::Result<()>>,
 ) -> anyhow::Result<ExitCode> {
     let job = SlurmJob {
         command: command_line(&job.typed)?,
@@ -24,7 +25,11 @@ pub(crate) fn submit(
         out: path::absolute(out).context("--out")?,
     };
     job.script()?;
-    prepare()?;
+    check()?;
+    if let Some(replace) = replace {
+        job.test("sbatch")?;
+        replace()?;
+    }
     if job.options.is_empty() {
         let note = "note: no options for sbatch were given after --, such as -- --nodes=4 --cpus-per-task=16, so the job gets the \
                     cluster's defaults, often one CPU";

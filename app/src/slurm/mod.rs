@@ -57,6 +57,21 @@ impl Submitted {
 }
 
 impl SlurmJob {
+    /// Writes the job script and lets `sbatch` check it without submitting it.
+    ///
+    /// # Errors
+    /// Those of [`SlurmJob::submit`].
+    pub fn test(&self, sbatch: &str) -> anyhow::Result<()> {
+        let script = self.write()?;
+        let output = Command::new(sbatch).arg("--test-only").arg(&script).current_dir(&self.folder).output();
+        let output = output.map_err(|error| not_started(&error, sbatch, &script))?;
+        // What it says of a job that it would accept is no warning.
+        if output.status.success() {
+            return Ok(());
+        }
+        refused(&output, sbatch).context("the job would not be accepted, so nothing was removed or submitted")
+    }
+
     /// Writes the job script into the folder of results and submits it with `sbatch`, a name or a path.
     ///
     /// # Errors

@@ -117,14 +117,18 @@ pub(crate) fn run(settings: StudySettings) -> anyhow::Result<ExitCode> {
     Ok(if failed.is_empty() { Exit::Done } else { Exit::SomeFitsFailed }.into())
 }
 
-/// Checks a study that a job is to run, and carries out `--force`, which the job does not get.
-pub(crate) fn prepare_job(settings: &StudySettings) -> anyhow::Result<()> {
+/// Checks a study that a job is to run.
+pub(crate) fn check_job(settings: &StudySettings) -> anyhow::Result<()> {
     let study = Study::read(&settings.study)?;
-    let claim = claim(settings, &study);
-    claim.check()?;
+    claim(settings, &study).check()?;
     cells::plan(&study)?;
     read_inputs(&study, settings.progress)?;
-    claim.replace_now()
+    Ok(())
+}
+
+/// Carries out `--force`, which the job does not get.
+pub(crate) fn replace_old(settings: &StudySettings) -> anyhow::Result<()> {
+    claim(settings, &Study::read(&settings.study)?).replace_now()
 }
 
 /// Computes the cells that are not complete. Returns how many workers joined.

@@ -80,6 +80,31 @@ fn force_is_carried_out_at_submission_and_is_not_in_the_job() {
     }
 }
 
+/// A job that would not be accepted, a foreign file in the place of its script, and a machine without Slurm.
+#[test]
+fn force_removes_nothing_if_the_job_cannot_be_submitted() {
+    let refusing = site("echo 'sbatch: error: invalid partition specified: gold' >&2; exit 1");
+    let foreign = site("echo 4711");
+    let without = site("");
+    fs::remove_file(without.path().join("sbatch")).unwrap();
+    let cases = [
+        (&refusing, "invalid partition"),
+        (&foreign, "is not a job script of this program"),
+        (&without, "cannot find sbatch"),
+    ];
+    for (site, words) in cases {
+        let at = |name: &str| site.path().join("run").join(name);
+        fs::create_dir_all(at("")).unwrap();
+        fs::write(at("summary.csv"), "old").unwrap();
+        if words.contains("job script") {
+            fs::write(at("lookalike.sbatch"), "mine").unwrap();
+        }
+        let (code, stdout, stderr) = say(site.path(), "batch two.toml --out run --slurm --force");
+        assert!(code != Some(0) && stdout.is_empty() && stderr.contains(words), "{stderr}");
+        assert_eq!(fs::read_to_string(at("summary.csv")).unwrap(), "old");
+    }
+}
+
 #[test]
 fn mistakes_are_reported_before_anything_is_submitted() {
     let site = site("touch submitted; echo 4711");

@@ -118,7 +118,7 @@ fn commands_and_flags_in_documents_exist() {
         "--test",
     ];
     // Of sbatch, podman, kubectl and a validator.
-    const OF_CLUSTERS: [&str; 14] = [
+    const OF_CLUSTERS: [&str; 15] = [
         "--array",
         "--cpus-per-task",
         "--exclusive",
@@ -132,6 +132,7 @@ fn commands_and_flags_in_documents_exist() {
         "--signal",
         "--strict",
         "--tag",
+        "--test-only",
         "--time",
     ];
     // Of oiiotool, which scales and mirrors maps.
