@@ -2,7 +2,11 @@
 
 use anyhow::{Context, anyhow, bail};
 use lookalike_coordinator::atomic;
-use std::{fs, io::ErrorKind, path::Path};
+use std::{
+    fs,
+    io::{self, ErrorKind},
+    path::Path,
+};
 
 /// Checks whether a file can be written, before the work whose result it will hold. It may replace a file, but no input of the command.
 pub(crate) fn check_writable(path: &Path, inputs: &[&Path]) -> anyhow::Result<()> {
@@ -29,19 +33,23 @@ pub(crate) fn check_writable(path: &Path, inputs: &[&Path]) -> anyhow::Result<()
         if fs::symlink_metadata(&draft).is_ok() {
             bail!("{} would be replaced; it may be left from a killed process: remove it or move it", draft.display());
         }
-        Ok(())
+        // The file is written beside its place and then moved there.
+        fs::File::create_new(&draft).and_then(|_| fs::remove_file(&draft)).map_err(explained)
     };
     writable().with_context(|| cannot_write(path))
 }
 
 /// Writes a whole file, atomically.
 pub(crate) fn write_file(path: &Path, bytes: &[u8]) -> anyhow::Result<()> {
-    let explained = atomic::write(path, bytes).map_err(|error| match error.kind() {
+    atomic::write(path, bytes).map_err(explained).with_context(|| cannot_write(path))
+}
+
+fn explained(error: io::Error) -> anyhow::Error {
+    match error.kind() {
         ErrorKind::PermissionDenied => anyhow!("this user may not write there; choose another place"),
         ErrorKind::StorageFull => anyhow!("the disk is full; free some space or choose another place"),
         _ => anyhow!(error),
-    });
-    explained.with_context(|| cannot_write(path))
+    }
 }
 
 fn cannot_write(path: &Path) -> String {

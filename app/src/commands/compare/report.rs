@@ -3,13 +3,13 @@
 use super::coverage::{Coverage, Object};
 use crate::{
     inputs::{LoadedMask, LoadedPhoto},
+    outputs::print_result,
     settings::{CompareSettings, DisplayExposure},
     wrap::wrap,
 };
 use anyhow::Context;
 use lookalike::metric::Difference;
 use serde_json::{Map, Value, json};
-use std::io::{self, ErrorKind, Write};
 
 /// Everything that the report shows.
 #[derive(Debug)]
@@ -27,11 +27,7 @@ impl Report<'_> {
     /// Writes the report to stdout.
     pub(super) fn print(&self) -> anyhow::Result<()> {
         let text = if self.settings.json { format!("{:#}\n", self.json()) } else { self.table() };
-        match io::stdout().write_all(text.as_bytes()) {
-            // The reader has closed the pipe, as in `| head`.
-            Err(error) if error.kind() == ErrorKind::BrokenPipe => Ok(()),
-            written => written.context("cannot write to stdout"),
-        }
+        print_result(&text).context("cannot write to stdout")
     }
 
     fn json(&self) -> Value {
