@@ -34,7 +34,8 @@ struct OutputArgs {
     /// checks the results of a finished one
     #[arg(long)]
     resume: bool,
-    /// Replace files with our names in the folder, never an input and never through a symbolic link
+    /// Replace files that have the names of this run's files, and remove those of an earlier run (listed in run.written) that are
+    /// unchanged; never an input, never through a symbolic link
     #[arg(long, conflicts_with = "resume")]
     force: bool,
 }

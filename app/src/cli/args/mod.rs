@@ -76,7 +76,8 @@ pub(crate) struct DemoArgs {
     /// Folder for the results; only files of an earlier demo are replaced there
     #[arg(long, short, value_name = "DIR", default_value = "lookalike-demo", help_heading = "Output")]
     out: PathBuf,
-    /// Replace files with our names in the folder, even if another command wrote them
+    /// Replace files that have the names of the demo's files, and remove unchanged files of an earlier run of any command (listed in
+    /// run.written)
     #[arg(long, help_heading = "Output")]
     force: bool,
     /// Worker processes to start: auto starts one per core

@@ -17,7 +17,8 @@ pub(crate) struct StudyArgs {
     /// Resume the study in the folder without computing complete results again. If it is finished, only write its report again
     #[arg(long, help_heading = "Output")]
     resume: bool,
-    /// Replace files with our names in the folder, never an input and never through a symbolic link
+    /// Replace files that have the names of this run's files, and remove those of an earlier run (listed in run.written) that are
+    /// unchanged; never an input, never through a symbolic link. With --slurm, when the job is submitted
     #[arg(long, conflicts_with = "resume", help_heading = "Output")]
     force: bool,
     #[command(flatten)]
