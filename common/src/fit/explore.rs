@@ -16,10 +16,10 @@ use crate::{
 };
 use std::ops::ControlFlow;
 
-/// Most evaluations of CSSIM on the coarse picture from the best start, and in the mean over the starts.
+/// Most evaluations of CSSIM on the coarse picture by the search that continues from the best trial.
 pub(crate) const MAX_EXPLORATIONS: usize = 300;
 
-/// Most evaluations from each start before the best one is chosen.
+/// Most evaluations of the trial from each start.
 const TRIAL: usize = 80;
 
 /// The lobes that are tried in addition to the winner's, as widths of GGX.
@@ -54,6 +54,11 @@ pub(crate) fn starts(model: &dyn Model, won: &[f64]) -> Vec<Vec<f64>> {
     starts
 }
 
+/// Most evaluations in all of an exploration from so many starts.
+pub(crate) fn most_evaluations(starts: usize, max_evaluations: usize) -> usize {
+    starts * max_evaluations.min(TRIAL) + max_evaluations
+}
+
 /// Searches from every start for a while and continues from the result of lowest score, the first of equal ones.
 ///
 /// # Errors
@@ -80,11 +85,10 @@ pub(crate) fn explore(
         }
     }
     let best = best.ok_or(failure)?;
-    let left = (max_evaluations * starts.len()).saturating_sub(evaluations).min(max_evaluations);
-    if best.termination != Termination::MaxEvaluations || left == 0 {
+    if best.termination != Termination::MaxEvaluations {
         return Ok(Polished { evaluations, ..best });
     }
-    let found = polish(view, judge, by, &[best.parameters], left, observe)?;
+    let found = polish(view, judge, by, &[best.parameters], max_evaluations, observe)?;
     Ok(Polished { evaluations: evaluations + found.evaluations, ..found })
 }
 

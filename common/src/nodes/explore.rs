@@ -2,7 +2,7 @@
 
 use super::{PolishParameters, view::Scene};
 use crate::{
-    fit::explore::explore,
+    fit::explore::{explore, most_evaluations},
     graph::{Blob, NodeFailure, NodeType, RunContext},
     nodes::wire::{PolishedWire, check_parameters, read, write},
 };
@@ -20,8 +20,8 @@ impl NodeType for Explore {
         let PolishParameters { starts, max_evaluations } = read("parameters of explore", parameters)?;
         let scene = Scene::read(inputs, context)?;
         starts.iter().try_for_each(|start| check_parameters("starts", scene.view.model, start))?;
-        let total = u64::from(max_evaluations) * starts.len() as u64;
-        // Evaluations of the earlier starts, and of the current one so far: the search counts from 1 again at every start.
+        let total = most_evaluations(starts.len(), max_evaluations as usize) as u64;
+        // Evaluations of the earlier searches, and of the current one so far: each search counts from 1.
         let (mut before, mut last) = (0, 0);
         let mut observe = |progress: &crate::search::Progress<'_>| {
             let now = progress.evaluations as u64;

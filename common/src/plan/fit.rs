@@ -14,7 +14,7 @@ use super::{
     polishing::Polishing,
     scene_tables::SceneTables,
     step::Step,
-    tables::{FULL_SHARD, SUBSET_SHARD, stage_one_knots, whole_span},
+    tables::{LARGE_SHARD, LARGE_SUBSET, SUBSET_SHARD, stage_one_knots, whole_span},
     verify::{self, SubsetTables},
     work::Work,
 };
@@ -176,7 +176,7 @@ impl FitPlanner {
             let mut inputs = vec![Input::Blob(add(graph, "pixel subset", &wire)?)];
             let what = if self.subsets.len() == 1 { "of the subset".to_owned() } else { format!("of subset {s}") };
             let (count, shard) =
-                (subset.pixels.len(), if subset.pixels.len() > 4096 { FULL_SHARD } else { SUBSET_SHARD });
+                (subset.pixels.len(), if subset.pixels.len() > LARGE_SUBSET { LARGE_SHARD } else { SUBSET_SHARD });
             let knots = stage_one_knots(&self.scene.method);
             inputs.extend(self.scene.add_transport(
                 graph,

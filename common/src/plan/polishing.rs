@@ -14,7 +14,7 @@ use crate::{
     brdf::Model,
     fit::{
         Judged, Polished,
-        explore::{MAX_EXPLORATIONS, explored_span, starts},
+        explore::{MAX_EXPLORATIONS, explored_span, most_evaluations, starts},
         needed_span,
         polish::MAX_EVALUATIONS,
     },
@@ -129,7 +129,7 @@ impl Polishing {
         // Not released earlier: the plan checks every shard when it arrives.
         let table = self.coarse.take().map_or_else(Vec::new, |(_, table)| table);
         table.iter().filter_map(Input::node).for_each(|shard| graph.release(shard));
-        let most = MAX_EXPLORATIONS * starts(model, &won).len();
+        let most = most_evaluations(starts(model, &won).len(), MAX_EXPLORATIONS);
         let found = verify::polished(model, output, most)?;
         self.explored_evaluations = found.evaluations;
         let found = found.parameters;

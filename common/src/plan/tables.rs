@@ -12,6 +12,12 @@ pub(super) type Span = Option<(f64, f64)>;
 /// Pixels per shard of a subset's table: small enough to spread over several workers.
 pub(super) const SUBSET_SHARD: usize = 32;
 
+/// Above this number of pixels, a subset's table has shards of [`LARGE_SHARD`].
+pub(super) const LARGE_SUBSET: usize = 4096;
+
+/// Pixels per shard of a large subset's table.
+pub(super) const LARGE_SHARD: usize = 2048;
+
 /// Pixels per shard of the full-resolution table: large enough that few nodes of a grid of normals serve the pixels of two shards.
 pub(super) const FULL_SHARD: usize = 4096;
 
