@@ -87,11 +87,11 @@ impl Formula for CookTorranceLobe {
         let zero = T::of(0.0);
         let cos_i = g.cos_i.max(zero);
         let (distribution, blur) = beckmann(g, m);
-        let cos_d = g.cos_d.max(T::of(LEAST_COS_D));
+        let cos_d = g.cos_d.max(T::of(LEAST_DIVISOR));
         let masking = (T::of(2.0) * g.cos_h.max(zero) * g.cos_o.min(cos_i) / cos_d).min(T::of(1.0));
         distribution * masking * blur / (T::of(4.0) * g.cos_o)
     }
 }
 
-/// Least `v.h` by which the masking divides; lists of lights are padded with zeros.
-const LEAST_COS_D: f64 = 1e-9;
+/// Least `v.h` by which the masking divides: light opposite to the view.
+const LEAST_DIVISOR: f64 = 1e-9;

@@ -27,7 +27,7 @@ impl Seen<f64> {
     }
 }
 
-/// A formula of a lobe that is as accurate in single precision.
+/// The formula of a lobe whose integrals have the same errors in single precision, which are those of the quadrature.
 pub(super) trait Formula: Sync {
     /// [`Lobe::kernel`](super::Lobe::kernel). Mark it `#[inline(always)]`, or the loop over the lights is not vectorised.
     fn value<T: Real>(g: &Seen<T>, width: T) -> T;
@@ -36,7 +36,7 @@ pub(super) trait Formula: Sync {
 /// The factor `1 + x` of a second-order correction, clamped to the range in which a second-order expansion holds.
 #[inline(always)]
 pub(super) fn second_order<T: Real>(x: T) -> T {
-    (T::of(1.0) + x).max(T::of(0.25)).min(T::of(2.0))
+    (T::of(1.0) + x).clamped(0.25, 2.0)
 }
 
 /// Adds the basis integrals of a lobe: see [`Lobe::accumulate`](super::Lobe::accumulate).
@@ -48,13 +48,16 @@ pub(super) fn accumulate<F: Formula>(
     widths: &[f64],
     sums: &mut [f64],
 ) {
+    assert!(lights.len().is_multiple_of(BLOCK), "lists of lights are padded to whole blocks");
     let count = widths.len();
+    let cos_o = to_f32(cos_o);
     for (chunk, some) in widths.chunks(WIDTHS).enumerate() {
         let mut totals = [[[0.0; BLOCK]; ROWS]; WIDTHS];
-        let widths: Vec<f32> = some.iter().map(|width| to_f32(*width)).collect();
+        let mut singles = [0.0; WIDTHS];
+        some.iter().zip(&mut singles).for_each(|(width, single)| *single = to_f32(*width));
+        let widths = &singles[..some.len()];
         let formula = PhantomData::<F>;
-        let cos_o = to_f32(cos_o);
-        simd::dispatch(Accumulate { formula, split, lights, cos_o, widths: &widths, totals: &mut totals });
+        simd::dispatch(Accumulate { formula, split, lights, cos_o, widths, totals: &mut totals });
         for (w, totals) in totals[..some.len()].iter().enumerate() {
             let rows = if split == Split::Whole { 3 } else { ROWS };
             for (row, lanes) in totals[..rows].iter().enumerate() {

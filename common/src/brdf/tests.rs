@@ -248,48 +248,62 @@ fn the_scan_ends_at_parameters_of_the_weights_that_it_found() {
     }
 }
 
-/// The SIMD path against a sum of [`Lobe::eval`]: up to the rounding of single precision.
+/// Sums over lights against those of `kernel`, for the narrowest and the widest lobes: at the mirror direction and around it, at the horizon,
+/// opposite to the view, and with a view along the surface. Exactly for lobes in double precision.
 #[test]
 fn accumulation_is_the_sum_over_lights() {
-    const TOLERANCE: f64 = 3e-6;
-    let wo = direction(999);
-    // Not a multiple of the lights of a block.
-    let light = |n: u64| Incident {
-        angles: Angles::new(Vec3::Z, direction(n), wo),
-        energy: [0.1 * n as f64, 1.0, 3.0 / (1.0 + n as f64)],
-        spread: Spread { du: 1e-4 * n as f64, du2: 1e-5 },
-    };
-    let lights: Vec<Incident> = (0..77).map(light).collect();
-    for basis in MODELS.iter().flat_map(|m| m.lobes()) {
-        let widths: Vec<f64> = (0..21).map(|k| 0.01 * (1.0 + f64::from(k))).collect();
-        let terms = lobe_terms(basis.lobe);
-        let mut sums = vec![0.0; terms * 3 * widths.len()];
-        basis.lobe.accumulate(&lights.iter().copied().collect(), wo.z, 0.5, &widths, &mut sums);
-        for (k, &width) in widths.iter().enumerate() {
-            for t in 0..terms {
-                for c in 0..3 {
+    // Single precision rounds each of about thirty operations by up to 6e-8, and the distribution of the narrowest lobe changes as
+    // the fourth power of a small difference.
+    const TOLERANCE: f64 = 1e-5;
+    for wo in [direction(999), Vec3::Z, Vec3::new((1.0_f64 - 1e-4).sqrt(), 0.0, 1e-2)] {
+        let special = [
+            Vec3::new(-wo.x, -wo.y, wo.z),
+            Vec3::new(-wo.x + 0.01, -wo.y, wo.z).normalize(),
+            Vec3::new(-wo.x, -wo.y + 0.003, wo.z).normalize(),
+            Vec3::new(-wo.x, -wo.y, 1e-3).normalize(),
+            Vec3::new(0.0, 1.0, 0.0),
+            Vec3::new(0.0, (1.0_f64 - 1e-8).sqrt(), 1e-4),
+        ];
+        // Not a multiple of the lights of a block.
+        let directions = special.into_iter().chain((0..71).map(direction));
+        let light = |(n, wi)| Incident {
+            angles: Angles::new(Vec3::Z, wi, wo),
+            energy: [0.1 * n as f64, 1.0, 3.0 / (1.0 + n as f64)],
+            spread: Spread { du: 1e-7 * n as f64, du2: 1e-10 },
+        };
+        let lights: Lights = directions.enumerate().map(light).collect();
+        for basis in MODELS.iter().flat_map(|m| m.lobes()) {
+            let mut widths: Vec<f64> = (0..19).map(|k| 0.01 * (1.0 + f64::from(k))).collect();
+            widths.extend([0.005, 0.999]);
+            let terms = lobe_terms(basis.lobe);
+            let mut sums = vec![0.0; terms * 3 * widths.len()];
+            basis.lobe.accumulate(&lights, wo.z, 0.5, &widths, &mut sums);
+            for (k, &width) in widths.iter().enumerate() {
+                for (t, c) in (0..terms).flat_map(|t| (0..3).map(move |c| (t, c))) {
                     let mut expected = 0.0;
-                    for Incident { angles, energy, spread } in &lights {
+                    for n in (0..lights.len()).filter(|&n| lights.cos_i[n] > 0.0) {
+                        let (angles, spread) = lights.at(n, wo.z);
                         let f5 = angles.f5();
                         let part = if terms == 1 { 1.0 } else { [1.0 - f5, f5][t] };
-                        expected += 0.5 * part * energy[c] * basis.lobe.kernel(angles, spread, width);
+                        expected += part * f64::from(lights.energy[c][n]) * basis.lobe.kernel(&angles, &spread, width);
                     }
-                    let found = sums[(t * 3 + c) * widths.len() + k];
-                    let error = (found - expected).abs();
-                    assert!(
-                        error <= TOLERANCE * expected.abs(),
-                        "{} width {width}: {found} {expected}",
-                        basis.lobe.name()
-                    );
+                    let (found, expected) = (sums[(t * 3 + c) * widths.len() + k], 0.5 * expected);
+                    let name = basis.lobe.name();
+                    let tolerance = if is_single(name) { TOLERANCE * expected } else { 0.0 };
+                    assert!((found - expected).abs() <= tolerance, "{name} width {width} {wo}: {found} {expected}");
                 }
             }
         }
     }
 }
 
-/// Every SIMD level gives the same bits.
+/// Whether a lobe is integrated in single precision.
+fn is_single(lobe: &str) -> bool {
+    ["ggx", "cook-torrance", "disney specular", "disney clearcoat"].contains(&lobe)
+}
+
 #[test]
-fn accumulation_has_the_bits_of_a_scalar_loop() {
+fn every_simd_level_accumulates_the_same_bits() {
     let wo = direction(999);
     let light = |n: u64| Incident {
         angles: Angles::new(Vec3::Z, direction(n), wo),

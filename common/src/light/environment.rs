@@ -158,8 +158,8 @@ impl Environment {
         ([&rows[0], &rows[1], &rows[self.stride], &rows[self.stride + 1]], [s, t])
     }
 
-    /// A row of texels with the neighbours of its ends, and row 0 and the last beyond the poles: red, green, blue and a node of the
-    /// sampling density.
+    /// A row of the bordered grid: row `i + 1` holds texels `i`, with the texels beyond its ends; the first and the last row lie beyond the
+    /// poles. Red, green, blue and a node of the sampling density.
     pub(crate) fn bordered_row(&self, row: usize) -> &[[f32; 4]] {
         &self.nodes[row * self.stride..][..self.stride]
     }

@@ -1,5 +1,5 @@
 //! Vectors, elementary functions that give the same bits on every platform, shading frames, warps and low-discrepancy
-//! points. Everything is `f64`; pixels are narrowed to `f32` only where they are stored.
+//! points. Numbers are `f64`, and `f32` where pixels are stored and tables are integrated.
 
 pub mod arctangent;
 #[cfg(test)]

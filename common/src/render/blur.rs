@@ -200,8 +200,8 @@ impl<V: Vector> Side<V> {
     }
 }
 
-/// Lower limit of `2 v.h` for the place of the half vector in the tangent plane.
-const LEAST_LENGTH: f64 = 2e-9;
+/// Lower limit of `2 v.h` for the place of the half vector in the tangent plane, ten times the rounding of directions.
+const LEAST_LENGTH: f64 = 1e-6;
 
 /// A vector along two tangents.
 #[inline(always)]

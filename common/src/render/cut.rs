@@ -77,9 +77,10 @@ impl<'a> Cut<'a> {
         }
     }
 
-    /// Refines the pyramid until no node's error, for a lobe of unit weight, exceeds `tolerance` in units of the light's mean radiance (for
-    /// glossy lobes times `n.v`, less for wide ones and more for sharp ones). The bound holds at every surface point whose normal and view lie within `reach`
-    /// of those of `point` (the sum of both chords of the unit sphere); `point.cos_o` must be the lowest of all these points.
+    /// Refines the pyramid until no node's error, for a lobe of unit weight, exceeds `tolerance` in units of the light's mean radiance. For glossy
+    /// lobes the tolerance is multiplied by `n.v`, and by a factor below 1 for lobes wider than 0.1, above 1 for sharper ones. The bound
+    /// holds at every surface point whose normal and view lie within `reach` of those of `point` (the sum of both chords of the unit
+    /// sphere); `point.cos_o` must be the lowest of all these points.
     pub fn refine(&mut self, point: &Point, reach: f64, band: Band, tolerance: f64) {
         let bound = Bound::new(point, reach, band);
         // The `F5` part of a lobe has a twentieth of the lobe's mean radiance, nearly all of it near the rim, where n.v is small: with
@@ -87,7 +88,7 @@ impl<'a> Cut<'a> {
         let tolerance = tolerance * self.pyramid.mean_radiance();
         let tolerance = match band {
             Band::Diffuse(_) => tolerance,
-            Band::Glossy(sharpest, ..) => tolerance * point.cos_o.max(LEAST_COS_D) * care(sharpest),
+            Band::Glossy(sharpest, ..) => tolerance * point.cos_o.max(LEAST_COS_D) * leniency(sharpest),
         };
         let tolerance = to_f32(tolerance);
         let Lists(mut nodes) = Lists::of(&mut self.lights, &mut self.nodes);
@@ -108,7 +109,7 @@ impl<'a> Cut<'a> {
                 for (k, (&error, part)) in errors.iter().zip(cell.parts()).enumerate() {
                     if error > tolerance && part.splits() {
                         self.split.push(part);
-                    } else if error >= 0.0 {
+                    } else if error != NO_LIGHT {
                         self.kept.push(4 * quad + k);
                     }
                 }
@@ -162,18 +163,19 @@ impl Recent {
         if slot.as_ref().is_none_or(|(found, _)| *found != cell) {
             *slot = Some((cell, pyramid.sub_texels(cell)));
         }
+        // Never inserts: it was set above, which the borrow checker does not see.
         &slot.get_or_insert_with(|| (cell, Quad::default())).1
     }
 }
 
-/// Number of cells that are kept: they fit into the second-level cache.
+/// Number of cells that are kept, in 360 kB.
 const RECENT: usize = 2048;
 
 /// Nodes that may be split, one list for each of their numbers, padded to whole registers.
 #[derive(Debug, Default)]
 struct Candidates {
     numbers: [Vec<f32>; NUMBERS],
-    /// The largest error of each node taken as a point; -1 for one from which no light arrives.
+    /// The largest error of each node taken as a point, or [`NO_LIGHT`].
     errors: Vec<f32>,
 }
 
@@ -188,6 +190,9 @@ impl Candidates {
         dispatch(Errors { candidates: self, bound });
     }
 }
+
+/// In place of the error of a node from which no light arrives.
+const NO_LIGHT: f32 = -1.0;
 
 struct Errors<'a, 'b> {
     candidates: &'a mut Candidates,
@@ -268,7 +273,7 @@ impl<'a> Bound<'a> {
                 spread2 * (curvature + distribution * SLOW_FACTORS) + kink * distribution
             }
         };
-        let no_light = Lanes::splat(vector, -1.0);
+        let no_light = Lanes::splat(vector, f64::from(NO_LIGHT));
         let error = zero.if_less(energy, error * energy * self.shading, no_light);
         cos_i.if_less(zero - margin, no_light, error)
     }
@@ -327,7 +332,7 @@ const SLOW_FACTORS: f64 = 4.0;
 /// Factor on the tolerance for bands whose sharpest lobe has this width. For lobes wider than [`EVEN`], the second-order terms correct only
 /// about half of the error, because the factors of the distribution vary as much as the distribution, and such lobes need few nodes. A
 /// sharp lobe needs many nodes, whose errors average out.
-fn care(sharpest: f64) -> f64 {
+fn leniency(sharpest: f64) -> f64 {
     let wide = EVEN / sharpest;
     if wide < 1.0 { wide } else { wide.sqrt() }
 }

@@ -100,7 +100,7 @@ impl<V: Vector> Moments<V> {
         Self { energy, centroid, spread, radius }
     }
 
-    /// What a region counts in a mean.
+    /// The weight of a region in a mean: its energy, summed over the channels.
     #[inline(always)]
     fn weight(&self) -> Lanes<V> {
         self.energy[0] + self.energy[1] + self.energy[2]

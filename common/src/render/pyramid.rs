@@ -13,7 +13,7 @@ use super::moments::Quad;
 use crate::light::Environment;
 use std::f64::consts::PI;
 
-/// A rectangle of the map: level (negative is finer than texels), row and column at that level.
+/// A rectangle of the map: level (0 is a texel, negative is finer), row and column at that level. Stored are the parts of cells above level 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Cell {
     level: i8,
@@ -86,7 +86,7 @@ impl LightPyramid {
         self.mean_radiance
     }
 
-    /// The coarsest cells, which cover the sphere.
+    /// Cells one level coarser than the coarsest nodes; their parts cover the sphere.
     pub(super) fn roots(&self) -> impl Iterator<Item = Cell> + '_ {
         let level = self.levels.len();
         let [rows, columns] = [self.levels[level - 1].rows, self.levels[level - 1].columns].map(|n| n.div_ceil(2));
@@ -156,6 +156,27 @@ mod tests {
                 let expected = widen([red, green, blue]);
                 // Single precision.
                 assert!((sum / expected - Rgb::ONE).abs().max_element() < 1e-5, "{part:?}");
+            }
+        }
+    }
+
+    /// Maps of one texel in height, of odd height, and of a side that is odd at some level; one without light but for a texel.
+    #[test]
+    fn the_roots_of_small_and_odd_maps_hold_their_light() {
+        for (width, height) in [(2, 1), (4, 2), (6, 3), (10, 5), (36, 18), (38, 19)] {
+            for only in [None, Some(height / 2 * width + 1)] {
+                let is_lit = |k: usize| only.is_none_or(|only| only == k);
+                let texel = |k: usize| if is_lit(k) { [0.3 + (k % 3) as f32, 1.0, 2.0] } else { [0.0; 3] };
+                let map = Image::from_pixels(width, height, (0..width * height).map(texel).collect());
+                let map = Environment::new(map).unwrap();
+                let integral = bilinear_integral(&map);
+                let pyramid = LightPyramid::new(map);
+                let error = (root_energy(&pyramid) / integral - Rgb::ONE).abs().max_element();
+                // Only sin(theta) over a quadrant is neglected.
+                assert!(error < 0.5 / (height * height) as f64, "{width} x {height}, lit {only:?}: {error}");
+                for quad in pyramid.levels.iter().flat_map(|level| &level.quads) {
+                    assert!((0..4).flat_map(|k| quad.numbers(k)).all(f32::is_finite), "{width} x {height}: {quad:?}");
+                }
             }
         }
     }

@@ -24,7 +24,7 @@ const COMMON: MayImport = &[
     ("search", &["math"]),
     ("fit", &["brdf", "choice", "image", "light", "math", "metric", "render", "scene", "search"]),
     ("nodes", &["brdf", "fit", "graph", "image", "light", "math", "metric", "protocol", "render", "scene", "search"]),
-    ("plan", &["brdf", "fit", "graph", "image", "light", "math", "metric", "nodes", "render", "scene", "search"]),
+    ("plan", &["brdf", "fit", "graph", "image", "light", "math", "metric", "nodes", "render", "scene"]),
     ("graph", &[]),
     ("protocol", &["graph"]),
 ];

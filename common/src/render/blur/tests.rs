@@ -118,7 +118,6 @@ fn second_order_terms_help_a_wide_lobe_too() {
 fn second_order_terms_do_not_remove_the_error_of_a_kink() {
     for width in [0.01, 0.1, 0.3] {
         let (plain, corrected) = (error(0.3, width, false, true), error(0.3, width, true, true));
-        println!("{width}: {plain:.2e} {corrected:.2e}");
         assert!(corrected < 0.05 * width + 0.5 * plain, "width {width}: {corrected:.2e} of {plain:.2e}");
     }
 }
@@ -206,7 +205,6 @@ fn the_mean_over_a_turning_point_is_that_of_many_positions() {
                 .collect();
             let exact = many.iter().sum::<f64>() / 400.0;
             let (ours, without) = (value(&Point { turn, ..middle }), value(&middle));
-            println!("{position:?} {offset}: {exact:.4} {ours:.4} {without:.4}");
             assert!((ours - exact).abs() < 0.15 * (without - exact).abs() + 2e-3 * exact, "{position:?} {offset}");
         }
     }

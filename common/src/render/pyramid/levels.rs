@@ -110,6 +110,7 @@ impl WithSimd for TexelRow<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
+        const { assert!(LONGEST_REGISTER.is_multiple_of(S::F64_LANES), "lists are padded to whole registers") };
         let Self { parts, rows, columns, texels, nodes } = self;
         let columns = columns.each_ref().map(|side| side.each_ref().map(|list| S::as_simd_f64s(list).0));
         // From the left neighbours, the texels, the right neighbours.
@@ -169,6 +170,7 @@ impl WithSimd for CoarseRow<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
+        const { assert!(LONGEST_REGISTER.is_multiple_of(S::F64_LANES), "lists are padded to whole registers") };
         let parts = self.parts.each_ref().map(|row| row.each_ref().map(|list| S::as_simd_f64s(list).0));
         let has_right = S::as_simd_f64s(self.has_right).0;
         let mut nodes = self.nodes.each_mut().map(|list| S::as_mut_simd_f64s(list).0);

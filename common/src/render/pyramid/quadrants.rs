@@ -164,6 +164,7 @@ impl WithSimd for SubTexels<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
+        const { assert!(LONGEST_REGISTER.is_multiple_of(S::F64_LANES), "lists are padded to whole registers") };
         let lists = self.lists.each_ref().map(|list| S::as_simd_f64s(list).0);
         let mut nodes = self.nodes.each_mut().map(|list| S::as_mut_simd_f64s(list).0);
         for k in 0..4_usize.div_ceil(S::F64_LANES) {

@@ -1,7 +1,7 @@
 //! Integrals interpolated between normals, where that is accurate.
 //!
 //! Grids of normals become finer, each twice as fine as the last. A pixel takes its integrals from the first grid on which the
-//! estimated error of every one of them is within the tolerance. Nothing is assumed about the lobe, the light or the camera: near the
+//! estimated error of every one of them is below a share of the tolerance. Nothing is assumed about the lobe, the light or the camera: near the
 //! reflection of a lamp, on the line where a lamp sets or at the rim the error is larger, and a finer grid or the pixel itself serves.
 
 use super::{
@@ -27,7 +27,7 @@ const FIRST_SPACING: f64 = 0.35;
 /// alike. The error falls faster than the spacing.
 const WIDEST_SPACING_RAD: f64 = 0.08;
 
-/// Most nodes of a grid for each position of the pixels that it serves: if the estimates reject all of them, little is lost.
+/// Most nodes of a grid for each part of the pixels that it serves: if the estimates reject all of them, little is lost.
 const WORTH: f64 = 0.5;
 
 /// A grid whose rings, squared, are more than this for each position is not made: most of its nodes would be of no use.
@@ -69,7 +69,7 @@ impl<'a> Interpolator<'a> {
     }
 
     /// Integrals of the pixels of these numbers on the next grid, `None` for a pixel where it is too coarse; `None` altogether if the next
-    /// grid would have about as many nodes as the pixels have positions.
+    /// grid would have more than half as many nodes as the pixels have parts.
     pub(super) fn next(&mut self, parts: &[Vec<Part>], numbers: &[usize]) -> Option<Vec<Option<Integrals>>> {
         let most: usize = numbers.iter().map(|&number| 4 * parts[number].len()).sum();
         let rings = self.viewpoint.reach_rad() / self.spacing;

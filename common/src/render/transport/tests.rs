@@ -47,7 +47,12 @@ fn interpolated_integrals_agree_with_those_computed_at_the_pixels() {
     }
 }
 
-/// The pixels that take their integrals from a grid agree with all pixels within the tolerance of tables, root mean square.
+/// Largest root mean square difference, in units of the tolerance: that is the largest error of one node of a cut, and pixels as wide as
+/// these have errors of their own, most from close by.
+const MOST: f64 = 2.5;
+const MOST_FROM_CLOSE_BY: f64 = 4.0;
+
+/// The pixels that take their integrals from a grid agree with all pixels; `MOST` says how well.
 fn check(view: &View<'_>, slice: Slice<'_>) {
     let parts: Vec<Vec<Part>> = view.pixels.iter().map(|&pixel| view.parts(pixel, slice)).collect();
     let mut interpolator = Interpolator::new(view, slice).unwrap();
@@ -77,8 +82,7 @@ fn check(view: &View<'_>, slice: Slice<'_>) {
         // The `F5` part is seen beside some hundredths of the rest.
         let share = if 2 * k >= count && lobe_terms(slice.lobe) == 2 { 0.1 } else { 1.0 };
         let camera = view.geometry.camera();
-        // Tolerance is the largest error of one node of a cut, and pixels as wide as these have errors of their own, most from close by.
-        let most = if camera == Camera::Orthographic { 2.5 } else { 4.0 };
+        let most = if camera == Camera::Orthographic { MOST } else { MOST_FROM_CLOSE_BY };
         assert!(rms < most * share, "{camera} {name} {:?}, integral {k}: {rms:.2} of the tolerance", slice.band);
     }
 }

@@ -17,7 +17,8 @@ pub type Pixel = [u32; 2];
 /// How finely tables are integrated.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Accuracy {
-    /// Largest error of one node of a cut, and of interpolation between normals, in units of the map's mean radiance, for a lobe of unit weight.
+    /// Largest error of one node of a cut, in units of the map's mean radiance, for a lobe of unit weight and width 0.1 (for others see
+    /// [`Cut::refine`](crate::render::cut::Cut::refine)). Interpolation between normals may have a fifth of it.
     pub tolerance: f64,
     /// Factor on the turn of the normal over a pixel up to which a given number of parts is used; 1 keeps the error below 2e-3 of the
     /// lobe's peak.
