@@ -1,28 +1,31 @@
 //! Eq. 1 by transport tables against the direct integrator, on one sphere of 256 x 256 pixels in a synthetic room.
 //!
-//! `cargo bench -p lookalike --bench transport` times the kernels, then prints two ratios from the same run:
+//! `cargo bench -p lookalike --bench transport` times the parts of a table, the table and the polish of a full image, and stage one, then prints
+//! two ratios from the same run:
 //! - one evaluation of Eq. 1 over 256 pixels by tables, against the direct integrator at 256 samples per pixel and at the
 //!   sample count where its noise falls to 0.2 % of mean radiance, which is the accuracy of the tables;
 //! - stage one (21 searches and the table they need), against one direct rendering of the full image for every evaluation
 //!   that the searches made.
 
-use std::{hint::black_box, sync::Arc, time::Instant};
+use std::{hint::black_box, ops::ControlFlow, sync::Arc, time::Instant};
 
-use criterion::{Criterion, criterion_group, criterion_main};
+use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use lookalike::{
-    brdf::{Ggx, Material},
-    fit::{Candidate, Method, Objective, search_gamma},
+    brdf::{Ggx, LinearModel, Material, Tail},
+    fit::{Candidate, FullView, JudgedBy, Method, Objective, polish, search_gamma},
     image::Image,
     light::{Environment, LightDistribution},
-    math::{Rgb, luminance, narrow, to_f32},
-    metric::cost::Compression,
+    math::{Rgb, Vec3, luminance, narrow, to_f32},
+    metric::{Judge, JudgeOptions, cost::Compression},
     render::{
+        cut::{Band, Cut},
         integrator::Integrator,
         knots::{Knots, PER_OCTAVE},
+        point::Point,
         pyramid::LightPyramid,
         subset::{self, PixelSubset, SampleCount, Sampling},
         table::TransportTable,
-        transport::{Accuracy, Pixel, TransportPlan},
+        transport::{Accuracy, Pixel, TransportPlan, tile_order},
     },
     scene::{Camera, Circle, Geometry},
 };
@@ -133,8 +136,69 @@ fn seconds(runs: u32, mut f: impl FnMut()) -> f64 {
     (0..runs).map(once).fold(f64::INFINITY, f64::min)
 }
 
+/// The parts of a table: pyramid, one cut, its lights at one point, the lobe at the widths of a band.
+fn parts(criterion: &mut Criterion, study: &Study) {
+    let mut group = criterion.benchmark_group("parts");
+    group.sample_size(20);
+    group.bench_function("pyramid of a map of 512 x 256", |b| b.iter(|| LightPyramid::new(room())));
+    let normal = Vec3::new(0.3, 0.2, 0.933).normalize();
+    let point = Point::new(normal, Vec3::Z).expect("the point faces the camera");
+    let (band, widths) = (Band::Glossy(0.01, 0.02, Tail::Short), Knots::covering(0.01, 0.02, PER_OCTAVE).widths());
+    let mut cut = Cut::new(&study.pyramid);
+    cut.refine(&point, 0.0, band, Accuracy::SUBSET.tolerance);
+    let lights = cut.lights(&point).clone();
+    group.throughput(Throughput::Elements(lights.len() as u64));
+    group.bench_function("one cut", |b| {
+        b.iter(|| cut.refine(black_box(&point), 0.0, band, Accuracy::SUBSET.tolerance));
+    });
+    group.bench_function("one pass over its lights", |b| b.iter(|| cut.lights(black_box(&point)).len()));
+    let lobe = Ggx::LOBES[1].lobe;
+    let mut sums = vec![0.0; 6 * widths.len()];
+    group.bench_function("ggx at the 7 widths of a band", |b| {
+        b.iter(|| lobe.accumulate(black_box(&lights), point.cos_o, 1.0, &widths, &mut sums));
+    });
+    group.finish();
+}
+
+/// A table of the full image around the true width, and polish on it from a wrong start.
+fn full_image(criterion: &mut Criterion, study: &Study) {
+    let size = SIZE as usize;
+    let coverage: Vec<f32> = (0..size * size).map(|k| study.geometry.coverage(k % size, k / size)).collect();
+    let mut pixels: Vec<Pixel> = (0..SIZE * SIZE).map(|k| [k % SIZE, k / SIZE]).collect();
+    pixels.retain(|p| coverage[(p[1] * SIZE + p[0]) as usize] > 0.0);
+    pixels.sort_by_key(|&pixel| tile_order(pixel));
+    let plan = TransportPlan { model: &Ggx, knots: Knots::covering(0.07, 0.14, 5.0), accuracy: Accuracy::FULL };
+    let integrate = || plan.integrate(&study.geometry, &study.pyramid, &pixels);
+    let table = integrate();
+    let view = FullView {
+        model: &Ggx,
+        table: &table,
+        pixels: &pixels,
+        coverage: &coverage,
+        stride: 1,
+        width: size,
+        height: size,
+    };
+    let photo = view.render(&TRUTH);
+    let options = JudgeOptions::default();
+    let judge = Judge::new(&photo, &coverage, 1.0, &options).expect("the picture shows the object");
+    let mut start = TRUTH;
+    start[..3].fill(0.3);
+    start[6] = 0.08;
+    let mut group = criterion.benchmark_group("full image");
+    group.sample_size(10);
+    group.bench_function("table of 256 x 256 pixels", |b| b.iter(integrate));
+    group.bench_function("polish, at most 100 evaluations", |b| {
+        let starts = [start.to_vec()];
+        b.iter(|| polish(&view, &judge, JudgedBy::Image, &starts, 100, &mut |_| ControlFlow::Continue(())));
+    });
+    group.finish();
+}
+
 fn kernels(criterion: &mut Criterion) {
     let study = Study::new();
+    parts(criterion, &study);
+    full_image(criterion, &study);
     let table = study.table();
     let mut objective = study.objective(&table);
     criterion.bench_function("Eq. 1 over 256 pixels by tables", |b| b.iter(|| objective.cost(black_box(&TRUTH))));
