@@ -3,7 +3,7 @@
 //! Level 0 has one node per texel of the lat-long map; each coarser level joins 2 x 2 nodes. The energy of a texel is the integral of
 //! the *bilinear* radiance over the texel's area. The mean of a bilinear function over a rectangle within one patch is its value at the
 //! centre, so four quadrants suffice. The covariance of radiance and sin(theta) over a quadrant is neglected in the energy, but not in
-//! the centroid. Where a texel is too coarse for a lobe, [`Cell`]s finer than texels are computed on demand.
+//! the centroid. Where a texel is too coarse for a lobe, cells finer than texels are computed on demand.
 
 mod levels;
 mod quadrants;
