@@ -46,9 +46,9 @@ const SUBSURFACE: &str = "disney subsurface";
 /// The errors of a cut have one sign from the normal to the rim, so they add up.
 const CARE: f64 = 4.0;
 
-/// `(1 - x)^5` changes over a fifth of the range at the rim, and hardly at the centre.
+/// `(1 - x)^5` changes fast at the rim, and hardly at the centre.
 fn rim_footprint(width: f64, cos_o: f64) -> f64 {
-    width.min(0.2 + cos_o)
+    width.min(0.03 + 0.5 * cos_o)
 }
 
 impl<const POWER: u8> Lobe for Diffuse<POWER> {
@@ -111,7 +111,7 @@ impl<const POWER: u8> Lobe for Subsurface<POWER> {
     }
 
     fn footprint(&self, width: f64, cos_o: f64) -> f64 {
-        width.min(cos_o)
+        width.min(0.5 * cos_o)
     }
 
     /// The formula has an albedo of up to 1.205 (computed in NumPy).
