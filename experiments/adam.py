@@ -7,7 +7,8 @@
 Mitsuba 3 renders the sphere (orthographic, inscribed in the photo) with its `principled` BSDF, and Adam changes base colour, roughness, specular
 and metallic until the loss stays on a plateau: its mean over 40 iterations falls by less than 1 % against the 40 before. The loss is the mean
 square difference of x^(1/2.2), so that highlights do not outweigh the rest. CPU seconds are of the whole process tree, user and system; those of
-Mitsuba's imports and of reading the files are left out.
+Mitsuba's imports and of reading the files are left out. Mitsuba needs an LLVM library, named by DRJIT_LIBLLVM_PATH: seen to work with LLVM 19, not
+with 15 and AVX-512.
 """
 import argparse
 import pathlib
@@ -19,7 +20,7 @@ import time
 import drjit as dr
 import mitsuba as mi
 import numpy as np
-from mitsuba_compare import rows_on_poles
+from mitsuba_compare import scene_of
 
 # After the import, which chooses another one.
 mi.set_variant("llvm_ad_rgb")
@@ -28,29 +29,13 @@ WINDOW = 40
 MOST = 2000
 
 
-def scene(latlong, side, samples):
-    return mi.load_dict({
-        "type": "scene",
-        "integrator": {"type": "direct", "emitter_samples": 1, "bsdf_samples": 1, "hide_emitters": True},
-        "light": {"type": "envmap", "bitmap": mi.Bitmap(rows_on_poles(latlong))},
-        "sphere": {
-            "type": "sphere",
-            "bsdf": {
-                "type": "principled",
-                "base_color": {"type": "rgb", "value": [0.4, 0.4, 0.4]},
-                "roughness": 0.3,
-                "specular": 0.5,
-                "metallic": 0.5,
-            },
-        },
-        "sensor": {
-            "type": "orthographic",
-            "to_world": mi.ScalarTransform4f().look_at(origin=[0, 0, 5], target=[0, 0, 0], up=[0, 1, 0]),
-            "film": {"type": "hdrfilm", "width": side, "height": side, "rfilter": {"type": "box"},
-                     "pixel_format": "rgb", "component_format": "float32"},
-            "sampler": {"type": "independent", "sample_count": samples},
-        },
-    })
+START = {
+    "type": "principled",
+    "base_color": {"type": "rgb", "value": [0.4, 0.4, 0.4]},
+    "roughness": 0.3,
+    "specular": 0.5,
+    "metallic": 0.5,
+}
 
 
 def display(image):
@@ -59,7 +44,7 @@ def display(image):
 
 def adam(photo, latlong, samples, rate):
     """Iterations, last mean of the loss, and the parameters."""
-    object_ = scene(latlong, photo.shape[0], samples)
+    object_ = scene_of(latlong, START, photo.shape[0], samples)
     parameters = mi.traverse(object_)
     names = [name for name in parameters.keys() if name.startswith("sphere.bsdf.")]
     names = [name for name in names if name.endswith(("base_color.value", "roughness.value", "specular", "metallic.value"))]

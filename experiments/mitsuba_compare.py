@@ -45,12 +45,13 @@ def bsdf(kind, value):
     return {"type": "roughconductor", "distribution": "ggx", "alpha": value, "material": "none"}
 
 
-def mitsuba_image(latlong, kind, value, size, samples, seed):
-    scene = mi.load_dict({
+def scene_of(latlong, reflectance, size, samples):
+    """A sphere under a map, seen along parallel rays that it fills."""
+    return mi.load_dict({
         "type": "scene",
         "integrator": {"type": "direct", "emitter_samples": 1, "bsdf_samples": 1, "hide_emitters": True},
         "light": {"type": "envmap", "bitmap": mi.Bitmap(rows_on_poles(latlong))},
-        "sphere": {"type": "sphere", "bsdf": bsdf(kind, value)},
+        "sphere": {"type": "sphere", "bsdf": reflectance},
         "sensor": {
             "type": "orthographic",
             "to_world": mi.ScalarTransform4f().look_at(origin=[0, 0, 5], target=[0, 0, 0], up=[0, 1, 0]),
@@ -59,7 +60,10 @@ def mitsuba_image(latlong, kind, value, size, samples, seed):
             "sampler": {"type": "independent", "sample_count": samples},
         },
     })
-    return np.array(mi.render(scene, seed=seed))[..., :3]
+
+
+def mitsuba_image(latlong, kind, value, size, samples, seed):
+    return np.array(mi.render(scene_of(latlong, bsdf(kind, value), size, samples), seed=seed))[..., :3]
 
 
 def our_image(program, map_path, out, size, samples, kind, value):

@@ -9,7 +9,7 @@
 
 use std::{hint::black_box, ops::ControlFlow, sync::Arc, time::Instant};
 
-use criterion::{Criterion, Throughput, criterion_group, criterion_main};
+use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_main};
 use lookalike::{
     brdf::{Ggx, LinearModel, Material, Tail},
     fit::{Candidate, FullView, JudgedBy, Method, Objective, polish, search_gamma},
@@ -140,7 +140,9 @@ fn seconds(runs: u32, mut f: impl FnMut()) -> f64 {
 fn parts(criterion: &mut Criterion, study: &Study) {
     let mut group = criterion.benchmark_group("parts");
     group.sample_size(20);
-    group.bench_function("pyramid of a map of 512 x 256", |b| b.iter(|| LightPyramid::new(room())));
+    group.bench_function("pyramid of a map of 512 x 256", |b| {
+        b.iter_batched(room, LightPyramid::new, BatchSize::LargeInput)
+    });
     let normal = Vec3::new(0.3, 0.2, 0.933).normalize();
     let point = Point::new(normal, Vec3::Z).expect("the point faces the camera");
     let (band, widths) = (Band::Glossy(0.01, 0.02, Tail::Short), Knots::covering(0.01, 0.02, PER_OCTAVE).widths());

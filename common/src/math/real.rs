@@ -28,76 +28,46 @@ pub(crate) trait Real:
     fn ln_positive(self) -> Self;
 }
 
-impl Real for f64 {
-    #[inline(always)]
-    fn of(x: f64) -> Self {
-        x
-    }
+macro_rules! real {
+    ($name:ident, $of:expr, $exp:expr) => {
+        impl Real for $name {
+            #[inline(always)]
+            fn of(x: f64) -> Self {
+                $of(x)
+            }
 
-    #[inline(always)]
-    fn sqrt(self) -> Self {
-        self.sqrt()
-    }
+            #[inline(always)]
+            fn sqrt(self) -> Self {
+                self.sqrt()
+            }
 
-    #[inline(always)]
-    fn max(self, other: Self) -> Self {
-        self.max(other)
-    }
+            #[inline(always)]
+            fn max(self, other: Self) -> Self {
+                self.max(other)
+            }
 
-    #[inline(always)]
-    fn min(self, other: Self) -> Self {
-        self.min(other)
-    }
+            #[inline(always)]
+            fn min(self, other: Self) -> Self {
+                self.min(other)
+            }
 
-    #[inline(always)]
-    fn clamped(self, least: f64, most: f64) -> Self {
-        self.clamp(least, most)
-    }
+            #[inline(always)]
+            fn clamped(self, least: f64, most: f64) -> Self {
+                self.clamp($of(least), $of(most))
+            }
 
-    #[inline(always)]
-    fn exp_nonpositive(self) -> Self {
-        exp_nonpositive(self)
-    }
+            #[inline(always)]
+            fn exp_nonpositive(self) -> Self {
+                $exp(self)
+            }
 
-    #[inline(always)]
-    fn ln_positive(self) -> Self {
-        ln_positive(self)
-    }
+            #[inline(always)]
+            fn ln_positive(self) -> Self {
+                $of(ln_positive(f64::from(self)))
+            }
+        }
+    };
 }
 
-impl Real for f32 {
-    #[inline(always)]
-    fn of(x: f64) -> Self {
-        to_f32(x)
-    }
-
-    #[inline(always)]
-    fn sqrt(self) -> Self {
-        self.sqrt()
-    }
-
-    #[inline(always)]
-    fn max(self, other: Self) -> Self {
-        self.max(other)
-    }
-
-    #[inline(always)]
-    fn min(self, other: Self) -> Self {
-        self.min(other)
-    }
-
-    #[inline(always)]
-    fn clamped(self, least: f64, most: f64) -> Self {
-        self.clamp(to_f32(least), to_f32(most))
-    }
-
-    #[inline(always)]
-    fn exp_nonpositive(self) -> Self {
-        exp_nonpositive_single(self)
-    }
-
-    #[inline(always)]
-    fn ln_positive(self) -> Self {
-        to_f32(ln_positive(f64::from(self)))
-    }
-}
+real!(f64, std::convert::identity, exp_nonpositive);
+real!(f32, to_f32, exp_nonpositive_single);
