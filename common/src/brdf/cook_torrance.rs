@@ -17,9 +17,9 @@
 //! A photo determines the product `ks f0`, the specular colour at normal incidence, well, and its factors poorly.
 
 use super::{
-    Angles, BasisLobe, Lambert, Lights, LinearModel, Lobe, Parameter, Role, Split, Spread, Weight, Width,
+    BasisLobe, Lambert, LinearModel, Lobe, Parameter, Role, Split, Weight, Width,
     beckmann::beckmann,
-    single::{self, Formula, Seen},
+    single::{Formula, Seen, by_formula},
 };
 use crate::math::real::Real;
 
@@ -70,14 +70,7 @@ impl Lobe for CookTorranceLobe {
         Some(width)
     }
 
-    #[inline(always)]
-    fn kernel(&self, g: &Angles, spread: &Spread, m: f64) -> f64 {
-        Self::value(&Seen::new(g, spread), m)
-    }
-
-    fn accumulate(&self, lights: &Lights, cos_o: f64, share: f64, widths: &[f64], sums: &mut [f64]) {
-        single::accumulate::<Self>(self.split(), lights, cos_o, share, widths, sums);
-    }
+    by_formula!();
 }
 
 impl Formula for CookTorranceLobe {

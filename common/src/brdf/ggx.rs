@@ -14,8 +14,8 @@
 //! | `alpha` | microfacet width (an artist's roughness is its square root) | [0.005, 1] |
 
 use super::{
-    Angles, BasisLobe, Lambert, Lights, LinearModel, Lobe, Parameter, Split, Spread, Weight, Width,
-    single::{self, Formula, Seen, second_order},
+    BasisLobe, Lambert, LinearModel, Lobe, Parameter, Split, Weight, Width,
+    single::{Formula, Seen, by_formula, second_order},
 };
 use crate::math::real::Real;
 use std::f64::consts::FRAC_1_PI;
@@ -59,14 +59,7 @@ impl Lobe for GgxLobe {
         Some(width)
     }
 
-    #[inline(always)]
-    fn kernel(&self, g: &Angles, spread: &Spread, alpha: f64) -> f64 {
-        Self::value(&Seen::new(g, spread), alpha)
-    }
-
-    fn accumulate(&self, lights: &Lights, cos_o: f64, share: f64, widths: &[f64], sums: &mut [f64]) {
-        single::accumulate::<Self>(self.split(), lights, cos_o, share, widths, sums);
-    }
+    by_formula!();
 }
 
 impl Formula for GgxLobe {

@@ -39,6 +39,22 @@ pub(super) fn second_order<T: Real>(x: T) -> T {
     (T::of(1.0) + x).clamped(0.25, 2.0)
 }
 
+/// The methods of a [`Lobe`](super::Lobe) that has a [`Formula`].
+macro_rules! by_formula {
+    () => {
+        #[inline(always)]
+        fn kernel(&self, g: &$crate::brdf::Angles, spread: &$crate::brdf::Spread, width: f64) -> f64 {
+            <Self as $crate::brdf::single::Formula>::value(&$crate::brdf::single::Seen::new(g, spread), width)
+        }
+
+        fn accumulate(&self, lights: &$crate::brdf::Lights, cos_o: f64, share: f64, widths: &[f64], sums: &mut [f64]) {
+            $crate::brdf::single::accumulate::<Self>(self.split(), lights, cos_o, share, widths, sums);
+        }
+    };
+}
+
+pub(super) use by_formula;
+
 /// Adds the basis integrals of a lobe: see [`Lobe::accumulate`](super::Lobe::accumulate).
 pub(super) fn accumulate<F: Formula>(
     split: Split,

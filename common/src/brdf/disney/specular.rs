@@ -3,8 +3,8 @@
 //! Both are `D G / (4 n.l n.v)` with separable Smith masking, `G1(c) / (2 c) = 1/(c + sqrt(g^2 + (1 - g^2) c^2))`.
 
 use super::super::{
-    Angles, Expected, Lights, Lobe, Split, Spread, Tail, Width,
-    single::{self, Formula, Seen, second_order},
+    Expected, Lobe, Split, Tail, Width,
+    single::{Formula, Seen, by_formula, second_order},
 };
 use crate::math::real::Real;
 use std::f64::consts::FRAC_1_PI;
@@ -63,14 +63,7 @@ impl Lobe for Specular {
         Expected { sharp_albedo: |_, _| (1.0, 0.15), ..Expected::default() }
     }
 
-    #[inline(always)]
-    fn kernel(&self, g: &Angles, spread: &Spread, width: f64) -> f64 {
-        Self::value(&Seen::new(g, spread), width)
-    }
-
-    fn accumulate(&self, lights: &Lights, cos_o: f64, share: f64, widths: &[f64], sums: &mut [f64]) {
-        single::accumulate::<Self>(self.split(), lights, cos_o, share, widths, sums);
-    }
+    by_formula!();
 }
 
 impl Formula for Specular {
@@ -129,14 +122,7 @@ impl Lobe for Clearcoat {
         Expected { most_albedo: 1.255, sharp_albedo: |_, _| (1.0, 0.13), ..Expected::default() }
     }
 
-    #[inline(always)]
-    fn kernel(&self, g: &Angles, spread: &Spread, width: f64) -> f64 {
-        Self::value(&Seen::new(g, spread), width)
-    }
-
-    fn accumulate(&self, lights: &Lights, cos_o: f64, share: f64, widths: &[f64], sums: &mut [f64]) {
-        single::accumulate::<Self>(self.split(), lights, cos_o, share, widths, sums);
-    }
+    by_formula!();
 }
 
 impl Formula for Clearcoat {
