@@ -7,7 +7,7 @@ use lookalike::graph::{
     Blob, GraphEdit, NodeFailure, NodeId, NodeSpec, NodeType, Placement, PlanError, Planner, Registry, RunContext,
 };
 use lookalike_coordinator::{
-    journal::{JournalOptions, RunIdentity, status::Status},
+    journal::{JournalOptions, Names, RunIdentity, status::Status},
     runner::{RunError, RunnerOptions, run},
 };
 use rusqlite::{Connection, params, types::Value};
@@ -81,7 +81,7 @@ static FINISHED: LazyLock<TempDir> = LazyLock::new(|| {
 
 const EXPECTED: [[u8; 2]; 3] = [[0, 0], [1, 1], [2, 2]];
 
-const TABLES: [&str; 6] = ["run", "epochs", "nodes", "attempts", "workers", "results"];
+const TABLES: [&str; 7] = ["run", "epochs", "nodes", "attempts", "workers", "results", "parts"];
 
 fuzz_target!(|bytes: &[u8]| {
     let folder = tempfile::tempdir().expect("a temporary folder");
@@ -94,7 +94,7 @@ fuzz_target!(|bytes: &[u8]| {
             corrupt(&journal, change);
         }
     }
-    let _ = Status::of(folder.path());
+    let _ = Status::of(folder.path(), Names::default());
     if let Ok(found) = outputs(folder.path(), true) {
         assert_eq!(found, EXPECTED.map(Vec::from));
     }
