@@ -16,16 +16,15 @@ fn site(sbatch: &str) -> TempDir {
     let paint = Material::new(&Ggx, vec![0.3, 0.12, 0.08, 0.05, 0.05, 0.05, 0.25]).unwrap();
     fs::write(folder.path().join("paint.binary"), merl::file_of(&paint)).unwrap();
     let path = folder.path().join("sbatch");
-    fs::write(&path, format!("#!/bin/sh\n{sbatch}\n")).unwrap();
+    fs::write(&path, format!("#!/bin/sh\nPATH=/usr/bin:/bin\n{sbatch}\n")).unwrap();
     fs::set_permissions(&path, fs::Permissions::from_mode(0o755)).unwrap();
     folder
 }
 
-/// Exit code, stdout and stderr of a command line.
+/// Exit code, stdout and stderr of a command line. Only the site's `sbatch` can be found, whatever is installed here.
 fn say(site: &Path, line: &str) -> (Option<i32>, String, String) {
     let mut command = Command::new(env!("CARGO_BIN_EXE_lookalike-under-test"));
-    let path = format!("{}:{}", site.display(), std::env::var("PATH").unwrap());
-    command.args(line.split_whitespace()).current_dir(site).env("PATH", path).env_remove("RUST_LOG");
+    command.args(line.split_whitespace()).current_dir(site).env("PATH", site).env_remove("RUST_LOG");
     let output = command.output().unwrap();
     let text = |bytes| String::from_utf8(bytes).unwrap();
     (output.status.code(), text(output.stdout), text(output.stderr))
