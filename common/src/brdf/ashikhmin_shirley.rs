@@ -106,6 +106,10 @@ impl Lobe for SpecularLobe {
         2.0
     }
 
+    fn footprint(&self, width: f64, _cos_o: f64) -> f64 {
+        power::footprint(width)
+    }
+
     fn expected(&self) -> Expected {
         let sharp_albedo = |width, cos_o| (1.0, power::beyond_kink(width, cos_o));
         Expected { sharp_albedo, is_kinked: true, ..Expected::default() }

@@ -56,6 +56,15 @@ impl Lobe for BlinnPhongLobe {
         Some(width)
     }
 
+    /// Its kink near the mirror direction varies as much as the distribution of a wide lobe.
+    fn care(&self) -> f64 {
+        2.0
+    }
+
+    fn footprint(&self, width: f64, _cos_o: f64) -> f64 {
+        power::footprint(width)
+    }
+
     /// The albedo of a sharp lobe is `n.v`, because the `1/(v.h)` of microfacets is missing.
     fn expected(&self) -> Expected {
         let sharp_albedo = |width, cos_o| (cos_o, power::beyond_kink(width, cos_o));

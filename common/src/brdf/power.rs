@@ -36,6 +36,13 @@ pub(super) fn beyond_kink(width: f64, cos_o: f64) -> f64 {
     width * (1.0 - cos_o * cos_o).sqrt() / cos_o + 0.002
 }
 
+/// The turn of the normal within which such a lobe varies little: less than its width, because the kink at `n.l = n.v` runs through the
+/// mirror direction. With parts of a whole width, tables of stage one were off by 0.34 % of mean radiance under Eucalyptus
+/// Grove; with half a width, by 0.14 %.
+pub(super) fn footprint(width: f64) -> f64 {
+    0.5 * width
+}
+
 /// `(n.h)^n`, and the factor by which the spread of light changes its mean.
 ///
 /// Spread: with `u = sin^2(th)` and `k = n/2` it is `(1 - u)^k`; its first derivative by `u`, as a share of it, is `-k / (1 - u)`, its

@@ -6,9 +6,9 @@
 //! By default the integrator's means and variances are read from a file. With `--features slow` they are integrated again, for more
 //! pixels.
 
-use super::{ACCURACIES, Case, EFFORT, Rigour, knots, stored};
+use super::{ACCURACIES, Case, EFFORT, Rigour, TOLERANCE, knots, stored};
 use lookalike::{
-    brdf::{CookTorrance, Ggx, MODELS, Material, Model, Split},
+    brdf::{BasisLobe, CookTorrance, Ggx, MODELS, Material, Model, Split},
     render::{
         knots::{Knots, PER_OCTAVE},
         transport::{Accuracy, Pixel, TransportPlan},
@@ -87,28 +87,45 @@ fn tables_agree_with_the_direct_integrator_through_a_perspective_camera() {
 /// 0.23 % of its mean under a real sun, its diffuse and subsurface lobes by as much under this one.
 #[test]
 fn lobes_of_fixed_shape_have_enough_parts_of_rim_pixels() {
-    const TOLERANCE: f64 = 2e-3;
+    let is_fixed = |basis: &BasisLobe| basis.width.is_none() && basis.lobe.expected().adjusts.is_none();
+    compare_with_smaller_parts(Knots::covering(0.5, 1.0, 1.0), is_fixed);
+}
+
+/// A regression: the lobes of `blinn-phong` and `ashikhmin-shirley` have a kink at their peak, and their tables had too few parts of a pixel:
+/// 0.28 and 0.34 % off under Eucalyptus Grove, 0.32 and 0.41 % under this sun.
+#[test]
+fn sharp_lobes_with_a_kink_have_enough_parts() {
+    let is_kinked = |basis: &BasisLobe| basis.lobe.expected().is_kinked && basis.width.is_some();
+    compare_with_smaller_parts(Knots::covering(0.0106, 0.0107, 1.0), is_kinked);
+}
+
+/// Compares lobes of every model with tables of much smaller parts of pixels, under a sun of one texel.
+fn compare_with_smaller_parts(knots: Knots, is_compared: fn(&BasisLobe) -> bool) {
     let scene = Scene::sphere(256, Camera::Orthographic, synthetic::one_texel_sun(256, 80, 100)).unwrap();
     let pixels = spread(&scene.interior(), 200, 5);
+    let mut compared = 0;
     for model in MODELS {
+        let wanted: Vec<usize> = (0..model.lobes().len()).filter(|&l| is_compared(&model.lobes()[l])).collect();
+        if wanted.is_empty() {
+            continue;
+        }
         let integrate = |footprint: f64| {
             let accuracy = Accuracy { footprint, ..Accuracy::SUBSET };
-            let plan = TransportPlan { model: *model, knots: Knots::covering(0.5, 1.0, 1.0), accuracy };
-            plan.integrate(&scene.geometry, &scene.pyramid, &pixels)
+            TransportPlan { model: *model, knots, accuracy }.integrate(&scene.geometry, &scene.pyramid, &pixels)
         };
         let (ours, fine) = (integrate(Accuracy::SUBSET.footprint), integrate(0.1 * Accuracy::SUBSET.footprint));
-        for ((basis, ours), fine) in model.lobes().iter().zip(&ours.lobes).zip(&fine.lobes) {
-            if basis.width.is_some() || basis.lobe.expected().adjusts.is_some() {
-                continue;
-            }
-            let count = fine.values.len() as f64;
-            let mean = fine.values.iter().map(|x| f64::from(*x)).sum::<f64>() / count;
-            let squares = ours.values.iter().zip(&fine.values).map(|(a, b)| f64::from(a - b).powi(2));
+        for l in wanted {
+            let (name, ours, fine) = (model.lobes()[l].lobe.name(), &ours.lobes[l].values, &fine.lobes[l].values);
+            let count = fine.len() as f64;
+            let mean = fine.iter().map(|x| f64::from(*x)).sum::<f64>() / count;
+            let squares = ours.iter().zip(fine).map(|(a, b)| f64::from(a - b).powi(2));
             let rms = (squares.sum::<f64>() / count).sqrt() / mean;
-            println!("{}, {}: {:.3} %", model.name(), basis.lobe.name(), 100.0 * rms);
-            assert!(rms < TOLERANCE, "{}, {}: {rms}", model.name(), basis.lobe.name());
+            println!("{}, {name}: {:.3} %", model.name(), 100.0 * rms);
+            assert!(rms < TOLERANCE, "{}, {name}: {rms}", model.name());
+            compared += 1;
         }
     }
+    assert!(compared >= 2, "{compared} lobes");
 }
 
 /// Pixels of a sphere that its silhouette cuts.

@@ -112,9 +112,9 @@ impl Lobe for Clearcoat {
         Tail::Long
     }
 
-    /// Its weight is at most a quarter.
+    /// Its weight is at most a quarter, but its long tail gathers the errors of many nodes.
     fn care(&self) -> f64 {
-        0.5
+        0.8
     }
 
     /// The formula has an albedo of up to 1.251 (computed in NumPy). The horizon cuts the long tail of a sharp coat.
