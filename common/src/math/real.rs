@@ -4,14 +4,36 @@ use super::{
     elementary::{exp_nonpositive, exp_nonpositive_single, ln_positive},
     to_f32,
 };
-use std::ops::{Add, Div, Mul, Sub};
+use std::{
+    fmt::Debug,
+    ops::{Add, AddAssign, Div, Mul, Sub, SubAssign},
+};
 
 /// `f64` or `f32`.
 pub(crate) trait Real:
-    Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self>
+    Copy
+    + PartialOrd
+    + Debug
+    + Send
+    + Sync
+    + Add<Output = Self>
+    + Sub<Output = Self>
+    + Mul<Output = Self>
+    + Div<Output = Self>
+    + AddAssign
+    + SubAssign
 {
+    const ZERO: Self;
+    const ONE: Self;
+    /// The distance from 1 to the next larger number.
+    const EPSILON: Self;
+
     /// A number, rounded.
     fn of(x: f64) -> Self;
+
+    fn of_single(x: f32) -> Self;
+
+    fn widen(self) -> f64;
 
     fn sqrt(self) -> Self;
     fn max(self, other: Self) -> Self;
@@ -31,9 +53,23 @@ pub(crate) trait Real:
 macro_rules! real {
     ($name:ident, $of:expr, $exp:expr) => {
         impl Real for $name {
+            const ZERO: Self = 0.0;
+            const ONE: Self = 1.0;
+            const EPSILON: Self = Self::EPSILON;
+
             #[inline(always)]
             fn of(x: f64) -> Self {
                 $of(x)
+            }
+
+            #[inline(always)]
+            fn of_single(x: f32) -> Self {
+                x.into()
+            }
+
+            #[inline(always)]
+            fn widen(self) -> f64 {
+                f64::from(self)
             }
 
             #[inline(always)]

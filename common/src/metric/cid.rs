@@ -140,7 +140,7 @@ pub(super) fn check_pair(
 }
 
 /// The working space of a displayed image.
-pub(super) fn working(pipeline: &Pipeline, displayed: &DisplayImage) -> Planes<4> {
+pub(super) fn working(pipeline: &Pipeline<f64>, displayed: &DisplayImage) -> Planes<f64, 4> {
     let (width, height) = (displayed.width(), displayed.height());
     pipeline.convert(&Region::whole(width, height), |y, [r, g, b]| {
         for (x, &pixel) in displayed.pixels()[y * width..(y + 1) * width].iter().enumerate() {
@@ -150,7 +150,11 @@ pub(super) fn working(pipeline: &Pipeline, displayed: &DisplayImage) -> Planes<4
 }
 
 /// Means over all windows of l_L, c_L, s_L, l_C, l_H and c_C (1 if it is not included).
-pub(super) fn means(statistics: &Statistics, reference: &Planes<4>, image: &Planes<4>) -> [f64; FEATURES + 1] {
+pub(super) fn means(
+    statistics: &Statistics,
+    reference: &Planes<f64, 4>,
+    image: &Planes<f64, 4>,
+) -> [f64; FEATURES + 1] {
     let reference = statistics.prepare(reference.clone());
     let (columns, stride) = (reference.moments.width(), reference.moments.stride());
     let rows = statistics.compare(&reference, image, |_, row| {
@@ -169,9 +173,9 @@ pub(super) fn means(statistics: &Statistics, reference: &Planes<4>, image: &Plan
 
 /// Halves the size of an image in the working space: low-pass of the biorthogonal 9/7 wavelet with half-sample
 /// reflection, then every second pixel.
-fn halve(planes: &Planes<4>) -> Planes<4> {
+fn halve(planes: &Planes<f64, 4>) -> Planes<f64, 4> {
     let (width, height) = (planes.width(), planes.height());
-    let mut half = Planes::<4>::new(width.div_ceil(2), height.div_ceil(2));
+    let mut half = Planes::<f64, 4>::new(width.div_ceil(2), height.div_ceil(2));
     let sum = LOW_PASS[0] + 2.0 * LOW_PASS[1..].iter().sum::<f64>();
     let taps = LOW_PASS.map(|tap| tap / sum);
     let (rows, columns) = (Region::whole(width, height).rows(4), Region::whole(width, height).columns(4));

@@ -6,13 +6,14 @@
 
 use std::sync::LazyLock;
 
+use crate::math::real::Real;
 use glam::{DMat3, DVec3};
 
 use super::lab2000hl::{Lab2000hl, lightness_row};
-use super::row_math::cbrt;
+use super::row_math::RowMath;
 
 /// A 3 x 3 matrix by rows.
-pub(super) type Matrix = [[f64; 3]; 3];
+pub(super) type Matrix<R = f64> = [[R; 3]; 3];
 
 /// Channels of a row of the working space.
 pub(super) const LIGHTNESS: usize = 0;
@@ -54,7 +55,7 @@ pub fn linear_from_lab([l, a, b]: [f64; 3]) -> [f64; 3] {
 
 /// Fills a row of the working space from rows of XYZ relative to the white.
 #[inline(always)]
-pub(super) fn working_row(space: &Lab2000hl, xyz: [&[f64]; 3], working: [&mut [f64]; 4]) {
+pub(super) fn working_row<R: RowMath>(space: &Lab2000hl, xyz: [&[R]; 3], working: [&mut [R]; 4]) {
     let [l, a, b, chroma] = working;
     let n = l.len();
     let (a, b, chroma) = (&mut a[..n], &mut b[..n], &mut chroma[..n]);
@@ -71,7 +72,7 @@ pub(super) fn working_row(space: &Lab2000hl, xyz: [&[f64]; 3], working: [&mut [f
 
 /// Multiplies each colour of three rows by a matrix, in place.
 #[inline(always)]
-pub(super) fn transform_row(matrix: &Matrix, rows: [&mut [f64]; 3]) {
+pub(super) fn transform_row<R: Real>(matrix: &Matrix<R>, rows: [&mut [R]; 3]) {
     let [r, g, b] = rows;
     let n = r.len();
     let (g, b) = (&mut g[..n], &mut b[..n]);
@@ -81,22 +82,22 @@ pub(super) fn transform_row(matrix: &Matrix, rows: [&mut [f64]; 3]) {
 }
 
 #[inline(always)]
-fn lab(x: f64, y: f64, z: f64) -> [f64; 3] {
+fn lab<R: RowMath>(x: R, y: R, z: R) -> [R; 3] {
     let (fx, fy, fz) = (compress(x), compress(y), compress(z));
-    [116.0 * fy - 16.0, 500.0 * (fx - fy), 200.0 * (fy - fz)]
+    [R::of(116.0) * fy - R::of(16.0), R::of(500.0) * (fx - fy), R::of(200.0) * (fy - fz)]
 }
 
 /// CIELAB's f: a cube root, linear below the threshold. Values may be negative after a filter.
 #[inline(always)]
-fn compress(t: f64) -> f64 {
-    let root = cbrt(t.max(LAB_THRESHOLD));
-    let line = t * (841.0 / 108.0) + 4.0 / 29.0;
-    if t < LAB_THRESHOLD { line } else { root }
+fn compress<R: RowMath>(t: R) -> R {
+    let root = t.max(R::of(LAB_THRESHOLD)).cube_root();
+    let line = t * R::of(841.0 / 108.0) + R::of(4.0 / 29.0);
+    if t < R::of(LAB_THRESHOLD) { line } else { root }
 }
 
 /// The matrix times a column vector.
 #[inline(always)]
-pub(super) fn apply(m: &Matrix, v: [f64; 3]) -> [f64; 3] {
+pub(super) fn apply<R: Real>(m: &Matrix<R>, v: [R; 3]) -> [R; 3] {
     [
         m[0][0] * v[0] + m[0][1] * v[1] + m[0][2] * v[2],
         m[1][0] * v[0] + m[1][1] * v[1] + m[1][2] * v[2],
@@ -141,6 +142,6 @@ mod tests {
     #[test]
     fn cielab_is_continuous_at_its_threshold_and_linear_below_zero() {
         assert!((compress(LAB_THRESHOLD) - compress(LAB_THRESHOLD - 1e-12)).abs() < 1e-5);
-        assert!((compress(-0.1) + 0.1 * 841.0 / 108.0 - 4.0 / 29.0).abs() < 1e-15);
+        assert!((compress(-0.1_f64) + 0.1 * 841.0 / 108.0 - 4.0 / 29.0).abs() < 1e-15);
     }
 }

@@ -7,7 +7,7 @@
 use super::MetricError;
 use crate::image::Image;
 use crate::math::elementary::pow;
-use crate::math::{cell, widen};
+use crate::math::{cell, real::Real, widen};
 
 /// An sRGB-encoded image in double precision: `height x width x 3`, row-major, top left first.
 #[derive(Debug, Clone, PartialEq)]
@@ -121,9 +121,9 @@ const ENCODE_THRESHOLD: f64 = 0.003_130_668_442_500_588_3;
 
 /// A linear display value: exposed and clipped. A gain of 0 gives 0, also for NaN.
 #[inline(always)]
-pub(super) fn expose(radiance: f64, gain: f64) -> f64 {
-    let exposed = if gain > 0.0 { radiance * gain } else { 0.0 };
-    exposed.clamp(0.0, 1.0)
+pub(super) fn expose<R: Real>(radiance: R, gain: R) -> R {
+    let exposed = if gain > R::ZERO { radiance * gain } else { R::ZERO };
+    exposed.clamped(0.0, 1.0)
 }
 
 pub(super) fn check_exposure(exposure: f64) -> Result<(), MetricError> {
@@ -142,6 +142,11 @@ pub(super) fn check_coverage(coverage: &[f32], width: usize, height: usize) -> R
 
 /// Fails on the first covered pixel with a channel that is NaN or infinite.
 pub(super) fn check_covered_finite(what: &'static str, image: &Image, coverage: &[f32]) -> Result<(), MetricError> {
+    // Most images are finite everywhere: one pass that becomes vector code.
+    let exponents = image.pixels().as_flattened().iter().map(|x| x.to_bits() & f32::INFINITY.to_bits());
+    if exponents.max() < Some(f32::INFINITY.to_bits()) {
+        return Ok(());
+    }
     let covered = image.pixels().iter().zip(coverage);
     let seen = covered.map(|(&pixel, &c)| if c > 0.0 { widen(pixel).to_array() } else { [0.0; 3] });
     check_finite(what, image.width(), seen)

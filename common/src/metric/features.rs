@@ -11,15 +11,16 @@
 
 use super::planes::LANES;
 use super::window::{MEAN_CHROMA, MEAN_LIGHTNESS, RowStatistics, VARIANCE_CHROMA, VARIANCE_LIGHTNESS};
+use crate::math::real::Real;
 
 /// Features of a window: l_L, c_L, s_L, l_C, l_H.
 pub(super) const FEATURES: usize = 5;
 
-const LIGHTNESS_WEIGHT: f64 = 0.002;
-const CHROMA_WEIGHT: f64 = 0.002;
-const HUE_WEIGHT: f64 = 0.008;
-const CONTRAST_CONSTANT: f64 = 0.1;
-const STRUCTURE_CONSTANT: f64 = 0.1;
+pub(super) const LIGHTNESS_WEIGHT: f64 = 0.002;
+pub(super) const CHROMA_WEIGHT: f64 = 0.002;
+pub(super) const HUE_WEIGHT: f64 = 0.008;
+pub(super) const CONTRAST_CONSTANT: f64 = 0.1;
+pub(super) const STRUCTURE_CONSTANT: f64 = 0.1;
 
 /// Fills rows with the deficits of the five features.
 #[inline(always)]
@@ -60,9 +61,9 @@ fn mean_deficit_row(k: f64, first: &[f64], second: &[f64], out: &mut [f64]) {
 
 /// 1 - 1/(1 + k d^2).
 #[inline(always)]
-pub(super) fn mean_deficit(k: f64, difference: f64) -> f64 {
-    let t = k * (difference * difference);
-    t / (1.0 + t)
+pub(super) fn mean_deficit<R: Real>(k: f64, difference: R) -> R {
+    let t = R::of(k) * (difference * difference);
+    t / (R::ONE + t)
 }
 
 /// 1 - (k + 2 s1 s2)/(k + s1^2 + s2^2), not below 0.
@@ -81,8 +82,8 @@ pub(super) fn structure_deficit(k: f64, covariance: f64, product: f64) -> f64 {
 ///
 /// Leaving out windows of error 0 at either end does not change the bits, if the row begins at a multiple of the lanes.
 #[inline(always)]
-pub(super) fn row_sum(row: &[f64]) -> f64 {
-    let mut sums = [0.0; LANES];
+pub(super) fn row_sum<R: Real>(row: &[R]) -> f64 {
+    let mut sums = [R::ZERO; LANES];
     let (chunks, rest) = row.as_chunks::<LANES>();
     for chunk in chunks {
         for i in 0..LANES {
@@ -92,13 +93,13 @@ pub(super) fn row_sum(row: &[f64]) -> f64 {
     for i in 0..rest.len() {
         sums[i] += rest[i];
     }
-    sums.iter().sum()
+    sums.iter().map(|sum| sum.widen()).sum()
 }
 
 /// As [`row_sum`], of the products of two rows.
 #[inline(always)]
-pub(super) fn weighted_row_sum(row: &[f64], weights: &[f64]) -> f64 {
-    let mut sums = [0.0; LANES];
+pub(super) fn weighted_row_sum<R: Real>(row: &[R], weights: &[R]) -> f64 {
+    let mut sums = [R::ZERO; LANES];
     let ((chunks, rest), (weight_chunks, weight_rest)) = (row.as_chunks::<LANES>(), weights.as_chunks::<LANES>());
     for j in 0..chunks.len() {
         for i in 0..LANES {
@@ -108,5 +109,5 @@ pub(super) fn weighted_row_sum(row: &[f64], weights: &[f64]) -> f64 {
     for i in 0..rest.len() {
         sums[i] += weight_rest[i] * rest[i];
     }
-    sums.iter().sum()
+    sums.iter().map(|sum| sum.widen()).sum()
 }

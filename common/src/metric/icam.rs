@@ -14,13 +14,16 @@ use rustfft::{Fft, FftDirection, FftPlanner};
 
 use super::colour::Matrix;
 use super::planes::Planes;
-use crate::math::elementary::{exp, pow};
+use crate::math::{
+    elementary::{exp, pow},
+    real::Real,
+};
 
 /// XYZ to YCC-RIT.
 pub(super) const XYZ_TO_YCC: Matrix = [[0.0556, 0.9981, -0.0254], [0.9510, -0.9038, 0.0], [0.0386, 1.0822, -1.0276]];
 
 /// Filters three YCC planes in place.
-pub(super) fn filter(planes: &mut Planes<3>, cycles_per_degree: f64) {
+pub(super) fn filter<R: Real>(planes: &mut Planes<R, 3>, cycles_per_degree: f64) {
     let sensitivities: [fn(f64) -> f64; 3] = [luminance_sensitivity, red_green_sensitivity, blue_yellow_sensitivity];
     let (width, height) = (planes.width(), planes.height());
     let filtered: Vec<Vec<f64>> = sensitivities
@@ -28,7 +31,7 @@ pub(super) fn filter(planes: &mut Planes<3>, cycles_per_degree: f64) {
         .enumerate()
         .map(|(channel, sensitivity)| {
             let values: Vec<f64> =
-                (0..height).flat_map(|y| planes.row_of(channel, y)[..width].iter().copied()).collect();
+                (0..height).flat_map(|y| planes.row_of(channel, y)[..width].iter().map(|x| x.widen())).collect();
             let mean = if channel == 0 { values.iter().sum::<f64>() / values.len() as f64 } else { 0.0 };
             filter_channel(&values, mean, width, |f| sensitivity(cycles_per_degree * f))
         })
@@ -37,7 +40,8 @@ pub(super) fn filter(planes: &mut Planes<3>, cycles_per_degree: f64) {
         || (),
         |(), y, rows| {
             for (row, values) in rows.into_iter().zip(&filtered) {
-                row[..width].copy_from_slice(&values[y * width..(y + 1) * width]);
+                let values = &values[y * width..(y + 1) * width];
+                row.iter_mut().zip(values).for_each(|(out, &value)| *out = R::of(value));
             }
         },
     );

@@ -14,8 +14,8 @@
 use std::sync::{Arc, LazyLock};
 
 use super::MetricError;
-use super::row_math::{ln_1p, sin_cos};
-use crate::math::cell;
+use super::row_math::RowMath;
+use crate::math::{cell, real::Real};
 
 /// The map from CIELAB to LAB2000HL.
 #[derive(Debug, Clone, Default)]
@@ -61,15 +61,17 @@ impl Lab2000hl {
 
     /// Replaces rows of CIELAB a and b by a00 and b00.
     #[inline(always)]
-    pub(super) fn chroma_row(&self, a: &mut [f64], b: &mut [f64]) {
+    pub(super) fn chroma_row<R: RowMath>(&self, a: &mut [R], b: &mut [R]) {
         let b = &mut b[..a.len()];
         if let Some(table) = &self.table {
             for i in 0..a.len() {
-                (a[i], b[i]) = bilinear(table, a[i], b[i]);
+                let (a00, b00) = bilinear(table, a[i].widen(), b[i].widen());
+                (a[i], b[i]) = (R::of(a00), R::of(b00));
             }
         } else {
+            let (ratio, offset) = (of(&RATIO), of(&HUE_OFFSET));
             for i in 0..a.len() {
-                (a[i], b[i]) = fit00(a[i], b[i]);
+                (a[i], b[i]) = fit00(&ratio, &offset, a[i], b[i]);
             }
         }
     }
@@ -77,13 +79,13 @@ impl Lab2000hl {
 
 /// Replaces a row of CIELAB L by L00. It is not vectorised, because it looks values up in a table.
 #[inline(always)]
-pub(super) fn lightness_row(l: &mut [f64]) {
+pub(super) fn lightness_row<R: Real>(l: &mut [R]) {
     let table = &LIGHTNESS[..];
     for l in l {
-        let x = l.clamp(0.0, 100.0) * LIGHTNESS_STEPS_PER_UNIT;
+        let x = l.widen().clamp(0.0, 100.0) * LIGHTNESS_STEPS_PER_UNIT;
         let i = cell(x, LIGHTNESS_STEPS);
         let fraction = x - i as f64;
-        *l = table[i] + fraction * (table[i + 1] - table[i]);
+        *l = R::of(table[i] + fraction * (table[i + 1] - table[i]));
     }
 }
 
@@ -103,29 +105,39 @@ const LIGHTNESS_STEPS_PER_UNIT: f64 = 1000.0;
 /// (a00, b00) of CIELAB (a, b). The hue angle is not computed: cos h and sin h are a/C and b/C, those of its multiples
 /// follow by Chebyshev's recurrence, and only the small offset d needs a sine and a cosine.
 #[inline(always)]
-fn fit00(a: f64, b: f64) -> (f64, f64) {
+fn fit00<R: RowMath>(ratios: &Coefficients<R>, offsets: &Coefficients<R>, a: R, b: R) -> (R, R) {
     let chroma = (a * a + b * b).sqrt();
-    let inverse = 1.0 / chroma.max(f64::MIN_POSITIVE);
+    // The smallest normal number of the lower precision, so that the inverse is finite in both.
+    let inverse = R::ONE / chroma.max(R::of(f64::from(f32::MIN_POSITIVE)));
     let (cos_h, sin_h) = (a * inverse, b * inverse);
-    let c = chroma * (1.0 / 128.0);
-    let (mut ratio, mut offset) = (cubic(&RATIO, 0, c), cubic(&HUE_OFFSET, 0, c));
-    let (mut cos_previous, mut sin_previous) = (1.0, 0.0);
+    let c = chroma * R::of(1.0 / 128.0);
+    let (mut ratio, mut offset) = (cubic(ratios, 0, c), cubic(offsets, 0, c));
+    let (mut cos_previous, mut sin_previous) = (R::ONE, R::ZERO);
+    let twice = R::of(2.0) * cos_h;
     let (mut cos_m, mut sin_m) = (cos_h, sin_h);
     for m in 0..6 {
-        ratio += cubic(&RATIO, 2 * m + 1, c) * cos_m + cubic(&RATIO, 2 * m + 2, c) * sin_m;
-        offset += cubic(&HUE_OFFSET, 2 * m + 1, c) * cos_m + cubic(&HUE_OFFSET, 2 * m + 2, c) * sin_m;
-        let next = (2.0 * cos_h * cos_m - cos_previous, 2.0 * cos_h * sin_m - sin_previous);
+        ratio += cubic(ratios, 2 * m + 1, c) * cos_m + cubic(ratios, 2 * m + 2, c) * sin_m;
+        offset += cubic(offsets, 2 * m + 1, c) * cos_m + cubic(offsets, 2 * m + 2, c) * sin_m;
+        let next = (twice * cos_m - cos_previous, twice * sin_m - sin_previous);
         (cos_previous, sin_previous) = (cos_m, sin_m);
         (cos_m, sin_m) = next;
     }
-    let chroma00 = ln_1p(0.045 * chroma) * (1.0 / 0.045) * ratio;
-    let (sin_d, cos_d) = sin_cos(offset);
+    let chroma00 = (R::of(0.045) * chroma).ln_one_plus() * R::of(1.0 / 0.045) * ratio;
+    let (sin_d, cos_d) = offset.sine_cosine();
     (chroma00 * (cos_h * cos_d - sin_h * sin_d), chroma00 * (sin_h * cos_d + cos_h * sin_d))
+}
+
+/// Four rows as [`RATIO`].
+type Coefficients<R> = [[R; 13]; 4];
+
+#[inline(always)]
+fn of<R: Real>(coefficients: &Coefficients<f64>) -> Coefficients<R> {
+    coefficients.map(|row| row.map(R::of))
 }
 
 /// The polynomial in `c` whose coefficients are column `term`.
 #[inline(always)]
-fn cubic(rows: &[[f64; 13]; 4], term: usize, c: f64) -> f64 {
+fn cubic<R: Real>(rows: &Coefficients<R>, term: usize, c: R) -> R {
     rows[0][term] + c * (rows[1][term] + c * (rows[2][term] + c * rows[3][term]))
 }
 
@@ -218,12 +230,12 @@ mod tests {
                         .sum()
                 };
                 let (c00, h00) = (libm::log1p(0.045 * c) / 0.045 * sum(&RATIO), h + sum(&HUE_OFFSET));
-                let (a00, b00) = fit00(a, b);
+                let (a00, b00) = fit00(&RATIO, &HUE_OFFSET, a, b);
                 let error = libm::hypot(a00 - c00 * libm::cos(h00), b00 - c00 * libm::sin(h00));
                 assert!(error < 1e-11, "{a} {b}: {error:e}");
             }
         }
-        assert_eq!(fit00(0.0, 0.0), (0.0, 0.0));
+        assert_eq!(fit00(&RATIO, &HUE_OFFSET, 0.0, 0.0), (0.0, 0.0));
     }
 
     #[test]

@@ -3,8 +3,8 @@
 //! Selection and polishing use [`Judge`]: CSSIM against a prepared reference. [`cid`] is the same measure on two
 //! displayed images, with the authors' variants; [`icid`] is its successor. [`MetricKind`] has the metrics by name.
 //! [`DisplayImage`] and [`auto_exposure`] are the display transform before them. The pipeline, in the order of the
-//! files: `display`, `colour` and `scielab` (or `icam`) under `working`, `lab2000hl`, `window`, `features`, then
-//! `cssim`, `cid` or `icid`, and `maps` for pictures.
+//! files: `display`, `colour` and `scielab` (or `icam`) under `working`, `lab2000hl`, `differences`, then `cssim`; or
+//! `window`, `features`, then `cid` or `icid`, and `maps` for pictures.
 //!
 //! Scores depend much more on resolution, exposure and background than on details of the formulas. Compare only scores
 //! with equal resolution, exposure and background.
@@ -13,6 +13,7 @@ mod cid;
 mod colour;
 pub mod cost;
 mod cssim;
+mod differences;
 mod dispatch;
 mod display;
 mod error;
@@ -26,6 +27,7 @@ mod planes;
 mod region;
 mod row_math;
 mod scielab;
+mod spans;
 mod window;
 mod working;
 

@@ -1,23 +1,25 @@
-//! Working buffers of the metric: `N` planes of `f64`, interleaved by row.
+//! Working buffers of the metric: `N` planes of numbers, interleaved by row.
+
+use crate::math::real::Real;
 
 /// Values that the row loops process together. Row lengths are padded to a multiple of it.
-pub(super) const LANES: usize = 16;
+pub(super) const LANES: usize = 32;
 
 /// `N` planes of `height x width` values. Rows with the same index are adjacent in memory, so that a parallel task can
 /// write to this row of all planes. Each row is padded to a multiple of [`LANES`].
 #[derive(Debug, Clone)]
-pub(super) struct Planes<const N: usize> {
+pub(super) struct Planes<R, const N: usize> {
     width: usize,
     height: usize,
     stride: usize,
-    values: Vec<f64>,
+    values: Vec<R>,
 }
 
-impl<const N: usize> Planes<N> {
+impl<R: Real, const N: usize> Planes<R, N> {
     /// Planes of zeros.
     pub(super) fn new(width: usize, height: usize) -> Self {
         let stride = width.next_multiple_of(LANES);
-        Self { width, height, stride, values: vec![0.0; N * stride * height] }
+        Self { width, height, stride, values: vec![R::ZERO; N * stride * height] }
     }
 
     pub(super) fn width(&self) -> usize {
@@ -34,13 +36,13 @@ impl<const N: usize> Planes<N> {
     }
 
     /// Row `y` of each plane, with its padding.
-    pub(super) fn row(&self, y: usize) -> [&[f64]; N] {
+    pub(super) fn row(&self, y: usize) -> [&[R]; N] {
         let row = &self.values[y * N * self.stride..(y + 1) * N * self.stride];
         std::array::from_fn(|plane| &row[plane * self.stride..(plane + 1) * self.stride])
     }
 
     /// Row `y` of one plane, with its padding.
-    pub(super) fn row_of(&self, plane: usize, y: usize) -> &[f64] {
+    pub(super) fn row_of(&self, plane: usize, y: usize) -> &[R] {
         &self.values[(y * N + plane) * self.stride..(y * N + plane + 1) * self.stride]
     }
 
@@ -48,7 +50,7 @@ impl<const N: usize> Planes<N> {
     pub(super) fn fill_rows<S: Send>(
         &mut self,
         scratch: impl Fn() -> S + Sync + Send,
-        fill: impl Fn(&mut S, usize, [&mut [f64]; N]) + Sync + Send,
+        fill: impl Fn(&mut S, usize, [&mut [R]; N]) + Sync + Send,
     ) {
         use rayon::prelude::*;
         let stride = self.stride;
@@ -64,7 +66,7 @@ impl<const N: usize> Planes<N> {
 pub(super) const ROWS_PER_TASK: usize = 8;
 
 /// The `N` rows of length `stride` in a row of planes.
-fn split<const N: usize>(row: &mut [f64], stride: usize) -> [&mut [f64]; N] {
+fn split<R, const N: usize>(row: &mut [R], stride: usize) -> [&mut [R]; N] {
     let mut rows = row.chunks_exact_mut(stride);
     std::array::from_fn(|_| rows.next().unwrap_or_default())
 }

@@ -112,12 +112,12 @@ mod tests {
 
     #[test]
     fn the_region_is_the_bounding_box_with_its_margin() {
-        let (width, height) = (100, 90);
+        let (width, height) = (120, 90);
         let mut coverage = vec![0.0; width * height];
         assert_eq!(Region::around(&coverage, width, height, 19), None);
-        coverage[50 * width + 60] = 0.25;
-        coverage[52 * width + 61] = 1.0;
+        coverage[50 * width + 75] = 0.25;
+        coverage[52 * width + 76] = 1.0;
         let region = Region::around(&coverage, width, height, 19).unwrap();
-        assert_eq!((region.x0, region.y0, region.width, region.height), (16, 21, 91 - 16, 82 - 21));
+        assert_eq!((region.x0, region.y0, region.width, region.height), (32, 21, 106 - 32, 82 - 21));
     }
 }

@@ -18,7 +18,12 @@
 use super::colour::Matrix;
 use super::planes::{LANES, Planes};
 use super::region::Region;
-use crate::math::elementary::{exp, ln};
+use super::spans::Spans;
+use crate::math::{
+    elementary::{exp, ln},
+    real::Real,
+};
+use std::ops::Range;
 
 /// XYZ to opponent colours: achromatic, red-green, blue-yellow (`cmatrix('xyz2opp')`, CIE 1931).
 pub(super) const XYZ_TO_OPPONENT: Matrix = [
@@ -35,29 +40,30 @@ const BLUE_YELLOW: [(f64, f64); 2] = [(0.092, 0.567_885), (0.6451, 0.432_115)];
 /// The kernels are built with at least this many samples per degree and then resampled.
 const MINIMUM_SAMPLES_PER_DEGREE: f64 = 224.0;
 
-/// Taps below this fraction of the centre tap are omitted: their sum is below the rounding error of the result.
-const NEGLIGIBLE_TAP: f64 = 1e-19;
+/// Taps below this fraction of the centre tap, in units of the precision, are omitted: their sum is below the rounding error of the
+/// result.
+const NEGLIGIBLE_TAP: f64 = 5e-4;
 
 /// The filter for one viewing distance.
 #[derive(Debug, Clone)]
-pub(super) struct Scielab {
-    achromatic: Channel<2>,
-    red_green: Channel<1>,
-    blue_yellow: Channel<1>,
+pub(super) struct Scielab<R> {
+    achromatic: Channel<R, 2>,
+    red_green: Channel<R, 1>,
+    blue_yellow: Channel<R, 1>,
     reach: usize,
 }
 
 /// One channel: a narrow Gaussian and `W` wide ones. Each kernel is stored as the half from its centre, along y; along
 /// x it is multiplied by the sign of its weight.
 #[derive(Debug, Clone)]
-struct Channel<const W: usize> {
-    narrow: Vec<f64>,
+struct Channel<R, const W: usize> {
+    narrow: Vec<R>,
     /// Tap k of all wide kernels, which are used together.
-    wide: Vec<[f64; W]>,
-    sign: [f64; W],
+    wide: Vec<[R; W]>,
+    sign: [R; W],
 }
 
-impl Scielab {
+impl<R: Real> Scielab<R> {
     /// The filter for `samples_per_degree` pixels per degree of visual angle.
     pub(super) fn new(samples_per_degree: f64) -> Self {
         let achromatic = Channel::new(ACHROMATIC[0], [ACHROMATIC[1], ACHROMATIC[2]], samples_per_degree);
@@ -73,26 +79,34 @@ impl Scielab {
     }
 
     /// Buffers for [`Scielab::filter_row`].
-    pub(super) fn scratch(&self, region: &Region) -> Scratch {
+    pub(super) fn scratch(&self, region: &Region) -> Scratch<R> {
         let stride = region.width.next_multiple_of(LANES);
         Scratch {
             rows: region.rows(self.reach),
             columns: region.columns(self.reach),
-            zeros: vec![0.0; stride],
-            smoothed: std::array::from_fn(|_| vec![0.0; stride + 2 * self.reach]),
+            zeros: vec![R::ZERO; stride],
+            smoothed: std::array::from_fn(|_| vec![R::ZERO; stride + 2 * self.reach]),
         }
     }
 
-    /// Filters row `y` of three opponent planes into `out`, rows of the planes' stride.
+    /// Filters row `y` of three opponent planes into `out`, rows of the planes' stride, where it may differ from 0.
     #[inline(always)]
-    pub(super) fn filter_row(&self, opponent: &Planes<3>, y: usize, scratch: &mut Scratch, out: [&mut [f64]; 3]) {
+    pub(super) fn filter_row(
+        &self,
+        opponent: &Planes<R, 3>,
+        y: usize,
+        spans: &Spans,
+        scratch: &mut Scratch<R>,
+        out: [&mut [R]; 3],
+    ) {
         let Scratch { rows, columns, zeros, smoothed } = scratch;
         let (sources, zeros) = (&rows[y..y + 2 * self.reach + 1], &zeros[..]);
         let source =
             |channel: usize| sources.iter().map(move |row| row.map_or(zeros, move |row| opponent.row_of(channel, row)));
         let [narrow, wide_a, wide_b] = smoothed;
         let [achromatic, red_green, blue_yellow] = out;
-        let layout = Layout { reach: self.reach, width: opponent.width(), columns };
+        let (vertical, filtered) = (spans.vertical(y), spans.filtered(y));
+        let layout = Layout { reach: self.reach, width: opponent.width(), columns, vertical, filtered };
         self.achromatic.filter_row(source(0), &layout, narrow, [&mut *wide_a, wide_b], achromatic);
         self.red_green.filter_row(source(1), &layout, narrow, [&mut *wide_a], red_green);
         self.blue_yellow.filter_row(source(2), &layout, narrow, [wide_a], blue_yellow);
@@ -101,58 +115,69 @@ impl Scielab {
 
 /// The buffers of one task that filters rows.
 #[derive(Debug)]
-pub(super) struct Scratch {
+pub(super) struct Scratch<R> {
     rows: Vec<Option<usize>>,
     columns: Vec<Option<usize>>,
-    zeros: Vec<f64>,
-    smoothed: [Vec<f64>; 3],
+    zeros: Vec<R>,
+    smoothed: [Vec<R>; 3],
 }
 
 struct Layout<'a> {
     reach: usize,
     width: usize,
     columns: &'a [Option<usize>],
+    /// Columns of the sums along y and of the result.
+    vertical: Range<usize>,
+    filtered: Range<usize>,
 }
 
-impl<const W: usize> Channel<W> {
+impl<R: Real, const W: usize> Channel<R, W> {
     fn new(narrow: (f64, f64), wide: [(f64, f64); W], samples_per_degree: f64) -> Self {
         let kernels = wide.map(|gaussian| half_kernel(gaussian, samples_per_degree));
         let mut narrow = half_kernel(narrow, samples_per_degree);
-        let significant = narrow.iter().take_while(|&&tap| tap > NEGLIGIBLE_TAP * narrow[0]).count();
+        let negligible = NEGLIGIBLE_TAP * R::EPSILON.widen() * narrow[0];
+        let significant = narrow.iter().take_while(|&&tap| tap > negligible).count();
         narrow.truncate(significant);
-        let wide_taps = (0..kernels[0].len()).map(|k| std::array::from_fn(|g| kernels[g][k])).collect();
-        Self { narrow, wide: wide_taps, sign: wide.map(|(_, weight)| weight.signum()) }
+        let wide_taps = (0..kernels[0].len()).map(|k| std::array::from_fn(|g| R::of(kernels[g][k]))).collect();
+        let narrow = narrow.into_iter().map(R::of).collect();
+        Self { narrow, wide: wide_taps, sign: wide.map(|(_, weight)| R::of(weight.signum())) }
     }
 
     #[inline(always)]
     fn filter_row<'a>(
         &self,
-        source: impl Iterator<Item = &'a [f64]>,
+        source: impl Iterator<Item = &'a [R]>,
         layout: &Layout<'_>,
-        narrow: &mut [f64],
-        mut wide: [&mut Vec<f64>; W],
-        out: &mut [f64],
-    ) {
-        let reach = layout.reach;
-        self.along_y(source, reach, &mut narrow[reach..], wide.each_mut().map(|row| &mut row[reach..]));
+        narrow: &mut [R],
+        mut wide: [&mut Vec<R>; W],
+        out: &mut [R],
+    ) where
+        R: 'a,
+    {
+        begin_row(narrow, layout);
+        wide.iter_mut().for_each(|row| begin_row(row, layout));
+        self.along_y(source, layout, narrow, wide.each_mut().map(|row| &mut row[..]));
         continue_row(narrow, layout);
         wide.iter_mut().for_each(|row| continue_row(row, layout));
-        self.along_x(reach, narrow, wide.map(|row| &row[..]), out);
+        self.along_x(layout, narrow, wide.map(|row| &row[..]), out);
     }
 
-    /// Sums the rows around the current one. `narrow` and `wide` begin at column 0.
+    /// Sums the rows around the current one, into rows that begin `reach` columns before column 0.
     #[inline(always)]
     fn along_y<'a>(
         &self,
-        source: impl Iterator<Item = &'a [f64]>,
-        reach: usize,
-        narrow: &mut [f64],
-        wide: [&mut [f64]; W],
-    ) {
-        let rows: Vec<&[[f64; LANES]]> = source.map(|row| row.as_chunks().0).collect();
+        source: impl Iterator<Item = &'a [R]>,
+        layout: &Layout<'_>,
+        narrow: &mut [R],
+        wide: [&mut [R]; W],
+    ) where
+        R: 'a,
+    {
+        let rows: Vec<&[[R; LANES]]> = source.map(|row| row.as_chunks().0).collect();
+        let reach = layout.reach;
         let (centre, pairs) = (rows[reach], self.narrow.len());
-        for j in 0..centre.len() {
-            let (mut narrow_sum, mut wide_sum) = (ZERO, [ZERO; W]);
+        for j in layout.vertical.start / LANES..layout.vertical.end / LANES {
+            let (mut narrow_sum, mut wide_sum) = (zero(), [zero(); W]);
             add_scaled(&mut narrow_sum, self.narrow[0], &centre[j]);
             for g in 0..W {
                 add_scaled(&mut wide_sum[g], self.wide[0][g], &centre[j]);
@@ -170,20 +195,21 @@ impl<const W: usize> Channel<W> {
                     add_scaled(&mut wide_sum[g], self.wide[k][g], &pair);
                 }
             }
-            narrow[j * LANES..][..LANES].copy_from_slice(&narrow_sum);
+            narrow[reach + j * LANES..][..LANES].copy_from_slice(&narrow_sum);
             for g in 0..W {
-                wide[g][j * LANES..][..LANES].copy_from_slice(&wide_sum[g]);
+                wide[g][reach + j * LANES..][..LANES].copy_from_slice(&wide_sum[g]);
             }
         }
     }
 
     /// Sums along rows that begin `reach` columns before column 0.
     #[inline(always)]
-    fn along_x(&self, reach: usize, narrow: &[f64], wide: [&[f64]; W], out: &mut [f64]) {
+    fn along_x(&self, layout: &Layout<'_>, narrow: &[R], wide: [&[R]; W], out: &mut [R]) {
+        let reach = layout.reach;
         let (chunks, _) = out.as_chunks_mut::<LANES>();
-        for j in 0..chunks.len() {
+        for j in layout.filtered.start / LANES..layout.filtered.end / LANES {
             let span = j * LANES..(j + 1) * LANES + 2 * reach;
-            let mut sum = ZERO;
+            let mut sum = zero();
             let row = &narrow[span.clone()];
             add_scaled(&mut sum, self.narrow[0], lanes(row, reach));
             for k in 1..self.narrow.len() {
@@ -191,7 +217,7 @@ impl<const W: usize> Channel<W> {
             }
             for g in 0..W {
                 let row = &wide[g][span.clone()];
-                let mut part = ZERO;
+                let mut part = zero();
                 add_scaled(&mut part, self.wide[0][g], lanes(row, reach));
                 for k in 1..=reach {
                     add_scaled(&mut part, self.wide[k][g], &sum_of(lanes(row, reach - k), lanes(row, reach + k)));
@@ -203,25 +229,37 @@ impl<const W: usize> Channel<W> {
     }
 }
 
+/// Sets the columns of a row that the sums along x read to 0.
+#[inline(always)]
+fn begin_row<R: Real>(row: &mut [R], layout: &Layout<'_>) {
+    // The row begins `reach` columns before column 0.
+    row[layout.filtered.start..layout.filtered.end + 2 * layout.reach].fill(R::ZERO);
+}
+
 /// Continues a row, which begins `reach` columns before column 0, beyond both ends of the region.
 #[inline(always)]
-fn continue_row(row: &mut [f64], layout: &Layout<'_>) {
+fn continue_row<R: Real>(row: &mut [R], layout: &Layout<'_>) {
     let (reach, width) = (layout.reach, layout.width);
     for i in (0..reach).chain(reach + width..width + 2 * reach) {
-        row[i] = layout.columns[i].map_or(0.0, |column| row[reach + column]);
+        row[i] = layout.columns[i].map_or(R::ZERO, |column| row[reach + column]);
     }
 }
 
-const ZERO: [f64; LANES] = [0.0; LANES];
-
 #[inline(always)]
-fn lanes(row: &[f64], at: usize) -> &[f64; LANES] {
-    row[at..at + LANES].as_array().unwrap_or(&ZERO)
+fn zero<R: Real>() -> [R; LANES] {
+    [R::ZERO; LANES]
+}
+
+/// The chunk that begins at `at`; a row always reaches to its end.
+#[inline(always)]
+fn lanes<R>(row: &[R], at: usize) -> &[R; LANES] {
+    let Some(lanes) = row[at..].first_chunk() else { unreachable!("a row is padded to whole chunks") };
+    lanes
 }
 
 #[inline(always)]
-fn sum_of(a: &[f64; LANES], b: &[f64; LANES]) -> [f64; LANES] {
-    let mut sum = ZERO;
+fn sum_of<R: Real>(a: &[R; LANES], b: &[R; LANES]) -> [R; LANES] {
+    let mut sum = zero();
     for i in 0..LANES {
         sum[i] = a[i] + b[i];
     }
@@ -229,7 +267,7 @@ fn sum_of(a: &[f64; LANES], b: &[f64; LANES]) -> [f64; LANES] {
 }
 
 #[inline(always)]
-fn add_scaled(sum: &mut [f64; LANES], tap: f64, chunk: &[f64; LANES]) {
+fn add_scaled<R: Real>(sum: &mut [R; LANES], tap: R, chunk: &[R; LANES]) {
     for i in 0..LANES {
         sum[i] += tap * chunk[i];
     }

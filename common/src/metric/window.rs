@@ -10,6 +10,8 @@
 use super::colour::{A, B, CHROMA, LIGHTNESS};
 use super::dispatch::Lanes;
 use super::planes::{LANES, Planes, ROWS_PER_TASK};
+use crate::math::real::Real;
+use std::ops::Range;
 
 /// Pixels along a side of a window.
 pub(super) const SIZE: usize = 11;
@@ -18,12 +20,12 @@ pub(super) const RADIUS: usize = SIZE / 2;
 
 /// The weights along one axis, from the centre outwards.
 #[derive(Debug, Clone)]
-pub(super) struct Window {
-    taps: [f64; RADIUS + 1],
+pub(super) struct Window<R> {
+    taps: [R; RADIUS + 1],
 }
 
 /// Statistics of one image for every window. The constants below name the planes.
-pub(super) type Moments = Planes<4>;
+pub(super) type Moments = Planes<f64, 4>;
 /// Planes of [`Moments`].
 pub(super) const MEAN_LIGHTNESS: usize = 0;
 /// Variance of lightness, not below 0.
@@ -36,7 +38,7 @@ pub(super) const VARIANCE_CHROMA: usize = 3;
 /// An image in the working space with its statistics.
 #[derive(Debug, Clone)]
 pub(super) struct Prepared {
-    pub(super) working: Planes<4>,
+    pub(super) working: Planes<f64, 4>,
     pub(super) moments: Moments,
 }
 
@@ -58,13 +60,13 @@ pub(super) struct RowStatistics<'a> {
 /// Settings and methods of the window statistics.
 #[derive(Debug, Clone)]
 pub(super) struct Statistics {
-    pub(super) window: Window,
+    pub(super) window: Window<f64>,
     /// Whether variance and covariance of chroma are needed.
     pub(super) chroma: bool,
     pub(super) lanes: Lanes,
 }
 
-impl Window {
+impl<R: Real> Window<R> {
     /// Gaussian weights of standard deviation `sigma` pixels that sum to 1.
     pub(super) fn new(sigma: f64) -> Self {
         let mut taps: [f64; RADIUS + 1] = std::array::from_fn(|i| {
@@ -73,39 +75,42 @@ impl Window {
         });
         let sum = taps[0] + 2.0 * taps[1..].iter().sum::<f64>();
         taps.iter_mut().for_each(|tap| *tap /= sum);
-        Self { taps }
+        Self { taps: taps.map(R::of) }
     }
 
-    /// Weighted means along a row of windows: of the values of `first` or, with `PRODUCT`, of their products with
+    /// Weighted means along a span of a row of windows: of the values of `first` or, with `PRODUCT`, of their products with
     /// `second`.
     #[inline(always)]
-    fn mean_row<const PRODUCT: bool>(
+    pub(super) fn mean_row<const PRODUCT: bool>(
         &self,
-        first: &WindowRows<'_>,
-        second: &WindowRows<'_>,
-        column_sums: &mut [f64],
-        out: &mut [f64],
+        first: &WindowRows<'_, R>,
+        second: &WindowRows<'_, R>,
+        span: &Range<usize>,
+        column_sums: &mut [R],
+        out: &mut [R],
     ) {
         let (sums, _) = column_sums.as_chunks_mut::<LANES>();
-        for j in 0..first[0].len() {
-            let mut total = [0.0; LANES];
+        let (begin, end) = (span.start / LANES, span.end / LANES);
+        for j in begin..(end + 1).min(first[0].len()) {
+            let mut total = [R::ZERO; LANES];
             for i in 0..LANES {
-                total[i] = self.taps[0] * value::<PRODUCT>(first[RADIUS][j][i], second[RADIUS][j][i]);
+                total[i] = self.taps[0] * value::<R, PRODUCT>(first[RADIUS][j][i], second[RADIUS][j][i]);
             }
             for k in 1..=RADIUS {
                 let above = (&first[RADIUS - k][j], &second[RADIUS - k][j]);
                 let below = (&first[RADIUS + k][j], &second[RADIUS + k][j]);
                 for i in 0..LANES {
-                    let pair = value::<PRODUCT>(above.0[i], above.1[i]) + value::<PRODUCT>(below.0[i], below.1[i]);
+                    let pair =
+                        value::<R, PRODUCT>(above.0[i], above.1[i]) + value::<R, PRODUCT>(below.0[i], below.1[i]);
                     total[i] += self.taps[k] * pair;
                 }
             }
             sums[j] = total;
         }
         let (chunks, _) = out.as_chunks_mut::<LANES>();
-        for j in 0..chunks.len() {
+        for j in begin..end {
             let around = &column_sums[j * LANES..(j + 1) * LANES + 2 * RADIUS];
-            let mut total = [0.0; LANES];
+            let mut total = [R::ZERO; LANES];
             for i in 0..LANES {
                 total[i] = self.taps[0] * around[i + RADIUS];
             }
@@ -121,16 +126,16 @@ impl Window {
 }
 
 /// The rows of one plane under a row of windows.
-type WindowRows<'a> = [&'a [[f64; LANES]]; SIZE];
+pub(super) type WindowRows<'a, R> = [&'a [[R; LANES]]; SIZE];
 
 #[inline(always)]
-fn value<const PRODUCT: bool>(first: f64, second: f64) -> f64 {
+fn value<R: Real, const PRODUCT: bool>(first: R, second: R) -> R {
     if PRODUCT { first * second } else { first }
 }
 
 impl Statistics {
     /// Computes the statistics of an image in the working space.
-    pub(super) fn prepare(&self, working: Planes<4>) -> Prepared {
+    pub(super) fn prepare(&self, working: Planes<f64, 4>) -> Prepared {
         let mut moments = Moments::new(working.width() - 2 * RADIUS, working.height() - 2 * RADIUS);
         moments.fill_rows(
             || column_sums(working.stride()),
@@ -149,7 +154,7 @@ impl Statistics {
     pub(super) fn compare<T: Send>(
         &self,
         reference: &Prepared,
-        image: &Planes<4>,
+        image: &Planes<f64, 4>,
         measure: impl Fn(usize, &RowStatistics<'_>) -> T + Sync + Send,
     ) -> Vec<T> {
         use rayon::prelude::*;
@@ -173,39 +178,48 @@ impl Statistics {
     }
 
     #[inline(always)]
-    fn moments_row(&self, working: &Planes<4>, y: usize, column_sums: &mut [f64], moments: [&mut [f64]; 4]) {
+    fn moments_row(&self, working: &Planes<f64, 4>, y: usize, column_sums: &mut [f64], moments: [&mut [f64]; 4]) {
         let lightness = &window_rows(working, LIGHTNESS, y);
         let chroma = &window_rows(working, CHROMA, y);
         let [mean_l, variance_l, mean_c, variance_c] = moments;
-        self.window.mean_row::<false>(lightness, lightness, column_sums, mean_l);
-        self.window.mean_row::<true>(lightness, lightness, column_sums, variance_l);
-        self.window.mean_row::<false>(chroma, chroma, column_sums, mean_c);
+        let span = &(0..mean_l.len());
+        self.window.mean_row::<false>(lightness, lightness, span, column_sums, mean_l);
+        self.window.mean_row::<true>(lightness, lightness, span, column_sums, variance_l);
+        self.window.mean_row::<false>(chroma, chroma, span, column_sums, mean_c);
         centre_squares(mean_l, variance_l);
         if self.chroma {
-            self.window.mean_row::<true>(chroma, chroma, column_sums, variance_c);
+            self.window.mean_row::<true>(chroma, chroma, span, column_sums, variance_c);
             centre_squares(mean_c, variance_c);
         }
     }
 
     #[inline(always)]
-    fn joint_row(&self, reference: &Prepared, image: &Planes<4>, hue: &Planes<1>, y: usize, buffers: &mut Buffers) {
+    fn joint_row(
+        &self,
+        reference: &Prepared,
+        image: &Planes<f64, 4>,
+        hue: &Planes<f64, 1>,
+        y: usize,
+        buffers: &mut Buffers,
+    ) {
         let Buffers { column_sums, moments, covariance_lightness, hue_difference, covariance_chroma } = buffers;
         let hue = &window_rows(hue, 0, y);
-        self.window.mean_row::<false>(hue, hue, column_sums, hue_difference);
+        let span = &(0..hue_difference.len());
+        self.window.mean_row::<false>(hue, hue, span, column_sums, hue_difference);
         let first = window_rows(&reference.working, LIGHTNESS, y);
         let second = window_rows(image, LIGHTNESS, y);
-        self.window.mean_row::<true>(&first, &second, column_sums, covariance_lightness);
+        self.window.mean_row::<true>(&first, &second, span, column_sums, covariance_lightness);
         centre_products(reference.moments.row_of(MEAN_LIGHTNESS, y), &moments[MEAN_LIGHTNESS], covariance_lightness);
         if self.chroma {
             let first = window_rows(&reference.working, CHROMA, y);
             let second = window_rows(image, CHROMA, y);
-            self.window.mean_row::<true>(&first, &second, column_sums, covariance_chroma);
+            self.window.mean_row::<true>(&first, &second, span, column_sums, covariance_chroma);
             centre_products(reference.moments.row_of(MEAN_CHROMA, y), &moments[MEAN_CHROMA], covariance_chroma);
         }
     }
 
     /// Per pixel, sqrt(da^2 + db^2 - dC^2). A radicand that rounding makes negative counts as 0.
-    fn hue_differences(&self, reference: &Planes<4>, image: &Planes<4>) -> Planes<1> {
+    fn hue_differences(&self, reference: &Planes<f64, 4>, image: &Planes<f64, 4>) -> Planes<f64, 1> {
         let mut differences = Planes::new(image.width(), image.height());
         differences.fill_rows(
             || (),
@@ -222,22 +236,22 @@ impl Statistics {
 }
 
 #[inline(always)]
-fn hue_difference_row(first: [&[f64]; 4], second: [&[f64]; 4], out: &mut [f64]) {
+pub(super) fn hue_difference_row<R: Real>(first: [&[R]; 4], second: [&[R]; 4], out: &mut [R]) {
     let n = out.len();
     let (a1, b1, c1) = (&first[A][..n], &first[B][..n], &first[CHROMA][..n]);
     let (a2, b2, c2) = (&second[A][..n], &second[B][..n], &second[CHROMA][..n]);
     for i in 0..n {
         let (da, db, dc) = (a1[i] - a2[i], b1[i] - b2[i], c1[i] - c2[i]);
-        out[i] = (da * da + db * db - dc * dc).max(0.0).sqrt();
+        out[i] = (da * da + db * db - dc * dc).max(R::ZERO).sqrt();
     }
 }
 
 /// Turns means of squares into variances.
 #[inline(always)]
-fn centre_squares(means: &[f64], squares: &mut [f64]) {
+pub(super) fn centre_squares<R: Real>(means: &[R], squares: &mut [R]) {
     let means = &means[..squares.len()];
     for i in 0..means.len() {
-        squares[i] = (squares[i] - means[i] * means[i]).max(0.0);
+        squares[i] = (squares[i] - means[i] * means[i]).max(R::ZERO);
     }
 }
 
@@ -251,13 +265,13 @@ fn centre_products(first: &[f64], second: &[f64], products: &mut [f64]) {
     }
 }
 
-fn window_rows<const N: usize>(planes: &Planes<N>, plane: usize, y: usize) -> WindowRows<'_> {
+pub(super) fn window_rows<R: Real, const N: usize>(planes: &Planes<R, N>, plane: usize, y: usize) -> WindowRows<'_, R> {
     std::array::from_fn(|k| planes.row_of(plane, y + k).as_chunks().0)
 }
 
 /// A buffer for the vertical sums over a row of pixels, with room for the values that the last chunk of windows reads.
-fn column_sums(stride: usize) -> Vec<f64> {
-    vec![0.0; stride + 2 * RADIUS]
+pub(super) fn column_sums<R: Real>(stride: usize) -> Vec<R> {
+    vec![R::ZERO; stride + 2 * RADIUS]
 }
 
 /// The row buffers that a task reuses.

@@ -50,14 +50,17 @@ fn the_judge_agrees_with_the_plain_path_through_encoded_images() {
 }
 
 #[test]
-fn the_score_of_the_bounding_box_equals_that_of_the_whole_image_bit_for_bit() {
+fn the_score_of_the_spans_equals_that_of_the_whole_image_bit_for_bit() {
     for corner in [(3, 0), (41, 30), (88, 68)] {
         let (reference, coverage) = framed(&plastic(0.2), 160, 140, corner);
         let (image, _) = framed(&plastic(0.25), 160, 140, corner);
         let options = JudgeOptions::default();
         let boxed = Judge::new(&reference, &coverage, 1.0, &options).unwrap();
-        let whole = |_: &[f32], width, height, _| Some(Region::whole(width, height));
-        let whole = Judge::over(&reference, &coverage, 1.0, &options, whole).unwrap();
+        let whole = |_: &[f32], width, height, _| {
+            let region = Region::whole(width, height);
+            Some((region, Spans::whole(&region)))
+        };
+        let whole = Judge::<f64>::over(&reference, &coverage, 1.0, &options, whole).unwrap();
         assert!(boxed.region.width < whole.region.width && boxed.region.height < whole.region.height);
         assert_eq!(boxed.score(&image).unwrap(), whole.score(&image).unwrap(), "{corner:?}");
         assert_eq!(boxed.maps(&image).unwrap(), whole.maps(&image).unwrap(), "{corner:?}");
@@ -77,12 +80,31 @@ fn vector_instructions_and_threads_change_no_bit() {
 }
 
 #[test]
+fn single_precision_is_exact_enough_for_a_search() {
+    let (reference, coverage) = framed(&plastic(0.2), 120, 100, (20, 10));
+    let double = judge(&reference, &coverage, Lanes::Detected);
+    let [single, plain] = [Lanes::Detected, Lanes::Plain].map(|lanes| {
+        Judge::single(&reference, &coverage, 1.3, &JudgeOptions { lanes, ..JudgeOptions::default() }).unwrap()
+    });
+    for alpha in [0.05, 0.19, 0.199, 0.201, 0.3] {
+        let (image, _) = framed(&plastic(alpha), 120, 100, (20, 10));
+        let [exact, found] = [double.score(&image).unwrap(), single.score(&image).unwrap()];
+        // A buffer that another image has used changes no bit.
+        assert_eq!((plain.score(&image).unwrap(), single.score(&image).unwrap()), (found, found));
+        let scores = [(exact.cssim, found.cssim), (exact.cssim_object, found.cssim_object)];
+        assert!(scores.iter().all(|(e, f)| (e - f).abs() < 2e-6), "{alpha}: {exact:?} {found:?}");
+    }
+}
+
+#[test]
 fn the_reference_itself_scores_exactly_zero() {
     let (reference, coverage) = framed(&plastic(0.1), 100, 83, (11, 6));
     let judge = judge(&reference, &coverage, Lanes::Detected);
     let score = judge.score(&reference).unwrap();
     assert_eq!((score.cssim.to_bits(), score.cssim_object.to_bits()), (0, 0));
     assert_eq!((score.features, score.features_object), ([1.0; 5], [1.0; 5]));
+    let single = Judge::single(&reference, &coverage, 1.3, &JudgeOptions::default()).unwrap();
+    assert_eq!(single.score(&reference).unwrap(), score);
     assert!(judge.error_map(&reference).unwrap().error.iter().all(|&e| e == 0.0));
 }
 

@@ -18,7 +18,7 @@ const LAST: [(usize, f64); 4] =
 /// Twelve digits are published; the taps are below 1.
 const TOLERANCE: f64 = 1e-12;
 
-fn kernels(filter: &Scielab) -> [Vec<f64>; 7] {
+fn kernels(filter: &Scielab<f64>) -> [Vec<f64>; 7] {
     let wide = |g: usize| filter.achromatic.wide.iter().map(|w| w[g]).collect::<Vec<_>>();
     [
         filter.achromatic.narrow.clone(),
@@ -66,10 +66,12 @@ fn a_point_becomes_the_outer_products_of_the_kernels() {
     let filter = Scielab::new(40.0);
     let (width, height) = (61, 47);
     let region = Region::whole(width, height);
+    let spans = Spans::whole(&region);
     let mut opponent = Planes::new(width, height);
     opponent.fill_rows(|| (), |(), y, mut rows| rows.iter_mut().for_each(|row| row[20] = f64::from(u8::from(y == 25))));
-    let mut filtered = Planes::<3>::new(width, height);
-    filtered.fill_rows(|| filter.scratch(&region), |scratch, y, out| filter.filter_row(&opponent, y, scratch, out));
+    let mut filtered = Planes::<f64, 3>::new(width, height);
+    filtered
+        .fill_rows(|| filter.scratch(&region), |scratch, y, out| filter.filter_row(&opponent, y, &spans, scratch, out));
     let kernels = kernels(&filter);
     let tap = |k: usize, d: usize| kernels[k].get(d).copied().unwrap_or(0.0);
     for (x, y) in [(20, 25), (22, 24), (1, 25), (39, 44), (40, 25), (25, 5), (30, 46)] {
