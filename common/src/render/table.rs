@@ -6,7 +6,7 @@
 use super::knots::Knots;
 use crate::{
     brdf::{Model, lobe_terms, term_count},
-    math::Rgb,
+    math::{Rgb, simd},
 };
 
 /// Basis integrals of one lobe.
@@ -47,11 +47,7 @@ impl TransportTable {
     #[must_use]
     pub fn concatenate(shards: &[&Self]) -> Option<Self> {
         let first = shards.first()?;
-        let same = |s: &&Self| {
-            s.lobes.len() == first.lobes.len()
-                && s.lobes.iter().zip(&first.lobes).all(|(a, b)| a.knots == b.knots && a.terms == b.terms)
-        };
-        if !shards.iter().all(same) {
+        if !shards.iter().all(|shard| shard.has_the_grids_of(first)) {
             return None;
         }
         let pixels = shards.iter().map(|s| s.pixels).sum();
@@ -66,6 +62,13 @@ impl TransportTable {
             LobeTable { knots: lobe.knots, terms: lobe.terms, values }
         });
         Some(Self { pixels, lobes: lobes.collect() })
+    }
+
+    /// Whether both have the same lobes with the same widths, as the shards of one table do.
+    #[must_use]
+    pub fn has_the_grids_of(&self, other: &Self) -> bool {
+        let same = |(a, b): (&LobeTable, &LobeTable)| a.knots == b.knots && a.terms == b.terms;
+        self.lobes.len() == other.lobes.len() && self.lobes.iter().zip(&other.lobes).all(same)
     }
 
     /// Planes of zeros, one value per pixel.
@@ -84,19 +87,24 @@ impl TransportTable {
     pub fn radiance(&self, model: &dyn Model, parameters: &[f64], out: &mut Planes) {
         let mut weights = vec![Rgb::ZERO; term_count(model)];
         model.weights(parameters, &mut weights);
-        out.iter_mut().for_each(|plane| plane.fill(0.0));
-        let mut first_term = 0;
+        let (mut layers, mut first_term) = (Vec::new(), 0);
         for (basis, table) in model.lobes().iter().zip(&self.lobes) {
             let (first, coefficients) = slice_weights(table, basis.width_at(parameters));
-            for (channel, plane) in out.iter_mut().enumerate() {
-                for (k, coefficient) in coefficients.iter().enumerate() {
-                    for t in 0..table.terms {
-                        let scale = coefficient * weights[first_term + t][channel];
-                        self.add_scaled(table, first + k, t, channel, scale, plane);
-                    }
+            for (k, &coefficient) in coefficients.iter().enumerate() {
+                for t in 0..table.terms {
+                    let start = ((first + k) * table.terms + t) * 3 * self.pixels;
+                    layers.push((&table.values[start..][..3 * self.pixels], weights[first_term + t] * coefficient));
                 }
             }
             first_term += lobe_terms(basis.lobe);
+        }
+        for (channel, plane) in out.iter_mut().enumerate() {
+            for (block, sums) in plane.chunks_mut(BLOCK).enumerate() {
+                sums.fill(0.0);
+                for &(layer, weight) in &layers {
+                    add_scaled(&layer[channel * self.pixels + block * BLOCK..][..sums.len()], weight[channel], sums);
+                }
+            }
         }
     }
 
@@ -111,22 +119,33 @@ impl TransportTable {
                 for (channel, plane) in out[first_term + t].iter_mut().enumerate() {
                     plane.fill(0.0);
                     for (k, &coefficient) in coefficients.iter().enumerate() {
-                        self.add_scaled(table, first + k, t, channel, coefficient, plane);
+                        let start = (((first + k) * table.terms + t) * 3 + channel) * self.pixels;
+                        add_scaled(&table.values[start..][..self.pixels], coefficient, plane);
                     }
                 }
             }
             first_term += lobe_terms(basis.lobe);
         }
     }
+}
 
-    fn add_scaled(&self, table: &LobeTable, slice: usize, term: usize, channel: usize, scale: f64, plane: &mut [f64]) {
-        if scale == 0.0 {
-            return;
-        }
-        let start = ((slice * table.terms + term) * 3 + channel) * self.pixels;
-        let values = &table.values[start..][..self.pixels];
-        plane.iter_mut().zip(values).for_each(|(sum, &value)| *sum += scale * f64::from(value));
+/// Pixels whose sums stay in the first-level cache while all layers are added.
+const BLOCK: usize = 1024;
+
+fn add_scaled(values: &[f32], scale: f64, sums: &mut [f64]) {
+    if scale == 0.0 {
+        return;
     }
+    simd::dispatch(
+        #[inline(always)]
+        || {
+            let n = sums.len().min(values.len());
+            let (sums, values) = (&mut sums[..n], &values[..n]);
+            for i in 0..n {
+                sums[i] += scale * f64::from(values[i]);
+            }
+        },
+    );
 }
 
 fn slice_weights(table: &LobeTable, width: Option<f64>) -> (usize, Vec<f64>) {
