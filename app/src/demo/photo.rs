@@ -26,7 +26,7 @@ use rayon::prelude::*;
 use std::f64::consts::TAU;
 
 /// Largest error of a node of the light, in units of the mean radiance, for a lobe of albedo 1.
-const TOLERANCE: f64 = 3e-3;
+const TOLERANCE: f64 = 1e-2;
 /// Camera noise: photon noise at mean radiance, and read noise, as shares of the mean radiance.
 const PHOTON_NOISE: f64 = 0.004;
 const READ_NOISE: f64 = 0.001;
