@@ -12,7 +12,7 @@ use std::{hint::black_box, ops::ControlFlow, sync::Arc, time::Instant};
 use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_main};
 use lookalike::{
     brdf::{Ggx, LinearModel, Material, Tail},
-    fit::{Candidate, FullView, JudgedBy, Method, Objective, polish, search_gamma},
+    fit::{Candidate, FullView, JudgedBy, Judges, Method, Objective, ScannedTable, polish, search_gamma},
     image::Image,
     light::{Environment, LightDistribution},
     math::{Rgb, Vec3, luminance, narrow, to_f32},
@@ -120,8 +120,9 @@ impl Study {
 
     fn stage_one(&self, table: &TransportTable) -> Vec<Candidate> {
         let method = Method::default();
+        let scanned = ScannedTable::new(&method, table.clone(), &self.subset, &self.photo);
         let search =
-            |gamma: &f64| search_gamma(&method, *gamma, table, &self.subset, &self.photo, self.mean_radiance, None);
+            |gamma: &f64| search_gamma(&method, *gamma, &scanned, &self.subset, &self.photo, self.mean_radiance, None);
         method.gammas.par_iter().map(|gamma| search(gamma).expect("the searches succeed")).collect()
     }
 }
@@ -171,7 +172,7 @@ fn full_image(criterion: &mut Criterion, study: &Study) {
     pixels.sort_by_key(|&pixel| tile_order(pixel));
     let plan = TransportPlan { model: &Ggx, knots: Knots::covering(0.07, 0.14, 5.0), accuracy: Accuracy::FULL };
     let integrate = || plan.integrate(&study.geometry, &study.pyramid, &pixels);
-    let table = integrate();
+    let table = [Arc::new(integrate())];
     let view = FullView {
         model: &Ggx,
         table: &table,
@@ -184,6 +185,8 @@ fn full_image(criterion: &mut Criterion, study: &Study) {
     let photo = view.render(&TRUTH);
     let options = JudgeOptions::default();
     let judge = Judge::new(&photo, &coverage, 1.0, &options).expect("the picture shows the object");
+    let searching = Judge::single(&photo, &coverage, 1.0, &options).expect("the picture shows the object");
+    let judges = Judges { searching: &searching, reporting: &judge, by: JudgedBy::Image };
     let mut start = TRUTH;
     start[..3].fill(0.3);
     start[6] = 0.08;
@@ -192,7 +195,7 @@ fn full_image(criterion: &mut Criterion, study: &Study) {
     group.bench_function("table of 256 x 256 pixels", |b| b.iter(integrate));
     group.bench_function("polish, at most 100 evaluations", |b| {
         let starts = [start.to_vec()];
-        b.iter(|| polish(&view, &judge, JudgedBy::Image, &starts, 100, &mut |_| ControlFlow::Continue(())));
+        b.iter(|| polish(&view, judges, &starts, 100, &mut |_| ControlFlow::Continue(())));
     });
     group.finish();
 }

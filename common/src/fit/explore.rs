@@ -3,15 +3,13 @@
 //! very different lobes; polish at full resolution starts from the best result.
 
 use super::{
-    method::JudgedBy,
-    polish::{Polished, polish},
+    polish::{Judges, Polished, polish},
     stage_one::paper_start,
     stage_two::FullView,
 };
 use crate::{
     brdf::{Model, flat_bounds},
     math::elementary::{exp, ln},
-    metric::Judge,
     search::{Progress, SearchError, Termination},
 };
 use std::ops::ControlFlow;
@@ -65,16 +63,15 @@ pub(crate) fn most_evaluations(starts: usize, max_evaluations: usize) -> usize {
 /// When no start can be rendered and scored.
 pub(crate) fn explore(
     view: &FullView<'_>,
-    judge: &Judge,
-    by: JudgedBy,
+    judges: Judges<'_>,
     starts: &[Vec<f64>],
     max_evaluations: usize,
     observe: &mut dyn FnMut(&Progress<'_>) -> ControlFlow<()>,
 ) -> Result<Polished, SearchError> {
-    let score = |p: &Polished| by.pick(p.cssim, p.cssim_object);
+    let score = |p: &Polished| judges.by.pick(p.cssim, p.cssim_object);
     let (mut best, mut failure, mut evaluations) = (None::<Polished>, SearchError::NoParameters, 0);
     for start in starts {
-        match polish(view, judge, by, std::slice::from_ref(start), max_evaluations.min(TRIAL), observe) {
+        match polish(view, judges, std::slice::from_ref(start), max_evaluations.min(TRIAL), observe) {
             Ok(found) => {
                 evaluations += found.evaluations;
                 if best.as_ref().is_none_or(|best| score(&found) < score(best)) {
@@ -88,13 +85,18 @@ pub(crate) fn explore(
     if best.termination != Termination::MaxEvaluations {
         return Ok(Polished { evaluations, ..best });
     }
-    let found = polish(view, judge, by, &[best.parameters], max_evaluations, observe)?;
+    let found = polish(view, judges, &[best.parameters], max_evaluations, observe)?;
     Ok(Polished { evaluations: evaluations + found.evaluations, ..found })
 }
 
 /// The span of widths whose lobes differ visibly on a coarse picture; `None` for a model without widths.
 pub(crate) fn explored_span(model: &dyn Model) -> Option<(f64, f64)> {
-    let widths: Vec<f64> = grid(model)?.into_iter().filter(|(_, alpha)| *alpha >= SHARPEST).map(|(w, _)| w).collect();
+    span_of_lobes(model, SHARPEST)
+}
+
+/// The span of widths whose lobes are at least as wide as that of GGX with this alpha; `None` for a model without widths.
+pub(crate) fn span_of_lobes(model: &dyn Model, sharpest: f64) -> Option<(f64, f64)> {
+    let widths: Vec<f64> = grid(model)?.into_iter().filter(|(_, alpha)| *alpha >= sharpest).map(|(w, _)| w).collect();
     let (low, high) = (widths.iter().copied().reduce(f64::min)?, widths.iter().copied().reduce(f64::max)?);
     (low < high).then_some((low, high))
 }

@@ -31,8 +31,8 @@ pub use method::{
     UnknownIntegration, gamma_range,
 };
 pub use objective::Objective;
-pub use polish::{MAX_EVALUATIONS, Polished, polish};
-pub use stage_one::{SearchFailure, search_gamma};
+pub use polish::{Judges, MAX_EVALUATIONS, Polished, polish};
+pub use stage_one::{ScannedTable, SearchFailure, search_gamma};
 pub use stage_two::{FullView, Judged, judge_candidates, winner};
 pub use uncertainty::{LARGEST_SHARE, Uncertainty};
 

@@ -7,12 +7,12 @@
 use super::{
     method::{JudgedBy, SearchKind},
     objective::flat_roles,
-    stage_one::search_bounds,
+    stage_one::{search_bounds, within_table},
     stage_two::FullView,
 };
 use crate::{
     brdf::Role,
-    metric::Judge,
+    metric::{Judge, Score},
     search::{
         Bounds, Progress, Scale, SearchError, Termination,
         quasi_newton::{self, QuasiNewtonOptions},
@@ -40,6 +40,17 @@ pub struct Polished {
     pub at_table_edge: bool,
 }
 
+/// The judges of a search: evaluations in single precision, results in double precision.
+#[derive(Debug, Clone, Copy)]
+pub struct Judges<'a> {
+    /// Of the search.
+    pub searching: &'a Judge<f32>,
+    /// Of its result.
+    pub reporting: &'a Judge,
+    /// The score that counts.
+    pub by: JudgedBy,
+}
+
 /// Polishes the best of `starts`. `observe` is called at every iteration and may end the search.
 ///
 /// Scores on different tables cannot be compared. To continue on another table, pass all results so far as starts: the outcome scores
@@ -49,30 +60,41 @@ pub struct Polished {
 /// If there is no start, or no start can be rendered and scored.
 pub fn polish(
     view: &FullView<'_>,
-    judge: &Judge,
-    by: JudgedBy,
+    judges: Judges<'_>,
     starts: &[Vec<f64>],
     max_evaluations: usize,
     observe: &mut dyn FnMut(&Progress<'_>) -> ControlFlow<()>,
 ) -> Result<Polished, SearchError> {
     let (bounds, table_is_tighter) = polish_bounds(view)?;
+    let picked = |score: &Score| judges.by.pick(score.cssim, score.cssim_object);
     let objective = |point: &[f64]| {
         // A point whose rendering cannot be scored is rejected.
-        judge.score(&view.render(point)).map_or(f64::NAN, |s| by.pick(s.cssim, s.cssim_object))
+        judges.searching.score(&view.render(point)).map_or(f64::NAN, |score| picked(&score))
     };
-    let (start, compared) = best_start(starts, &bounds, objective)?;
+    let report = |point: &[f64]| {
+        let score = judges.reporting.score(&view.render(point));
+        score.map_err(|_| SearchError::NotFinite { what: "the CSSIM", point: point.to_vec() })
+    };
+    let (start, compared) =
+        best_start(starts, &bounds, |start| report(start).map_or(f64::NAN, |score| picked(&score)))?;
     let max_evaluations = max_evaluations.saturating_sub(compared).max(1);
     let options = QuasiNewtonOptions { max_evaluations, ..QuasiNewtonOptions::default() };
     let minimum = quasi_newton::minimise(objective, &start, &bounds, &options, observe)?;
-    let score = judge
-        .score(&view.render(&minimum.point))
-        .map_err(|_| SearchError::NotFinite { what: "the CSSIM", point: minimum.point.clone() })?;
+    let mut score = report(&minimum.point)?;
+    let mut point = minimum.point;
+    if point != start {
+        // Single precision may rank start and result wrongly; double precision decides.
+        let of_start = report(&start)?;
+        if picked(&of_start) < picked(&score) {
+            (point, score) = (start, of_start);
+        }
+    }
     let at_table_edge = view.model.lobes().iter().find_map(|b| b.width).is_some_and(|width| {
-        let (x, step) = (bounds.to_scaled(width.entry, minimum.point[width.entry]), EDGE);
+        let (x, step) = (bounds.to_scaled(width.entry, point[width.entry]), EDGE);
         (table_is_tighter[0] && x < step) || (table_is_tighter[1] && x > 1.0 - step)
     });
     Ok(Polished {
-        parameters: minimum.point,
+        parameters: point,
         cssim: score.cssim,
         cssim_object: score.cssim_object,
         evaluations: compared + minimum.evaluations,
@@ -108,20 +130,7 @@ const EDGE: f64 = 0.02;
 /// and upper bound.
 fn polish_bounds(view: &FullView<'_>) -> Result<(Bounds, [bool; 2]), SearchError> {
     let model_bounds = search_bounds(view.model, SearchKind::LeastSquares)?;
-    let (mut lower, mut upper) = (model_bounds.lower().to_vec(), model_bounds.upper().to_vec());
-    let mut tighter = [false, false];
-    let main = view.model.lobes().iter().find_map(|b| b.width);
-    if let (Some(width), Some(span)) = (main, view.table.span()) {
-        let (entry, (first, last)) = (width.entry, width.entries(span));
-        tighter = [first > lower[entry] * (1.0 + 1e-9), last < upper[entry] * (1.0 - 1e-9)];
-        // If the table reaches the model's bound, its outermost knot may differ from the bound by rounding; then the bound is used.
-        if tighter[0] {
-            lower[entry] = first;
-        }
-        if tighter[1] {
-            upper[entry] = last;
-        }
-    }
+    let (bounds, tighter) = within_table(view.model, &model_bounds, view.span())?;
     // Small steps of a reflectance are visible where the reflectance is small.
     let is_width = |entry| view.model.lobes().iter().any(|b| b.width.is_some_and(|width| width.entry == entry));
     let scale = |(entry, role)| match role {
@@ -130,5 +139,5 @@ fn polish_bounds(view: &FullView<'_>) -> Result<(Bounds, [bool; 2]), SearchError
         _ => Scale::OffsetLogarithmic,
     };
     let scales: Vec<Scale> = flat_roles(view.model).into_iter().enumerate().map(scale).collect();
-    Ok((Bounds::new(lower, upper, scales)?, tighter))
+    Ok((Bounds::new(bounds.lower().to_vec(), bounds.upper().to_vec(), scales)?, tighter))
 }

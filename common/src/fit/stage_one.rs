@@ -40,6 +40,26 @@ pub enum SearchFailure {
     },
 }
 
+/// The table of a pixel subset with the starts of a search on it, which are the same for every gamma.
+#[derive(Debug, Clone)]
+pub struct ScannedTable {
+    /// The table.
+    pub table: TransportTable,
+    starts: Vec<Vec<f64>>,
+}
+
+impl ScannedTable {
+    /// Finds the starts. `photo` holds the subset's pixels.
+    #[must_use]
+    pub fn new(method: &Method, table: TransportTable, subset: &PixelSubset, photo: &[[f32; 3]]) -> Self {
+        let starts = match method.start {
+            Start::Paper => vec![paper_start(method.model)],
+            Start::Scan => scan(method.model, &table, &subset.weights, photo),
+        };
+        Self { table, starts }
+    }
+}
+
 /// Minimises `C(A, B, gamma)` over the parameters. `photo` holds the subset's pixels. `mean_radiance` is the photo's mean luminance over
 /// all usable pixels; it sets the knee of the compression, the same for every gamma and subset. With `direct`, the cost is that of
 /// direct renderings, and the table is used for the starts only.
@@ -49,7 +69,7 @@ pub enum SearchFailure {
 pub fn search_gamma(
     method: &Method,
     gamma: f64,
-    table: &TransportTable,
+    scanned: &ScannedTable,
     subset: &PixelSubset,
     photo: &[[f32; 3]],
     mean_radiance: f64,
@@ -57,19 +77,16 @@ pub fn search_gamma(
 ) -> Result<Candidate, SearchFailure> {
     let fail = |source| SearchFailure::Search { gamma, source };
     let bounds = search_bounds(method.model, method.search).map_err(fail)?;
+    let ScannedTable { table, starts } = scanned;
+    let (bounds, _) = within_table(method.model, &bounds, table.span()).map_err(fail)?;
     let mut objective = objective_of(method, gamma, table, subset, photo, mean_radiance);
     if let Some(direct) = direct {
         objective = objective.rendered_by(direct);
     }
-    let starts = match method.start {
-        Start::Paper => vec![paper_start(method.model)],
-        Start::Scan => scan(method.model, table, &subset.weights, photo),
-    };
-    let scanned = starts.len();
     let starts: Vec<multi_start::Start> =
-        starts.into_iter().map(|point| multi_start::Start { cost: objective.cost(&point), point }).collect();
+        starts.iter().map(|point| multi_start::Start { cost: objective.cost(point), point: point.clone() }).collect();
     let options = MultiStartOptions::default();
-    let mut evaluations = scanned;
+    let mut evaluations = starts.len();
     let best = match method.search {
         SearchKind::LeastSquares => multi_start::refine_best(&starts, &bounds, &options, |start| {
             let m = least_squares::minimise(&mut objective, &start.point, &bounds, &LeastSquaresOptions::default())?;
@@ -141,6 +158,28 @@ impl Refined for Found {
 /// The paper's single start.
 pub(super) fn paper_start(model: &dyn Model) -> Vec<f64> {
     model.parameters().iter().flat_map(|p| std::iter::repeat_n(p.start, p.channels.count())).collect()
+}
+
+/// Bounds with the main lobe's width restricted to the span of a table, and whether the span is tighter than the lower and the upper bound.
+/// If the table reaches a bound, its outermost knot may differ from the bound by rounding; then the bound is used.
+pub(super) fn within_table(
+    model: &dyn Model,
+    bounds: &Bounds,
+    span: Option<(f64, f64)>,
+) -> Result<(Bounds, [bool; 2]), SearchError> {
+    let (mut lower, mut upper) = (bounds.lower().to_vec(), bounds.upper().to_vec());
+    let mut tighter = [false, false];
+    if let Some((width, span)) = model.lobes().iter().find_map(|basis| basis.width).zip(span) {
+        let (entry, (first, last)) = (width.entry, width.entries(span));
+        tighter = [first > lower[entry] * (1.0 + 1e-9), last < upper[entry] * (1.0 - 1e-9)];
+        if tighter[0] {
+            lower[entry] = first;
+        }
+        if tighter[1] {
+            upper[entry] = last;
+        }
+    }
+    Ok((Bounds::new(lower, upper, bounds.scales().to_vec())?, tighter))
 }
 
 /// The bounds of a model's parameters and the scale in which a search steps. Least squares steps in the logarithm of a width, because the

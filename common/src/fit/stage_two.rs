@@ -15,14 +15,15 @@ use crate::{
     },
 };
 use rayon::prelude::*;
+use std::sync::Arc;
 
 /// Renders full images from parameters.
 #[derive(Debug)]
 pub struct FullView<'a> {
     /// The model.
     pub model: &'static dyn Model,
-    /// Full-resolution table of `pixels`.
-    pub table: &'a TransportTable,
+    /// Shards of the full-resolution table of `pixels`, in order.
+    pub table: &'a [Arc<TransportTable>],
     /// The pixels that see the object.
     pub pixels: &'a [Pixel],
     /// The share of each pixel of the image that the object covers, `height x width`.
@@ -40,16 +41,28 @@ impl FullView<'_> {
     /// times its coverage.
     #[must_use]
     pub fn render(&self, parameters: &[f64]) -> Image {
-        let mut planes: Planes = self.table.planes();
-        self.table.radiance(self.model, parameters, &mut planes);
+        let radiance = |shard: &Arc<TransportTable>| {
+            let mut planes: Planes = shard.planes();
+            shard.radiance(self.model, parameters, &mut planes);
+            planes
+        };
+        let shards: Vec<Planes> = self.table.par_iter().map(radiance).collect();
         let mut image = Image::new(self.width, self.height);
         let out = image.pixels_mut();
-        for (i, &[column, row]) in self.pixels.iter().enumerate() {
-            let place = (row / self.stride) as usize * self.width + (column / self.stride) as usize;
-            let coverage = f64::from(self.coverage[place]);
-            out[place] = std::array::from_fn(|c| to_f32(planes[c][i] * coverage));
+        let mut pixels = self.pixels.iter();
+        for [red, green, blue] in &shards {
+            for (((r, g), b), &[column, row]) in red.iter().zip(green).zip(blue).zip(&mut pixels) {
+                let place = (row / self.stride) as usize * self.width + (column / self.stride) as usize;
+                let coverage = f64::from(self.coverage[place]);
+                out[place] = [r, g, b].map(|x| to_f32(x * coverage));
+            }
         }
         image
+    }
+
+    /// Smallest and largest width of the table.
+    pub(crate) fn span(&self) -> Option<(f64, f64)> {
+        self.table.first()?.span()
     }
 }
 

@@ -4,7 +4,7 @@ use std::any::Any;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
-use super::{Blob, DecodedCache, NodeFailure};
+use super::{Blob, BlobHash, DecodedCache, NodeFailure};
 
 /// The context of one execution of one node. Nothing in it may change the output.
 #[derive(Clone, Debug)]
@@ -62,5 +62,19 @@ impl RunContext {
         decode: impl FnOnce(&[u8]) -> Result<T, NodeFailure>,
     ) -> Result<Arc<T>, NodeFailure> {
         self.decoded.get_or_decode(input, decode)
+    }
+
+    /// A value that follows from inputs alone, shared with the other nodes of this process that make a `T` from the same ones. `key` is a hash
+    /// of all that it depends on, `bytes` about its size in memory. Nodes that start together may each make it.
+    ///
+    /// # Errors
+    /// Those of `make`.
+    pub fn derived<T: Any + Send + Sync>(
+        &self,
+        key: BlobHash,
+        bytes: usize,
+        make: impl FnOnce() -> Result<T, NodeFailure>,
+    ) -> Result<Arc<T>, NodeFailure> {
+        self.decoded.get_or_make(key, bytes, make)
     }
 }

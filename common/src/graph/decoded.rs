@@ -45,16 +45,30 @@ impl DecodedCache {
         blob: &Blob,
         decode: impl FnOnce(&[u8]) -> Result<T, E>,
     ) -> Result<Arc<T>, E> {
-        let key = (blob.hash(), TypeId::of::<T>());
+        self.get_or_make(blob.hash(), blob.len(), || decode(blob))
+    }
+
+    /// The value of a key: from the cache, otherwise from `make`, and then cached as `bytes` bytes. As [`DecodedCache::get_or_decode`] in
+    /// everything else.
+    ///
+    /// # Errors
+    /// Those of `make`; an error is not cached.
+    pub fn get_or_make<T: Any + Send + Sync, E>(
+        &self,
+        key: BlobHash,
+        bytes: usize,
+        make: impl FnOnce() -> Result<T, E>,
+    ) -> Result<Arc<T>, E> {
+        let key = (key, TypeId::of::<T>());
         if let Some(kept) = self.lock().find(key) {
             return Ok(kept);
         }
-        let fresh = Arc::new(decode(blob)?);
+        let fresh = Arc::new(make()?);
         let mut entries = self.lock();
         if let Some(kept) = entries.find(key) {
             return Ok(kept);
         }
-        entries.insert(key, Arc::clone(&fresh) as _, blob.len());
+        entries.insert(key, Arc::clone(&fresh) as _, bytes);
         entries.shrink_to(self.bound_bytes);
         Ok(fresh)
     }

@@ -33,7 +33,8 @@ impl NodeType for Explore {
             if context.is_cancelled() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         };
         let (view, limit) = (scene.full(), max_evaluations as usize);
-        let found = explore(&view, &scene.view.judge, scene.view.by, &starts, limit, &mut observe)
+        let searching = scene.view.searching()?;
+        let found = explore(&view, scene.view.judges(&searching), &starts, limit, &mut observe)
             .map_err(|error| NodeFailure::new(format!("explore: {error}")))?;
         // A cancelled search has no result.
         context.check()?;

@@ -32,8 +32,9 @@ impl NodeType for Polish {
             context.report(progress.evaluations as u64, u64::from(max_evaluations));
             if context.is_cancelled() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         };
+        let searching = scene.view.searching()?;
         let (view, limit) = (scene.full(), max_evaluations as usize);
-        let polished = polish(&view, &scene.view.judge, scene.view.by, &starts, limit, &mut observe)
+        let polished = polish(&view, scene.view.judges(&searching), &starts, limit, &mut observe)
             .map_err(|error| NodeFailure::new(format!("polish: {error}")))?;
         // A cancelled search has no result.
         context.check()?;

@@ -6,8 +6,8 @@
 use super::view::concatenated;
 use crate::{
     brdf::{self, Model},
-    fit::{Compress, DirectPixels, Method, SearchKind, Start, search_gamma},
-    graph::{Blob, NodeFailure, NodeType, RunContext},
+    fit::{Compress, DirectPixels, Method, ScannedTable, SearchKind, Start, search_gamma},
+    graph::{Blob, BlobHash, NodeFailure, NodeType, RunContext},
     light::LightDistribution,
     nodes::wire::{CandidateWire, EnvironmentWire, ImageWire, SubsetWire, read, write},
     render::transport::Pixel,
@@ -175,20 +175,29 @@ impl NodeType for Search {
             ));
         };
         let scene = parameters.direct.as_ref().map(|wire| DirectScene::read(wire, of_scene, context)).transpose()?;
-        let table = concatenated(model, shards, context)?;
-        if table.pixels != subset.pixels.len() {
-            let (expected, found) = (subset.pixels.len(), table.pixels);
-            return Err(NodeFailure::new(format!("expected a table of {expected} pixels, found {found}")));
-        }
         let positive = |x: f64| x.is_finite() && x > 0.0;
         if !positive(parameters.gamma) || !positive(parameters.mean_radiance) {
             let (gamma, mean) = (parameters.gamma, parameters.mean_radiance);
             return Err(NodeFailure::new(format!("gamma {gamma} and mean radiance {mean} must be positive")));
         }
         let method = parameters.method(model)?;
+        // Searches of other gammas reuse the scan: it depends on the inputs and the start alone.
+        let hashes = inputs.iter().flat_map(|input| input.hash().0);
+        let of_start = [u8::from(parameters.paper_start), u8::from(parameters.direct.is_some())];
+        let key: Vec<u8> = of_start.into_iter().chain(model.name().bytes()).chain(hashes).collect();
+        let bytes = shards.iter().map(|shard| shard.len()).sum();
+        let scanned = context.derived(BlobHash::of(&key), bytes, || {
+            let table = concatenated(model, shards, context)?;
+            if table.pixels != subset.pixels.len() {
+                let (expected, found) = (subset.pixels.len(), table.pixels);
+                return Err(NodeFailure::new(format!("expected a table of {expected} pixels, found {found}")));
+            }
+            Ok(ScannedTable::new(&method, table, &subset, &subset_wire.photo))
+        })?;
         let mean = parameters.mean_radiance;
         let direct = scene.as_ref().map(|scene| scene.pixels(&subset.pixels)).transpose()?;
-        let mut candidate = search_gamma(&method, parameters.gamma, &table, &subset, &subset_wire.photo, mean, direct)?;
+        let mut candidate =
+            search_gamma(&method, parameters.gamma, &scanned, &subset, &subset_wire.photo, mean, direct)?;
         candidate.subset = parameters.subset;
         write("candidate", &CandidateWire::of(&candidate))
     }

@@ -5,10 +5,10 @@
 
 use crate::{
     brdf::{self, Model, lobe_terms},
-    fit::{FullView, JudgedBy},
+    fit::{FullView, JudgedBy, Judges},
     graph::{Blob, NodeFailure, RunContext},
     image::Image,
-    metric::{Judge, JudgeOptions},
+    metric::{Judge, JudgeOptions, MetricError},
     nodes::wire::{ImageWire, TableWire, read},
     render::{table::TransportTable, transport::Pixel},
 };
@@ -36,6 +36,9 @@ pub(crate) struct ViewWire {
 pub(super) struct View {
     pub(super) model: &'static dyn Model,
     pub(super) judge: Judge,
+    /// Exposure and scored pixels of the judges.
+    exposure: f64,
+    scored: Vec<f32>,
     pub(super) by: JudgedBy,
     pub(super) photo: Image,
     pub(super) pixels: Vec<Pixel>,
@@ -49,7 +52,7 @@ pub(super) struct View {
 #[derive(Debug)]
 pub(super) struct Scene {
     pub(super) view: Arc<View>,
-    table: TransportTable,
+    table: Vec<Arc<TransportTable>>,
 }
 
 impl Scene {
@@ -58,9 +61,12 @@ impl Scene {
             return Err(NodeFailure::new("expected a view and a transport table, found no input"));
         };
         let view = context.decoded(view, View::decode)?;
-        let table = concatenated(view.model, shards, context)?;
-        if table.pixels != view.pixels.len() {
-            let (expected, found) = (view.pixels.len(), table.pixels);
+        let table = decoded(shards, context)?;
+        if !table.iter().all(|shard| is_of(view.model, shard) && shard.has_the_grids_of(&table[0])) {
+            return Err(of_different_tables(view.model));
+        }
+        let (expected, found) = (view.pixels.len(), table.iter().map(|shard| shard.pixels).sum::<usize>());
+        if expected != found {
             return Err(NodeFailure::new(format!("expected a table of {expected} pixels, found {found}")));
         }
         Ok(Self { view, table })
@@ -74,13 +80,22 @@ impl Scene {
 }
 
 impl View {
+    /// The judge of searches.
+    pub(super) fn searching(&self) -> Result<Judge<f32>, NodeFailure> {
+        Judge::single(&self.photo, &self.scored, self.exposure, &JudgeOptions::default()).map_err(cannot_be_judged)
+    }
+
+    /// Both judges, and which score counts.
+    pub(super) fn judges<'a>(&'a self, searching: &'a Judge<f32>) -> Judges<'a> {
+        Judges { searching, reporting: &self.judge, by: self.by }
+    }
+
     pub(super) fn decode(bytes: &[u8]) -> Result<Self, NodeFailure> {
         let wire: ViewWire = read("view", bytes)?;
         let photo: Image = wire.photo.image()?;
         let model = brdf::model(&wire.model).map_err(|error| NodeFailure::new(error.to_string()))?;
         let scored: Vec<f32> = wire.coverage.iter().map(|&c| if c > 0.0 { 1.0 } else { 0.0 }).collect();
-        let judge = Judge::new(&photo, &scored, wire.exposure, &JudgeOptions::default())
-            .map_err(|error| NodeFailure::new(format!("the photo cannot be judged: {error}")))?;
+        let judge = Judge::new(&photo, &scored, wire.exposure, &JudgeOptions::default()).map_err(cannot_be_judged)?;
         let (width, height) = (photo.width(), photo.height());
         let stride = wire.stride.max(1);
         let outside = |p: &&Pixel| (p[0] / stride) as usize >= width || (p[1] / stride) as usize >= height;
@@ -88,8 +103,13 @@ impl View {
             return Err(NodeFailure::new(format!("pixel {p:?} lies outside the {width} x {height} photo")));
         }
         let by = if wire.judge_object { JudgedBy::Object } else { JudgedBy::Image };
-        Ok(Self { model, judge, by, photo, pixels: wire.pixels, coverage: wire.coverage, stride, width, height })
+        let ViewWire { exposure, pixels, coverage, .. } = wire;
+        Ok(Self { model, judge, exposure, scored, by, photo, pixels, coverage, stride, width, height })
     }
+}
+
+fn cannot_be_judged(error: MetricError) -> NodeFailure {
+    NodeFailure::new(format!("the photo cannot be judged: {error}"))
 }
 
 /// Joins consecutive shards into one table, which must be for the lobes of `model`.
@@ -98,27 +118,31 @@ pub(super) fn concatenated(
     shards: &[Blob],
     context: &RunContext,
 ) -> Result<TransportTable, NodeFailure> {
-    let tables = shards
-        .iter()
-        .map(|shard| context.decoded(shard, |bytes| read::<TableWire>("transport table", bytes)?.table()))
-        .collect::<Result<Vec<_>, _>>()?;
+    let tables = decoded(shards, context)?;
     let tables: Vec<&TransportTable> = tables.iter().map(|table| &**table).collect();
     joined(model, &tables)
 }
 
+fn decoded(shards: &[Blob], context: &RunContext) -> Result<Vec<Arc<TransportTable>>, NodeFailure> {
+    let table = |bytes: &[u8]| read::<TableWire>("transport table", bytes)?.table();
+    shards.iter().map(|shard| context.decoded(shard, table)).collect()
+}
+
 /// As [`concatenated`], for shards that are already decoded.
 pub(crate) fn joined(model: &dyn Model, shards: &[&TransportTable]) -> Result<TransportTable, NodeFailure> {
-    let fits = |table: &TransportTable| {
-        let lobes = table.lobes.iter().zip(model.lobes());
-        table.lobes.len() == model.lobes().len()
-            && lobes
-                .into_iter()
-                .all(|(t, basis)| t.terms == lobe_terms(basis.lobe) && t.knots.is_some() == basis.width.is_some())
-    };
-    TransportTable::concatenate(shards).filter(fits).ok_or_else(|| {
-        NodeFailure::new(format!(
-            "expected shards of one transport table of {}, found none or shards of different tables",
-            model.name()
-        ))
-    })
+    TransportTable::concatenate(shards).filter(|table| is_of(model, table)).ok_or_else(|| of_different_tables(model))
+}
+
+/// Whether a table has the lobes of `model`.
+fn is_of(model: &dyn Model, table: &TransportTable) -> bool {
+    let mut lobes = table.lobes.iter().zip(model.lobes());
+    table.lobes.len() == model.lobes().len()
+        && lobes.all(|(t, basis)| t.terms == lobe_terms(basis.lobe) && t.knots.is_some() == basis.width.is_some())
+}
+
+fn of_different_tables(model: &dyn Model) -> NodeFailure {
+    NodeFailure::new(format!(
+        "expected shards of one transport table of {}, found none or shards of different tables",
+        model.name()
+    ))
 }

@@ -14,7 +14,9 @@ use super::{
     polishing::Polishing,
     scene_tables::SceneTables,
     step::Step,
-    tables::{LARGE_SHARD, LARGE_SUBSET, SUBSET_SHARD, stage_one_knots, whole_span},
+    tables::{
+        LARGE_SHARD, LARGE_SUBSET, SUBSET_SHARD, is_nearly_sharp, may_begin_blurred, stage_one_knots, whole_span,
+    },
     verify::{self, SubsetTables},
     work::Work,
 };
@@ -67,6 +69,8 @@ pub struct FitPlanner {
     subsets: Vec<PixelSubset>,
     extra_gammas: Vec<f64>,
     is_judged_on_whole_range: bool,
+    /// Whether the tables of stage one have the sharp lobes too.
+    has_sharp_lobes: bool,
     searches: BTreeMap<NodeId, usize>,
     /// One search of every subset: its inputs name the shards of the subset's table.
     search_of_subset: Vec<NodeId>,
@@ -99,6 +103,7 @@ impl FitPlanner {
             subsets,
             extra_gammas: Vec::new(),
             is_judged_on_whole_range: false,
+            has_sharp_lobes: false,
             searches: BTreeMap::new(),
             search_of_subset: Vec::new(),
             tables_of_subsets: SubsetTables::default(),
@@ -167,17 +172,19 @@ impl FitPlanner {
         self.searches.get(&node).map_or_else(|| Work::of_fit(kind, is_judged), |place| Work::Search(*place))
     }
 
-    fn add_searches(&mut self, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
+    /// Adds stage one; `again` with the sharp lobes, after a first round without them.
+    fn add_searches(&mut self, graph: &mut GraphEdit<'_>, again: bool) -> Result<(), PlanError> {
         let (direct, of_scene) = self.scene.direct_searches(graph)?;
         for (s, subset) in self.subsets.clone().into_iter().enumerate() {
             let list = add(graph, "list of pixels", &subset.pixels)?;
             let photo = photo_at(&self.scene.capture, &subset);
             let wire = SubsetWire { photo, pixels: subset.pixels.clone(), weights: subset.weights.clone() };
             let mut inputs = vec![Input::Blob(add(graph, "pixel subset", &wire)?)];
-            let what = if self.subsets.len() == 1 { "of the subset".to_owned() } else { format!("of subset {s}") };
+            let of = if self.subsets.len() == 1 { "of the subset".to_owned() } else { format!("of subset {s}") };
+            let what = if again { format!("{of} with sharp lobes") } else { of };
             let (count, shard) =
                 (subset.pixels.len(), if subset.pixels.len() > LARGE_SUBSET { LARGE_SHARD } else { SUBSET_SHARD });
-            let knots = stage_one_knots(&self.scene.method);
+            let knots = stage_one_knots(&self.scene.method, self.has_sharp_lobes);
             inputs.extend(self.scene.add_transport(
                 graph,
                 (nodes::TRANSPORT, &what),
@@ -192,7 +199,7 @@ impl FitPlanner {
                 let of_subset = if self.subsets.len() == 1 { String::new() } else { format!(", subset {s}") };
                 let node = graph.add_node(NodeSpec {
                     kind: nodes::SEARCH.to_owned(),
-                    label: format!("search gamma {gamma}{of_subset}"),
+                    label: format!("search gamma {gamma}{of_subset}{}", if again { ", with sharp lobes" } else { "" }),
                     parameters: encode("parameters", &parameters)?,
                     inputs: inputs.clone(),
                     placement: Placement::Worker,
@@ -257,7 +264,15 @@ impl FitPlanner {
         used
     }
 
+    /// Judges the candidates, or searches again on a table with the sharp lobes if a candidate came near them.
     fn searched(&mut self, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
+        let model = self.scene.method.model;
+        if !self.has_sharp_lobes && self.candidates.values().any(|c| is_nearly_sharp(model, &c.parameters)) {
+            self.has_sharp_lobes = true;
+            self.candidates.clear();
+            self.release_subset_tables(graph);
+            return self.add_searches(graph, true);
+        }
         let points = self.candidates.values().map(|c| &c.parameters[..]);
         let needed = needed_span(self.scene.method.model, points);
         self.scene.span = if self.is_judged_on_whole_range { whole_span(self.scene.method.model) } else { needed };
@@ -378,7 +393,8 @@ impl FitPlanner {
 impl Planner for FitPlanner {
     fn start(&mut self, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
         self.scene.keep_light(graph)?;
-        self.add_searches(graph)?;
+        self.has_sharp_lobes = self.is_judged_on_whole_range || !may_begin_blurred(&self.scene.method);
+        self.add_searches(graph, false)?;
         // This table depends on the scene alone, so idle workers can start it now.
         if self.scene.method.polish { self.polishing.add_coarse_table(&mut self.scene, graph) } else { Ok(()) }
     }

@@ -146,7 +146,7 @@ impl SceneTables {
         let list = add(graph, "list of pixels", &self.pixels)?;
         let knots = match span {
             Some((lower, upper)) => Knots::covering(lower, upper, FULL_PER_OCTAVE),
-            None => stage_one_knots(&self.method),
+            None => stage_one_knots(&self.method, true),
         };
         let pixels = (list, self.pixels.len(), FULL_SHARD);
         let what = if self.tables.is_empty() { "in full" } else { "in full again" };

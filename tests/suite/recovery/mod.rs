@@ -6,7 +6,7 @@ mod targets;
 
 use lookalike::{
     brdf::{Channels, Material, Model, flat_names, offset_of},
-    fit::{Candidate, Method, SearchKind, Start, search_gamma},
+    fit::{Candidate, Method, ScannedTable, SearchKind, Start, search_gamma},
     metric::cost::Compression,
     render::{
         knots::{Knots, PER_OCTAVE},
@@ -49,7 +49,8 @@ impl Session {
     fn search(&self, gamma: f64, search: SearchKind, start: Start) -> Candidate {
         let method = Method { model: self.model, search, start, ..Method::default() };
         let Photograph { subset, pixels, mean_radiance, .. } = &self.photo;
-        search_gamma(&method, gamma, &self.table, subset, pixels, *mean_radiance, None).unwrap()
+        let scanned = ScannedTable::new(&method, self.table.clone(), subset, pixels);
+        search_gamma(&method, gamma, &scanned, subset, pixels, *mean_radiance, None).unwrap()
     }
 
     fn prediction(&self, gamma: f64) -> Prediction {

@@ -2,7 +2,7 @@
 
 use super::scene::{Bench, capture, method};
 use crate::{
-    fit::{FullView, JudgedBy, MAX_EVALUATIONS, polish},
+    fit::{FullView, JudgedBy, Judges, MAX_EVALUATIONS, polish},
     graph::{Blob, NodeSpec},
     metric::{Judge, JudgeOptions},
     nodes::wire::{PolishedWire, read, write},
@@ -13,7 +13,7 @@ use crate::{
         transport::{Accuracy, Pixel, TransportPlan},
     },
 };
-use std::{cell::Cell, ops::ControlFlow};
+use std::{cell::Cell, ops::ControlFlow, sync::Arc};
 
 const MATERIAL: [f64; 7] = [0.3, 0.2, 0.1, 0.05, 0.05, 0.05, 0.2];
 
@@ -27,11 +27,13 @@ fn polish_starts_from_the_best_and_never_ends_worse_on_its_table() {
     let model = method("ggx").model;
     let plan = TransportPlan { model, knots: Knots::covering(0.1, 0.4, 5.0), accuracy: Accuracy::FULL };
     let pyramid = LightPyramid::new((**capture.environment()).clone());
-    let table = plan.integrate(capture.geometry(), &pyramid, &pixels);
+    let table = [Arc::new(plan.integrate(capture.geometry(), &pyramid, &pixels))];
     let view = FullView { model, table: &table, pixels: &pixels, coverage: &coverage, stride: 1, width, height };
     // The pixels of a photo over black contain the coverage already.
     let scored: Vec<f32> = coverage.iter().map(|&c| if c > 0.0 { 1.0 } else { 0.0 }).collect();
     let judge = Judge::new(photo, &scored, 1.0, &JudgeOptions::default()).unwrap();
+    let searching = Judge::single(photo, &scored, 1.0, &JudgeOptions::default()).unwrap();
+    let judges = Judges { searching: &searching, reporting: &judge, by: JudgedBy::Image };
     let score = |point: &[f64]| judge.score(&view.render(point)).unwrap().cssim;
     let near = vec![0.28, 0.21, 0.1, 0.06, 0.05, 0.04, 0.19];
     let far = vec![0.6, 0.1, 0.5, 0.3, 0.3, 0.3, 0.38];
@@ -39,7 +41,7 @@ fn polish_starts_from_the_best_and_never_ends_worse_on_its_table() {
     for starts in [vec![near.clone()], vec![far.clone(), near.clone()], vec![near.clone(), far]] {
         for limit in [3, 60] {
             let mut observe = |_: &crate::search::Progress<'_>| ControlFlow::Continue(());
-            let found = polish(&view, &judge, JudgedBy::Image, &starts, limit, &mut observe).unwrap();
+            let found = polish(&view, judges, &starts, limit, &mut observe).unwrap();
             assert!(found.cssim <= score(&near) && found.evaluations <= limit, "{starts:?} {limit}: {found:?}");
             assert_eq!(found.cssim, score(&found.parameters));
         }

@@ -3,7 +3,7 @@
 use super::scene::{StageOne, method};
 use crate::{
     brdf::{Channels, DEFAULT_MODEL, MODELS, Model},
-    fit::{Candidate, Method, SearchKind, Start, search_gamma},
+    fit::{Candidate, Method, ScannedTable, SearchKind, Start, search_gamma},
 };
 
 /// Two materials in the inside of a model's box: the values of its colours in their order, the place of every scalar between its bounds,
@@ -27,7 +27,8 @@ fn known(model: &dyn Model, (colours, scalar, width): ([[f64; 3]; 2], f64, f64))
 }
 
 fn search(method: &Method, scene: &StageOne, gamma: f64) -> Candidate {
-    search_gamma(method, gamma, &scene.table, &scene.subset, &scene.photo, 0.5, None).unwrap()
+    let scanned = ScannedTable::new(method, scene.table.clone(), &scene.subset, &scene.photo);
+    search_gamma(method, gamma, &scanned, &scene.subset, &scene.photo, 0.5, None).unwrap()
 }
 
 #[test]

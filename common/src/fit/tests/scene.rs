@@ -62,7 +62,8 @@ pub(super) fn capture_of(
     let plan = TransportPlan { model, knots, accuracy };
     let table = plan.integrate(&geometry, &LightPyramid::new(room()), &pixels);
     let (width, height) = (columns, rows);
-    let view = FullView { model, table: &table, pixels: &pixels, coverage: &coverage, stride: 1, width, height };
+    let view =
+        FullView { model, table: &[Arc::new(table)], pixels: &pixels, coverage: &coverage, stride: 1, width, height };
     let mut photo = view.render(parameters);
     for (i, pixel) in photo.pixels_mut().iter_mut().enumerate() {
         for (c, value) in pixel.iter_mut().enumerate() {
