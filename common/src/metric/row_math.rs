@@ -190,7 +190,7 @@ const TWO_23_BITS: u32 = 0x4b00_0000;
 const ROUNDING_SINGLE: f32 = 12_582_912.0;
 /// pi/2 to 11 bits and the rest.
 const HALF_PI_HIGH_SINGLE: f32 = 1.570_312_5;
-const HALF_PI_LOW_SINGLE: f32 = 4.838_267_9e-4;
+const HALF_PI_LOW_SINGLE: f32 = 4.838_268e-4;
 /// Lg1..Lg4 of FreeBSD's `e_logf.c`.
 const LOG_SINGLE: [f32; 4] = [0.666_666_6, 0.400_009_72, 0.284_987_87, 0.242_790_79];
 
