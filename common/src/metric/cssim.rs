@@ -72,8 +72,8 @@ pub struct Judge<R = f64> {
     object_windows: usize,
     pipeline: Pipeline<R>,
     reference: Reference<R>,
-    /// Buffers of finished comparisons, of a judge for searches: to get and return pages of memory takes as long as half of a score. A judge of
-    /// reported scores may be cached for long and keeps none.
+    /// Buffers of finished comparisons, of a judge for searches: new pages of memory would take up to a third of a score. A judge of reported
+    /// scores may be cached for long and keeps none.
     buffers: Option<Mutex<Vec<Buffers<R>>>>,
 }
 
@@ -102,7 +102,7 @@ impl Judge {
 }
 
 impl Judge<f32> {
-    /// As [`Judge::new`], in single precision: scores differ from those in double precision by about 1e-6, and take a third of the time.
+    /// As [`Judge::new`], in single precision: scores differ from those in double precision by at most 2e-6, and take about half the time.
     ///
     /// # Errors
     /// As [`Judge::new`].
