@@ -71,11 +71,6 @@ impl Lobe for DiffuseLobe {
         6.1
     }
 
-    /// It falls to 0 with the viewer's cosine.
-    fn footprint(&self, width: f64, cos_o: f64) -> f64 {
-        width.min(cos_o)
-    }
-
     #[inline(always)]
     fn kernel(&self, g: &Angles, _spread: &Spread, _width: f64) -> f64 {
         let cos_i = g.cos_i.max(0.0);
@@ -106,7 +101,7 @@ impl Lobe for SpecularLobe {
         2.0
     }
 
-    fn footprint(&self, width: f64, _cos_o: f64) -> f64 {
+    fn footprint(&self, width: f64) -> f64 {
         power::footprint(width)
     }
 

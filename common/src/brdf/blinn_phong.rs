@@ -61,7 +61,7 @@ impl Lobe for BlinnPhongLobe {
         2.0
     }
 
-    fn footprint(&self, width: f64, _cos_o: f64) -> f64 {
+    fn footprint(&self, width: f64) -> f64 {
         power::footprint(width)
     }
 

@@ -50,9 +50,8 @@ pub trait Lobe: Debug + Sync {
         0.0
     }
 
-    /// The turn of the normal, in radians, within which a lobe of this width varies little. Less than the width where the lobe changes
-    /// fast with the viewer's cosine `cos_o`.
-    fn footprint(&self, width: f64, _cos_o: f64) -> f64 {
+    /// The turn of the normal, in radians, within which a lobe of this width varies little.
+    fn footprint(&self, width: f64) -> f64 {
         width
     }
 

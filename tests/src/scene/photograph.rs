@@ -89,7 +89,7 @@ fn radiance(scene: &Scene, material: &Material, pixels: &[Pixel]) -> Vec<Rgb> {
 }
 
 /// Accuracy of the photograph: a tenth of the errors of stage one.
-const FINE: Accuracy = Accuracy { tolerance: 1e-5, footprint: 0.25 };
+const FINE: Accuracy = Accuracy { tolerance: 1e-5, footprint: 0.1 };
 
 /// Samples per pixel of the rendering that importance sampling uses.
 const CHEAP_SAMPLES: u32 = 64;

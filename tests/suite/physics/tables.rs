@@ -83,12 +83,16 @@ fn tables_agree_with_the_direct_integrator_through_a_perspective_camera() {
     PERSPECTIVE.check();
 }
 
-/// A regression: a pixel at the rim had too few parts for lobes that change there with the viewer's cosine. The sheen of `disney` was off by
-/// 0.23 % of its mean under a real sun, its diffuse and subsurface lobes by as much under this one.
+/// A regression: a pixel at the rim had too few parts for lobes that change there with the viewer's cosine. The diffuse lobe of
+/// `ashikhmin-shirley` was off by 1.1 % of its mean over these pixels, by 6.6 % in the worst.
 #[test]
 fn lobes_of_fixed_shape_have_enough_parts_of_rim_pixels() {
     let is_fixed = |basis: &BasisLobe| basis.width.is_none() && basis.lobe.expected().adjusts.is_none();
-    compare_with_smaller_parts(Knots::covering(0.5, 1.0, 1.0), is_fixed);
+    let at_rim = |scene: &Scene, &[column, row]: &Pixel| {
+        let middle = [column, row].map(|x| f64::from(x) + 0.5);
+        scene.geometry.point(middle[0], middle[1]).is_some_and(|point| point.normal.dot(point.view) < 0.3)
+    };
+    compare_with_smaller_parts(Knots::covering(0.5, 1.0, 1.0), is_fixed, at_rim);
 }
 
 /// A regression: the lobes of `blinn-phong` and `ashikhmin-shirley` have a kink at their peak, and their tables had too few parts of a pixel:
@@ -96,13 +100,18 @@ fn lobes_of_fixed_shape_have_enough_parts_of_rim_pixels() {
 #[test]
 fn sharp_lobes_with_a_kink_have_enough_parts() {
     let is_kinked = |basis: &BasisLobe| basis.lobe.expected().is_kinked && basis.width.is_some();
-    compare_with_smaller_parts(Knots::covering(0.0106, 0.0107, 1.0), is_kinked);
+    compare_with_smaller_parts(Knots::covering(0.0106, 0.0107, 1.0), is_kinked, |_, _| true);
 }
 
 /// Compares lobes of every model with tables of much smaller parts of pixels, under a sun of one texel.
-fn compare_with_smaller_parts(knots: Knots, is_compared: fn(&BasisLobe) -> bool) {
+fn compare_with_smaller_parts(
+    knots: Knots,
+    is_compared: fn(&BasisLobe) -> bool,
+    is_wanted: fn(&Scene, &Pixel) -> bool,
+) {
     let scene = Scene::sphere(256, Camera::Orthographic, synthetic::one_texel_sun(256, 80, 100)).unwrap();
-    let pixels = spread(&scene.interior(), 200, 5);
+    let wanted: Vec<Pixel> = scene.interior().into_iter().filter(|pixel| is_wanted(&scene, pixel)).collect();
+    let pixels = spread(&wanted, 200, 5);
     let mut compared = 0;
     for model in MODELS {
         let wanted: Vec<usize> = (0..model.lobes().len()).filter(|&l| is_compared(&model.lobes()[l])).collect();

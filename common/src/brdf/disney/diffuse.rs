@@ -46,11 +46,6 @@ const SUBSURFACE: &str = "disney subsurface";
 /// The errors of a cut have one sign from the normal to the rim, so they add up.
 const CARE: f64 = 4.0;
 
-/// `(1 - x)^5` changes fast at the rim, and hardly at the centre.
-fn rim_footprint(width: f64, cos_o: f64) -> f64 {
-    width.min(0.03 + 0.5 * cos_o)
-}
-
 impl<const POWER: u8> Lobe for Diffuse<POWER> {
     fn name(&self) -> &'static str {
         [DIFFUSE, "disney diffuse, by roughness", "disney diffuse, by its square"][usize::from(POWER)]
@@ -71,10 +66,6 @@ impl<const POWER: u8> Lobe for Diffuse<POWER> {
     /// The second derivative of `g(x) x` at the horizon is `2 g'`: 5 for `1 - FL/2`, 10 for `FL`.
     fn bend(&self) -> f64 {
         [5.0, 20.0, 40.0][usize::from(POWER)]
-    }
-
-    fn footprint(&self, width: f64, cos_o: f64) -> f64 {
-        rim_footprint(width, cos_o)
     }
 
     fn expected(&self) -> Expected {
@@ -108,10 +99,6 @@ impl<const POWER: u8> Lobe for Subsurface<POWER> {
     /// At grazing views it is that of `1/(n.l + n.v)`, over a few times `n.v`.
     fn bend(&self) -> f64 {
         60.0
-    }
-
-    fn footprint(&self, width: f64, cos_o: f64) -> f64 {
-        width.min(0.5 * cos_o)
     }
 
     /// The formula has an albedo of up to 1.205 (computed in NumPy).
@@ -148,10 +135,6 @@ impl Lobe for Sheen {
 
     fn bend(&self) -> f64 {
         20.0
-    }
-
-    fn footprint(&self, width: f64, cos_o: f64) -> f64 {
-        rim_footprint(width, cos_o)
     }
 
     #[inline(always)]

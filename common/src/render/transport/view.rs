@@ -47,7 +47,11 @@ const RIM: f64 = 0.25;
 
 /// Largest turn of the normal over a part, as a share of the geometric mean of the turns over which the lobe and `1/(n.v)` change by their own
 /// size: both change at once, which the second-order mean over a part omits.
-const BOTH: f64 = 0.08;
+const BOTH: f64 = 0.027;
+
+/// The same for a lobe of fixed shape, as a share of the viewer's cosine, with which it may change: its value in the middle of a part stands
+/// for the mean.
+const FIXED: f64 = 0.03;
 
 /// A lobe at the widths of one band.
 #[derive(Debug, Clone, Copy)]
@@ -85,13 +89,13 @@ impl View<'_> {
         }
         let turns = self.geometry.normal_turns(c, r).map(|turn| turn / self.accuracy.footprint);
         let cos_o = self.surface(pixel, [0.5; 2]).map_or(1.0, |surface| surface.normal.dot(surface.view));
-        let width = lobe.footprint(band.sharpest(), cos_o);
+        let width = lobe.footprint(band.sharpest());
         if !matches!(band, Band::Glossy(..)) {
-            return footprint::parts(turns, width, width);
+            return footprint::parts(turns, width, FIXED * cos_o);
         }
         // How far the normal turns while `1/(n.v)` grows by its own size.
         let turn_of_cosine = cos_o / (1.0 - cos_o * cos_o).max(0.0).sqrt();
-        let most = BOTH * (width * turn_of_cosine).sqrt() / self.accuracy.footprint;
+        let most = BOTH * (width * turn_of_cosine).sqrt();
         footprint::parts(turns, width.min(RIM * cos_o), most)
     }
 
