@@ -26,7 +26,7 @@ use super::{Lab2000hl, MetricError};
 use crate::image::Image;
 use std::{
     ops::Range,
-    sync::{Mutex, PoisonError},
+    sync::{Mutex, MutexGuard, PoisonError},
 };
 
 /// Settings of a [`Judge`].
@@ -72,9 +72,8 @@ pub struct Judge<R = f64> {
     object_windows: usize,
     pipeline: Pipeline<R>,
     reference: Reference<R>,
-    /// Buffers of finished comparisons, of a judge for searches: new pages of memory would take up to a third of a score. A judge of reported
-    /// scores may be cached for long and keeps none.
-    buffers: Option<Mutex<Vec<Buffers<R>>>>,
+    /// Buffers of finished comparisons: new pages of memory would take up to a third of a score.
+    buffers: Mutex<Vec<Buffers<R>>>,
 }
 
 /// Planes of the filter's space, and the differences.
@@ -112,8 +111,7 @@ impl Judge<f32> {
         exposure: f64,
         options: &JudgeOptions,
     ) -> Result<Self, MetricError> {
-        let judge = Self::over(reference, coverage, exposure, options, around)?;
-        Ok(Self { buffers: Some(Mutex::default()), ..judge })
+        Self::over(reference, coverage, exposure, options, around)
     }
 }
 
@@ -143,7 +141,7 @@ impl<R: RowMath> Judge<R> {
         let gain = gains(coverage, &region, exposure);
         let working = pipeline.convert(&region, |y, rgb| exposed_row(&region, &gain, reference, y, 0, rgb));
         let reference = Reference::new(working, Window::new(SIGMA), options.lanes);
-        let (coverage, buffers) = (coverage.to_vec(), None);
+        let (coverage, buffers) = (coverage.to_vec(), Mutex::default());
         Ok(Self { region, spans, coverage, gain, object, object_windows, pipeline, reference, buffers })
     }
 
@@ -215,9 +213,8 @@ impl<R: RowMath> Judge<R> {
             return Err(MetricError::SizeMismatch { expected, found });
         }
         check_covered_finite("image", image, &self.coverage)?;
-        let lock = || self.buffers.as_ref().map(|kept| kept.lock().unwrap_or_else(PoisonError::into_inner));
         let (width, height) = (self.region.width, self.region.height);
-        let kept = lock().and_then(|mut kept| kept.pop());
+        let kept = self.kept().pop();
         let (mut buffer, mut differences) =
             kept.unwrap_or_else(|| (Planes::new(width, height), Planes::new(width, height)));
         self.pipeline.run(
@@ -229,10 +226,17 @@ impl<R: RowMath> Judge<R> {
             |y, span, working, out| self.reference.difference_row(y, span, working, out),
         );
         let rows = self.reference.compare(&differences, &self.spans, measure);
-        if let Some(mut kept) = lock() {
-            kept.push((buffer, differences));
-        }
+        self.kept().push((buffer, differences));
         Ok(rows)
+    }
+
+    /// Frees the memory that scores keep for the next ones.
+    pub fn free_buffers(&self) {
+        self.kept().clear();
+    }
+
+    fn kept(&self) -> MutexGuard<'_, Vec<Buffers<R>>> {
+        self.buffers.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     fn combine(&self, all: [f64; FEATURES], object: [f64; FEATURES]) -> Score {

@@ -79,6 +79,13 @@ impl Scene {
     }
 }
 
+impl Drop for Scene {
+    /// The cache may keep the view for long after the node.
+    fn drop(&mut self) {
+        self.view.judge.free_buffers();
+    }
+}
+
 impl View {
     /// The judge of searches.
     pub(super) fn searching(&self) -> Result<Judge<f32>, NodeFailure> {
