@@ -1,7 +1,7 @@
 //! The cosine of the half vector's angle to a power: the lobe of Blinn (1977) and of Ashikhmin & Shirley (2000).
 
 use super::{Angles, Channels, Parameter, Role, Scale, Spread, Width, single::second_order};
-use crate::math::elementary::{exp_nonpositive, ln_positive};
+use crate::math::elementary::{exp_bounded, ln_positive};
 
 /// The exponent as a parameter.
 pub(super) const EXPONENT: Parameter = Parameter {
@@ -55,5 +55,5 @@ pub(super) fn cosine(g: &Angles, spread: &Spread, alpha: f64) -> (f64, f64) {
     let inverse = 1.0 / cos2;
     let slope = k * inverse;
     let blur = second_order(0.5 * slope * (k - 1.0) * inverse * spread.du2 - slope * spread.du);
-    (exp_nonpositive(k * ln_positive(cos2).min(0.0)), blur)
+    (exp_bounded(k * ln_positive(cos2).min(0.0)), blur)
 }

@@ -1,7 +1,7 @@
 //! The operations that a formula needs in either precision.
 
 use super::{
-    elementary::{exp_nonpositive, exp_nonpositive_single, ln_positive},
+    elementary::{exp_bounded, exp_nonpositive_single, ln_positive},
     to_f32,
 };
 use std::{
@@ -105,5 +105,5 @@ macro_rules! real {
     };
 }
 
-real!(f64, std::convert::identity, exp_nonpositive);
+real!(f64, std::convert::identity, exp_bounded);
 real!(f32, to_f32, exp_nonpositive_single);
