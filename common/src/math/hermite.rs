@@ -65,9 +65,21 @@ pub fn central_check(position: f64) -> [f64; STENCIL] {
     [0.0, a, b, c, d, 0.0]
 }
 
-/// As [`central_check`] for a [`stencil`], on its six values.
+/// The first of six values around `position`, their weights for the value there, and those of [`central_check`]; as [`stencil`].
 #[must_use]
-pub fn check(position: f64, count: usize) -> [f64; STENCIL] {
+#[inline]
+pub fn checked(position: f64, count: usize) -> (usize, [f64; STENCIL], [f64; STENCIL]) {
+    let left = cell(position, count - 1);
+    if left >= 2 && left + 3 < count {
+        let s = position - left as f64;
+        return (left - 2, central(s), central_check(s));
+    }
+    let stencil = stencil(position, count);
+    (stencil.first, stencil.value, check(position, count))
+}
+
+/// As [`central_check`] for a [`stencil`], on its six values.
+fn check(position: f64, count: usize) -> [f64; STENCIL] {
     let position = position.clamp(0.0, (count - 1) as f64);
     let left = cell(position, count - 1);
     let first = left.saturating_sub(2).min(count - STENCIL);
@@ -108,7 +120,9 @@ mod tests {
             let s = stencil(x, 9);
             let sum = |w: &[f64; STENCIL]| -> f64 { w.iter().zip(s.first..).map(|(w, k)| w * f(k as f64)).sum() };
             assert!((sum(&s.value) - f(x)).abs() < 1e-12 && (sum(&s.slope) - df(x)).abs() < 1e-12, "{x}");
-            assert!((sum(&check(x, 9)) - f(x)).abs() < 1e-12, "{x}");
+            let (first, value, check) = checked(x, 9);
+            assert!(first == s.first && (sum(&check) - f(x)).abs() < 1e-12, "{x}");
+            assert!(value.iter().zip(s.value).all(|(a, b)| (a - b).abs() < 1e-15), "{x}");
         }
     }
 

@@ -75,15 +75,14 @@ impl Grid {
         let around = angle(local.y, local.x);
         // The rings of the opposite side come first: three of them, counted from the farthest one.
         let (position, count) = (from_axis / self.step - 0.5 + OPPOSITE as f64, self.rings.len() + OPPOSITE);
-        let rings = hermite::stencil(position, count);
-        let checks = hermite::check(position, count);
+        let (first, values, checks) = hermite::checked(position, count);
         let mut nodes = [Weighted::default(); STENCIL * STENCIL];
         for (k, out) in nodes.chunks_exact_mut(STENCIL).enumerate() {
-            let (ring, turned) = match (rings.first + k).checked_sub(OPPOSITE) {
+            let (ring, turned) = match (first + k).checked_sub(OPPOSITE) {
                 Some(ring) => (ring, around),
-                None => (OPPOSITE - 1 - (rings.first + k), around + PI),
+                None => (OPPOSITE - 1 - (first + k), around + PI),
             };
-            self.rings[ring].stencil(turned, [rings.value[k], checks[k]], out);
+            self.rings[ring].stencil(turned, [values[k], checks[k]], out);
         }
         nodes
     }
@@ -120,11 +119,18 @@ impl Ring {
         let first = cell(left, usize::MAX) + self.nodes - 2;
         let (values, checks) = (hermite::central(position - left), hermite::central_check(position - left));
         for (k, out) in out.iter_mut().enumerate() {
-            let node = self.first + (first + k) % self.nodes;
+            let node = self.first + wrapped(first + k, self.nodes);
             let value = value * values[k];
             *out = Weighted { node, value, error: value - check * checks[k] };
         }
     }
+}
+
+/// `place` modulo `count`, for a place below four times the count: a division by a variable takes longer.
+fn wrapped(place: usize, count: usize) -> usize {
+    let twice = 2 * count;
+    let place = if place >= twice { place - twice } else { place };
+    if place >= count { place - count } else { place }
 }
 
 /// Rings of the opposite side that the stencil of a normal near the axis reads.
