@@ -8,7 +8,7 @@ use super::{
     method::{JudgedBy, SearchKind},
     objective::flat_roles,
     stage_one::{search_bounds, within_table},
-    stage_two::FullView,
+    stage_two::{FullView, Renderer},
 };
 use crate::{
     brdf::Role,
@@ -67,9 +67,10 @@ pub fn polish(
 ) -> Result<Polished, SearchError> {
     let (bounds, table_is_tighter) = polish_bounds(view)?;
     let picked = |score: &Score| judges.by.pick(score.cssim, score.cssim_object);
+    let renderer = Renderer::new(view);
     let objective = |point: &[f64]| {
         // A point whose rendering cannot be scored is rejected.
-        judges.searching.score(&view.render(point)).map_or(f64::NAN, |score| picked(&score))
+        judges.searching.score(&renderer.render(point)).map_or(f64::NAN, |score| picked(&score))
     };
     let report = |point: &[f64]| {
         let score = judges.reporting.score(&view.render(point));

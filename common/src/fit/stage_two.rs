@@ -5,17 +5,17 @@ use super::{
     method::JudgedBy,
 };
 use crate::{
-    brdf::Model,
+    brdf::{Model, term_count},
     image::Image,
-    math::to_f32,
+    math::Rgb,
     metric::{Judge, MetricError, Score},
-    render::{
-        table::{Planes, TransportTable},
-        transport::Pixel,
-    },
+    render::{table::TransportTable, transport::Pixel},
 };
 use rayon::prelude::*;
-use std::sync::Arc;
+use std::{
+    collections::VecDeque,
+    sync::{Arc, Mutex, PoisonError},
+};
 
 /// Renders full images from parameters.
 #[derive(Debug)]
@@ -41,20 +41,26 @@ impl FullView<'_> {
     /// times its coverage.
     #[must_use]
     pub fn render(&self, parameters: &[f64]) -> Image {
-        let radiance = |shard: &Arc<TransportTable>| {
-            let mut planes: Planes = shard.planes();
-            shard.radiance(self.model, parameters, &mut planes);
-            planes
-        };
-        let shards: Vec<Planes> = self.table.par_iter().map(radiance).collect();
+        self.image(&self.terms(parameters), parameters)
+    }
+
+    /// The basis integrals of every shard at the widths of a parameter vector.
+    fn terms(&self, parameters: &[f64]) -> Terms {
+        self.table.par_iter().map(|shard| shard.terms_single(self.model, parameters)).collect()
+    }
+
+    fn image(&self, terms: &Terms, parameters: &[f64]) -> Image {
+        let mut weights = vec![Rgb::ZERO; term_count(self.model)];
+        self.model.weights(parameters, &mut weights);
+        let shards: Vec<[Vec<f32>; 3]> =
+            self.table.par_iter().zip(terms).map(|(shard, terms)| shard.radiance_single(terms, &weights)).collect();
         let mut image = Image::new(self.width, self.height);
         let out = image.pixels_mut();
         let mut pixels = self.pixels.iter();
         for [red, green, blue] in &shards {
             for (((r, g), b), &[column, row]) in red.iter().zip(green).zip(blue).zip(&mut pixels) {
                 let place = (row / self.stride) as usize * self.width + (column / self.stride) as usize;
-                let coverage = f64::from(self.coverage[place]);
-                out[place] = [r, g, b].map(|x| to_f32(x * coverage));
+                out[place] = [r, g, b].map(|x| x * self.coverage[place]);
             }
         }
         image
@@ -63,6 +69,45 @@ impl FullView<'_> {
     /// Smallest and largest width of the table.
     pub(crate) fn span(&self) -> Option<(f64, f64)> {
         self.table.first()?.span()
+    }
+}
+
+/// Basis integrals at some widths: of every shard, `term x channel x pixel`.
+type Terms = Vec<Vec<f32>>;
+
+/// Renders a sequence of images of one view, of which many have the same widths. It keeps the integrals at the last widths; the images are those of
+/// [`FullView::render`].
+#[derive(Debug)]
+pub(super) struct Renderer<'a> {
+    view: &'a FullView<'a>,
+    kept: Mutex<VecDeque<(Widths, Arc<Terms>)>>,
+}
+
+/// The width of every lobe.
+type Widths = Vec<Option<f64>>;
+
+impl<'a> Renderer<'a> {
+    /// Widths that are kept: of the incumbent, and of a step from it.
+    const KEPT: usize = 2;
+
+    pub(super) fn new(view: &'a FullView<'a>) -> Self {
+        Self { view, kept: Mutex::default() }
+    }
+
+    pub(super) fn render(&self, parameters: &[f64]) -> Image {
+        let widths: Widths = self.view.model.lobes().iter().map(|basis| basis.width_at(parameters)).collect();
+        let lock = || self.kept.lock().unwrap_or_else(PoisonError::into_inner);
+        let known = lock().iter().find(|(kept, _)| *kept == widths).map(|(_, terms)| Arc::clone(terms));
+        let terms = known.unwrap_or_else(|| {
+            let terms = Arc::new(self.view.terms(parameters));
+            let mut kept = lock();
+            kept.push_back((widths, Arc::clone(&terms)));
+            if kept.len() > Self::KEPT {
+                kept.pop_front();
+            }
+            terms
+        });
+        self.view.image(&terms, parameters)
     }
 }
 

@@ -6,7 +6,7 @@
 use super::knots::Knots;
 use crate::{
     brdf::{Model, lobe_terms, term_count},
-    math::{Rgb, simd},
+    math::{Rgb, simd, to_f32},
 };
 
 /// Basis integrals of one lobe.
@@ -108,6 +108,37 @@ impl TransportTable {
         }
     }
 
+    /// The basis integrals at the widths of a parameter vector, `term x channel x pixel`, in single precision: what images of other weights
+    /// are summed from.
+    #[must_use]
+    pub fn terms_single(&self, model: &dyn Model, parameters: &[f64]) -> Vec<f32> {
+        let mut out = vec![0.0; term_count(model) * 3 * self.pixels];
+        let mut planes = out.chunks_exact_mut(3 * self.pixels);
+        for (basis, table) in model.lobes().iter().zip(&self.lobes) {
+            let (first, coefficients) = slice_weights(table, basis.width_at(parameters));
+            for (t, plane) in planes.by_ref().take(table.terms).enumerate() {
+                let slice = |k: usize| &table.values[((first + k) * table.terms + t) * 3 * self.pixels..][..plane.len()];
+                let slices: Vec<(&[f32], f32)> =
+                    coefficients.iter().enumerate().map(|(k, &c)| (slice(k), to_f32(c))).collect();
+                sum_of(&slices, plane);
+            }
+        }
+        out
+    }
+
+    /// Radiance of every pixel from [`Self::terms_single`] and the weights of the terms.
+    #[must_use]
+    pub fn radiance_single(&self, terms: &[f32], weights: &[Rgb]) -> [Vec<f32>; 3] {
+        std::array::from_fn(|channel| {
+            let plane = |t: usize| &terms[(3 * t + channel) * self.pixels..][..self.pixels];
+            let scaled: Vec<(&[f32], f32)> =
+                weights.iter().enumerate().map(|(t, weight)| (plane(t), to_f32(weight[channel]))).collect();
+            let mut sums = vec![0.0; self.pixels];
+            sum_of(&scaled, &mut sums);
+            sums
+        })
+    }
+
     /// The basis integrals at a parameter vector: one set of planes per term. With `slope`, their derivatives with respect to
     /// the logarithm of the width (zero for lobes of fixed shape).
     pub fn terms(&self, model: &dyn Model, parameters: &[f64], slope: bool, out: &mut [Planes]) {
@@ -131,6 +162,24 @@ impl TransportTable {
 
 /// Pixels whose sums stay in the first-level cache while all layers are added.
 const BLOCK: usize = 1024;
+
+/// Fills `sums` with the sum of scaled slices, which are as long, in their order.
+fn sum_of(scaled: &[(&[f32], f32)], sums: &mut [f32]) {
+    for (block, sums) in sums.chunks_mut(BLOCK).enumerate() {
+        simd::dispatch(
+            #[inline(always)]
+            || {
+                sums.fill(0.0);
+                for &(values, scale) in scaled {
+                    let values = &values[block * BLOCK..][..sums.len()];
+                    for i in 0..sums.len() {
+                        sums[i] += scale * values[i];
+                    }
+                }
+            },
+        );
+    }
+}
 
 fn add_scaled(values: &[f32], scale: f64, sums: &mut [f64]) {
     if scale == 0.0 {
