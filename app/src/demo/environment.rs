@@ -12,7 +12,7 @@ use lookalike::{
     image::Image,
     math::{
         Rgb, Vec3,
-        elementary::{acos, atan2, exp, sin_cos},
+        elementary::{acos, atan2, exp_bounded, sin_cos},
         narrow,
     },
 };
@@ -77,10 +77,10 @@ fn outdoors(d: Vec3) -> Rgb {
 
 /// A gradient from the pale horizon to the blue zenith, a glow around the sun, and the sun with its soft edge.
 fn sky(d: Vec3, elevation: f64) -> Rgb {
-    let haze = exp(-elevation / 0.32);
+    let haze = exp_bounded(-elevation / 0.32);
     let gradient = ZENITH + (HORIZON - ZENITH) * haze;
     let angle = acos(d.dot(sun_direction()));
-    let glow = Rgb::new(1.0, 0.78, 0.48) * (1.1 * exp(-angle / 0.14));
+    let glow = Rgb::new(1.0, 0.78, 0.48) * (1.1 * exp_bounded(-angle / 0.14));
     let disc = SUN * (1.0 - smooth_step(SUN_RADIUS - SUN_EDGE, SUN_RADIUS + SUN_EDGE, angle));
     gradient + glow + disc
 }
@@ -89,7 +89,7 @@ fn sky(d: Vec3, elevation: f64) -> Rgb {
 fn ground(d: Vec3) -> Rgb {
     let distance = pavilion::FLOOR / d.y;
     let (x, z) = (distance * d.x, distance * d.z);
-    let haze = 1.0 - exp(-distance / 90.0);
+    let haze = 1.0 - exp_bounded(-distance / 90.0);
     let surface = if z < TERRACE_END {
         let joint = (x / 0.9 - (x / 0.9).floor() < 0.05) || (z / 0.9 - (z / 0.9).floor() < 0.05);
         Rgb::new(0.95, 0.86, 0.72) * if joint { 0.6 } else { 1.0 }

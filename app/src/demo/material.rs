@@ -25,6 +25,7 @@ pub const DESCRIPTION: &str = "pearl paint under lacquer: two GGX lobes, a clear
 pub struct Target;
 
 impl Reflectance for Target {
+    #[inline(always)]
     fn eval_cos(&self, wi_local: Vec3, wo_local: Vec3) -> Rgb {
         eval(wi_local, wo_local) * wi_local.z.max(0.0)
     }
@@ -35,13 +36,11 @@ impl Reflectance for Target {
 }
 
 /// The BRDF in 1/sr, without the cosine, for unit directions that point away from the surface, in the frame whose +Z is the
-/// normal. Zero if either direction lies at or below the surface.
+/// normal. Zero if either direction lies at or below the surface. In straight-line code, for loops over directions.
 #[must_use]
+#[inline(always)]
 pub fn eval(wi_local: Vec3, wo_local: Vec3) -> Rgb {
     let (cos_i, cos_o) = (wi_local.z, wo_local.z);
-    if cos_i <= 0.0 || cos_o <= 0.0 {
-        return Rgb::ZERO;
-    }
     let sum = wi_local + wo_local;
     let half = sum.normalize();
     let cos_d = wo_local.dot(half).clamp(0.0, 1.0);
@@ -49,7 +48,8 @@ pub fn eval(wi_local: Vec3, wo_local: Vec3) -> Rgb {
 
     let pigment = PIGMENT.iter().fold(Rgb::ZERO, |total, p| total + p.weight * lobe(p.alpha, p.f0));
     let passed = (1.0 - fresnel(COAT_F0, cos_i)) * (1.0 - fresnel(COAT_F0, cos_o));
-    lobe(COAT_ALPHA, COAT_F0) + passed * (pigment + diffuse(cos_i, cos_o, wi_local.dot(wo_local)))
+    let value = lobe(COAT_ALPHA, COAT_F0) + passed * (pigment + diffuse(cos_i, cos_o, wi_local.dot(wo_local)));
+    if cos_i > 0.0 && cos_o > 0.0 { value } else { Rgb::ZERO }
 }
 
 /// One of the lobes below the lacquer.
@@ -60,6 +60,7 @@ struct Pigment {
 }
 
 /// The coloured diffuse part, with its retro-reflection.
+#[inline(always)]
 fn diffuse(cos_i: f64, cos_o: f64, cos_between: f64) -> Rgb {
     let towards = (0.5 * (1.0 + cos_between)).max(0.0);
     let squared = towards * towards;
@@ -69,6 +70,7 @@ fn diffuse(cos_i: f64, cos_o: f64, cos_between: f64) -> Rgb {
 }
 
 /// D V of GGX with height-correlated Smith masking.
+#[inline(always)]
 fn microfacets(alpha: f64, cos_h: f64, cos_i: f64, cos_o: f64) -> f64 {
     let a2 = alpha * alpha;
     let d = (1.0 - cos_h) * (1.0 + cos_h) + a2 * cos_h * cos_h;
@@ -78,6 +80,7 @@ fn microfacets(alpha: f64, cos_h: f64, cos_i: f64, cos_o: f64) -> f64 {
 }
 
 /// Schlick's Fresnel term.
+#[inline(always)]
 fn fresnel(f0: Rgb, cos: f64) -> Rgb {
     f0 + (Rgb::ONE - f0) * fifth_power(1.0 - cos)
 }

@@ -3,7 +3,7 @@
 use super::sky::{smooth_step, sun_direction};
 use lookalike::math::{
     Rgb, Vec3, cell,
-    elementary::exp,
+    elementary::exp_bounded,
     sampling::{key, uniform},
 };
 use std::f64::consts::PI;
@@ -138,7 +138,7 @@ fn corner_shade(p: Vec3) -> f64 {
     let near = |x: f64, low: f64, high: f64| {
         let distance = (x - low).min(high - x).max(0.0);
         // The wall on which the point lies does not count.
-        if distance < 1e-9 { 1.0 } else { 1.0 - 0.45 * exp(-distance / 0.3) }
+        if distance < 1e-9 { 1.0 } else { 1.0 - 0.45 * exp_bounded(-distance / 0.3) }
     };
     near(p.x, LOW.x, HIGH.x) * near(p.y, LOW.y, HIGH.y) * near(p.z, LOW.z, HIGH.z)
 }

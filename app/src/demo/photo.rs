@@ -14,6 +14,7 @@ use lookalike::{
         frame::Frame,
         narrow,
         sampling::{key, uniform},
+        simd,
     },
     render::{
         cut::{Band, Cut},
@@ -65,10 +66,17 @@ fn radiance_at(geometry: &Geometry, column: usize, row: usize, cut: &mut Cut<'_>
     cut.refine(&point, 0.0, Band::Glossy(sharpest, 1.0, Tail::Short), TOLERANCE);
     let frame = Frame::from_normal(point.normal);
     let wo = frame.to_local(point.view);
-    let reflected = cut
-        .directions()
-        .map(|(direction, energy): (Vec3, Rgb)| energy * Target.eval_cos(frame.to_local(direction).normalize(), wo));
-    reflected.sum()
+    let lights: Vec<(Vec3, Rgb)> = cut.directions().collect();
+    let mut reflected = vec![Rgb::ZERO; lights.len()];
+    simd::dispatch(
+        #[inline(always)]
+        || {
+            for (out, &(direction, energy)) in reflected.iter_mut().zip(&lights) {
+                *out = energy * Target.eval_cos(frame.to_local(direction).normalize(), wo);
+            }
+        },
+    );
+    reflected.iter().sum()
 }
 
 /// Gaussian noise whose variance is a constant plus a part that grows with radiance.

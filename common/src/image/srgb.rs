@@ -1,6 +1,6 @@
 //! The sRGB transfer function (IEC 61966-2-1:1999), between display codes in [0, 1] and linear values in [0, 1].
 
-use crate::math::elementary::pow;
+use crate::math::elementary::{pow, pow_positive};
 
 /// The linear value of a display code. `code` in [0, 1] gives [0, 1]; other values continue the two branches.
 #[must_use]
@@ -11,7 +11,7 @@ pub fn to_linear(code: f64) -> f64 {
 /// The display code of a linear value. `linear` in [0, 1] gives [0, 1]; other values continue the two branches.
 #[must_use]
 pub fn from_linear(linear: f64) -> f64 {
-    if linear <= 0.003_130_8 { linear * 12.92 } else { 1.055 * pow(linear, 1.0 / 2.4) - 0.055 }
+    if linear <= 0.003_130_8 { linear * 12.92 } else { 1.055 * pow_positive(linear, 1.0 / 2.4) - 0.055 }
 }
 
 /// The nearest 8-bit code of a linear value, after clamping to [0, 1]. NaN gives 0; writers reject it before.

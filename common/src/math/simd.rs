@@ -40,7 +40,7 @@ pub fn has_levels() -> bool {
 /// Runs a loop at the current level. The loop and the functions it calls should be `#[inline(always)]`: code that is not
 /// inlined is compiled for the baseline.
 #[inline(always)]
-pub(crate) fn dispatch<Op: WithSimd>(op: Op) -> Op::Output {
+pub fn dispatch<Op: WithSimd>(op: Op) -> Op::Output {
     match level() {
         Level::Detected => Arch::new().dispatch(op),
         Level::Baseline => op.with_simd(Scalar),
