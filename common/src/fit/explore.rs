@@ -14,11 +14,15 @@ use crate::{
 };
 use std::ops::ControlFlow;
 
-/// Most evaluations of CSSIM on the coarse picture by the search that continues from the best trial.
+/// Most evaluations of CSSIM on the coarse picture by the searches that continue from the best trials.
 pub(crate) const MAX_EXPLORATIONS: usize = 300;
 
 /// Most evaluations of the trial from each start.
 const TRIAL: usize = 80;
+
+/// Trials that are continued: a sharp lobe may look worse at first than the wide lobe that it is better than in the end (specular red phenolic under
+/// Eucalyptus Grove: .2393 against .2339 after the trials, .2246 against .2322 at the end).
+const CONTINUED: usize = 2;
 
 /// The lobes that are tried in addition to the winner's, as widths of GGX.
 const WIDTHS: [f64; 2] = [0.03, 0.1];
@@ -57,7 +61,7 @@ pub(crate) fn most_evaluations(starts: usize, max_evaluations: usize) -> usize {
     starts * max_evaluations.min(TRIAL) + max_evaluations
 }
 
-/// Searches from every start for a while and continues from the result of lowest score, the first of equal ones.
+/// Searches from every start for a while, continues from the best results, and returns the one of lowest score, the first of equal ones.
 ///
 /// # Errors
 /// When no start can be rendered and scored.
@@ -69,24 +73,24 @@ pub(crate) fn explore(
     observe: &mut dyn FnMut(&Progress<'_>) -> ControlFlow<()>,
 ) -> Result<Polished, SearchError> {
     let score = |p: &Polished| judges.by.pick(p.cssim, p.cssim_object);
-    let (mut best, mut failure, mut evaluations) = (None::<Polished>, SearchError::NoParameters, 0);
-    for start in starts {
-        match polish(view, judges, std::slice::from_ref(start), max_evaluations.min(TRIAL), observe) {
-            Ok(found) => {
-                evaluations += found.evaluations;
-                if best.as_ref().is_none_or(|best| score(&found) < score(best)) {
-                    best = Some(found);
-                }
-            }
+    let mut search =
+        |start: Vec<f64>, evaluations| polish(view, judges, &[start], max_evaluations.min(evaluations), &mut *observe);
+    let trials: Vec<_> = starts.iter().map(|start| search(start.clone(), TRIAL)).collect();
+    let (mut found, mut failure) = (Vec::new(), SearchError::NoParameters);
+    for trial in trials {
+        match trial {
+            Ok(trial) => found.push(trial),
             Err(error) => failure = error,
         }
     }
-    let best = best.ok_or(failure)?;
-    if best.termination != Termination::MaxEvaluations {
-        return Ok(Polished { evaluations, ..best });
+    let mut evaluations = found.iter().map(|trial| trial.evaluations).sum();
+    found.sort_by(|a, b| score(a).total_cmp(&score(b)));
+    for trial in found.iter_mut().take(CONTINUED).filter(|trial| trial.termination == Termination::MaxEvaluations) {
+        *trial = search(trial.parameters.clone(), max_evaluations / CONTINUED)?;
+        evaluations += trial.evaluations;
     }
-    let found = polish(view, judges, &[best.parameters], max_evaluations, observe)?;
-    Ok(Polished { evaluations: evaluations + found.evaluations, ..found })
+    let best = found.into_iter().min_by(|a, b| score(a).total_cmp(&score(b))).ok_or(failure)?;
+    Ok(Polished { evaluations, ..best })
 }
 
 /// The span of widths whose lobes differ visibly on a coarse picture; `None` for a model without widths.
