@@ -12,7 +12,7 @@ use std::{hint::black_box, ops::ControlFlow, sync::Arc, time::Instant};
 use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_main};
 use lookalike::{
     brdf::{Ggx, LinearModel, Material, Tail},
-    fit::{Candidate, FullView, JudgedBy, Judges, Method, Objective, ScannedTable, polish, search_gamma},
+    fit::{Candidate, FullView, JudgedBy, Judges, Limits, Method, Objective, ScannedTable, polish, search_gamma},
     image::Image,
     light::{Environment, LightDistribution},
     math::{Rgb, Vec3, luminance, narrow, to_f32},
@@ -195,7 +195,7 @@ fn full_image(criterion: &mut Criterion, study: &Study) {
     group.bench_function("table of 256 x 256 pixels", |b| b.iter(integrate));
     group.bench_function("polish, at most 100 evaluations", |b| {
         let starts = [start.to_vec()];
-        b.iter(|| polish(&view, judges, &starts, 100, &mut |_| ControlFlow::Continue(())));
+        b.iter(|| polish(&view, judges, &starts, Limits::of_polish(100), &mut |_| ControlFlow::Continue(())));
     });
     group.finish();
 }

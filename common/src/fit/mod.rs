@@ -31,7 +31,7 @@ pub use method::{
     UnknownIntegration, gamma_range,
 };
 pub use objective::Objective;
-pub use polish::{Judges, MAX_EVALUATIONS, Polished, polish};
+pub use polish::{Judges, Limits, MAX_EVALUATIONS, Polished, polish};
 pub use stage_one::{ScannedTable, SearchFailure, search_gamma};
 pub use stage_two::{FullView, Judged, judge_candidates, winner};
 pub use uncertainty::{LARGEST_SHARE, Uncertainty};

@@ -23,6 +23,23 @@ use std::ops::ControlFlow;
 /// Most evaluations of CSSIM.
 pub const MAX_EVALUATIONS: usize = 500;
 
+/// When a search on CSSIM ends.
+#[derive(Debug, Clone, Copy)]
+pub struct Limits {
+    /// Most evaluations.
+    pub evaluations: usize,
+    /// Decrease of CSSIM below which two iterations in a row end the search.
+    pub tolerance: f64,
+}
+
+impl Limits {
+    /// Limits of polish.
+    #[must_use]
+    pub fn of_polish(evaluations: usize) -> Self {
+        Self { evaluations, tolerance: QuasiNewtonOptions::default().function_tolerance }
+    }
+}
+
 /// The outcome of stage three.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Polished {
@@ -62,7 +79,7 @@ pub fn polish(
     view: &FullView<'_>,
     judges: Judges<'_>,
     starts: &[Vec<f64>],
-    max_evaluations: usize,
+    limits: Limits,
     observe: &mut dyn FnMut(&Progress<'_>) -> ControlFlow<()>,
 ) -> Result<Polished, SearchError> {
     let (bounds, table_is_tighter) = polish_bounds(view)?;
@@ -78,8 +95,9 @@ pub fn polish(
     };
     let (start, compared) =
         best_start(starts, &bounds, |start| report(start).map_or(f64::NAN, |score| picked(&score)))?;
-    let max_evaluations = max_evaluations.saturating_sub(compared).max(1);
-    let options = QuasiNewtonOptions { max_evaluations, ..QuasiNewtonOptions::default() };
+    let max_evaluations = limits.evaluations.saturating_sub(compared).max(1);
+    let function_tolerance = limits.tolerance;
+    let options = QuasiNewtonOptions { max_evaluations, function_tolerance, ..QuasiNewtonOptions::default() };
     let minimum = quasi_newton::minimise(objective, &start, &bounds, &options, observe)?;
     let mut score = report(&minimum.point)?;
     let mut point = minimum.point;

@@ -2,7 +2,7 @@
 
 use super::view::Scene;
 use crate::{
-    fit::polish,
+    fit::{Limits, polish},
     graph::{Blob, NodeFailure, NodeType, RunContext},
     nodes::wire::{PolishedWire, check_parameters, read, write},
 };
@@ -33,8 +33,8 @@ impl NodeType for Polish {
             if context.is_cancelled() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         };
         let searching = scene.view.searching()?;
-        let (view, limit) = (scene.full(), max_evaluations as usize);
-        let polished = polish(&view, scene.view.judges(&searching), &starts, limit, &mut observe)
+        let (view, limits) = (scene.full(), Limits::of_polish(max_evaluations as usize));
+        let polished = polish(&view, scene.view.judges(&searching), &starts, limits, &mut observe)
             .map_err(|error| NodeFailure::new(format!("polish: {error}")))?;
         // A cancelled search has no result.
         context.check()?;

@@ -117,7 +117,8 @@ impl TransportTable {
         for (basis, table) in model.lobes().iter().zip(&self.lobes) {
             let (first, coefficients) = slice_weights(table, basis.width_at(parameters));
             for (t, plane) in planes.by_ref().take(table.terms).enumerate() {
-                let slice = |k: usize| &table.values[((first + k) * table.terms + t) * 3 * self.pixels..][..plane.len()];
+                let slice =
+                    |k: usize| &table.values[((first + k) * table.terms + t) * 3 * self.pixels..][..plane.len()];
                 let slices: Vec<(&[f32], f32)> =
                     coefficients.iter().enumerate().map(|(k, &c)| (slice(k), to_f32(c))).collect();
                 sum_of(&slices, plane);

@@ -2,7 +2,7 @@
 
 use super::scene::{Bench, capture, method};
 use crate::{
-    fit::{FullView, JudgedBy, Judges, MAX_EVALUATIONS, polish},
+    fit::{FullView, JudgedBy, Judges, Limits, MAX_EVALUATIONS, polish},
     graph::{Blob, NodeSpec},
     metric::{Judge, JudgeOptions},
     nodes::wire::{PolishedWire, read, write},
@@ -41,7 +41,7 @@ fn polish_starts_from_the_best_and_never_ends_worse_on_its_table() {
     for starts in [vec![near.clone()], vec![far.clone(), near.clone()], vec![near.clone(), far]] {
         for limit in [3, 60] {
             let mut observe = |_: &crate::search::Progress<'_>| ControlFlow::Continue(());
-            let found = polish(&view, judges, &starts, limit, &mut observe).unwrap();
+            let found = polish(&view, judges, &starts, Limits::of_polish(limit), &mut observe).unwrap();
             assert!(found.cssim <= score(&near) && found.evaluations <= limit, "{starts:?} {limit}: {found:?}");
             assert_eq!(found.cssim, score(&found.parameters));
         }
