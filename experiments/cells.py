@@ -37,7 +37,9 @@ def main():
         if not exr.exists():
             table, part = options.work / f"{material}.binary", exr.with_suffix(".part.exr")
             if not table.exists():
-                run(sys.executable, options.make_merl, options.data / f"materials/{material}.nbrdf.json", table)
+                written = table.with_suffix(".part")
+                run(sys.executable, options.make_merl, options.data / f"materials/{material}.nbrdf.json", written)
+                written.rename(table)
             env = options.data / "probes" / PROBES[light]
             run(options.lookalike, "render", "--brdf", table, "--env", env, "--size", 128, "--samples", 1024, "--out", part)
             part.rename(exr)

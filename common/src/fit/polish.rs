@@ -95,6 +95,7 @@ pub fn polish(
     };
     let (start, compared) =
         best_start(starts, &bounds, |start| report(start).map_or(f64::NAN, |score| picked(&score)))?;
+    judges.reporting.free_buffers();
     let max_evaluations = limits.evaluations.saturating_sub(compared).max(1);
     let function_tolerance = limits.tolerance;
     let options = QuasiNewtonOptions { max_evaluations, function_tolerance, ..QuasiNewtonOptions::default() };

@@ -14,7 +14,7 @@ use crate::{
 use rayon::prelude::*;
 use std::{
     collections::VecDeque,
-    sync::{Arc, Mutex, PoisonError},
+    sync::{Arc, Mutex, MutexGuard, PoisonError},
 };
 
 /// Renders full images from parameters.
@@ -75,8 +75,8 @@ impl FullView<'_> {
 /// Basis integrals at some widths: of every shard, `term x channel x pixel`.
 type Terms = Vec<Vec<f32>>;
 
-/// Renders a sequence of images of one view, of which many have the same widths. It keeps the integrals at the last widths; the images are those of
-/// [`FullView::render`].
+/// Renders a sequence of images of one view, of which many have the same widths. It keeps the integrals at the widths used last. The images
+/// are those of [`FullView::render`].
 #[derive(Debug)]
 pub(super) struct Renderer<'a> {
     view: &'a FullView<'a>,
@@ -87,27 +87,35 @@ pub(super) struct Renderer<'a> {
 type Widths = Vec<Option<f64>>;
 
 impl<'a> Renderer<'a> {
-    /// Widths that are kept: of the incumbent, and of a step from it.
-    const KEPT: usize = 2;
-
     pub(super) fn new(view: &'a FullView<'a>) -> Self {
         Self { view, kept: Mutex::default() }
     }
 
     pub(super) fn render(&self, parameters: &[f64]) -> Image {
         let widths: Widths = self.view.model.lobes().iter().map(|basis| basis.width_at(parameters)).collect();
-        let lock = || self.kept.lock().unwrap_or_else(PoisonError::into_inner);
-        let known = lock().iter().find(|(kept, _)| *kept == widths).map(|(_, terms)| Arc::clone(terms));
-        let terms = known.unwrap_or_else(|| {
-            let terms = Arc::new(self.view.terms(parameters));
-            let mut kept = lock();
-            kept.push_back((widths, Arc::clone(&terms)));
-            if kept.len() > Self::KEPT {
-                kept.pop_front();
-            }
-            terms
-        });
+        let terms = self.known(&widths).unwrap_or_else(|| Arc::new(self.view.terms(parameters)));
+        self.keep(widths, Arc::clone(&terms));
         self.view.image(&terms, parameters)
+    }
+
+    fn known(&self, widths: &Widths) -> Option<Arc<Terms>> {
+        let kept = self.lock();
+        kept.iter().find(|(kept, _)| kept == widths).map(|(_, terms)| Arc::clone(terms))
+    }
+
+    /// Keeps integrals as those used last. A gradient needs those of the incumbent and, for each width, those of a step.
+    fn keep(&self, widths: Widths, terms: Arc<Terms>) {
+        let most = 1 + widths.iter().flatten().count();
+        let mut kept = self.lock();
+        kept.retain(|(known, _)| *known != widths);
+        kept.push_back((widths, terms));
+        if kept.len() > most {
+            kept.pop_front();
+        }
+    }
+
+    fn lock(&self) -> MutexGuard<'_, VecDeque<(Widths, Arc<Terms>)>> {
+        self.kept.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 

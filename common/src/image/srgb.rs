@@ -11,7 +11,12 @@ pub fn to_linear(code: f64) -> f64 {
 /// The display code of a linear value. `linear` in [0, 1] gives [0, 1]; other values continue the two branches.
 #[must_use]
 pub fn from_linear(linear: f64) -> f64 {
-    if linear <= 0.003_130_8 { linear * 12.92 } else { 1.055 * pow_positive(linear, 1.0 / 2.4) - 0.055 }
+    const EXPONENT: f64 = 1.0 / 2.4;
+    if linear > 0.003_130_8 {
+        1.055 * if linear <= 1.0 { pow_positive(linear, EXPONENT) } else { pow(linear, EXPONENT) } - 0.055
+    } else {
+        linear * 12.92
+    }
 }
 
 /// The nearest 8-bit code of a linear value, after clamping to [0, 1]. NaN gives 0; writers reject it before.
@@ -46,5 +51,7 @@ mod tests {
         }
         assert_eq!(to_code(f64::INFINITY), 255);
         assert_eq!(to_code(-1.0), 0);
+        assert_eq!(to_code(f64::NAN), 0);
+        assert!(from_linear(f64::NAN).is_nan() && from_linear(f64::INFINITY) == f64::INFINITY);
     }
 }

@@ -65,7 +65,7 @@ pub fn central_check(position: f64) -> [f64; STENCIL] {
     [0.0, a, b, c, d, 0.0]
 }
 
-/// The first of six values around `position`, their weights for the value there, and those of [`central_check`]; as [`stencil`].
+/// As [`stencil`], without slopes and with the weights of [`central_check`]: the first value, the weights, those of the check.
 #[must_use]
 #[inline]
 pub fn checked(position: f64, count: usize) -> (usize, [f64; STENCIL], [f64; STENCIL]) {

@@ -97,7 +97,7 @@ impl Compression {
     fn power_of(&self, x: f64) -> f64 {
         if self.exponent == 1.0 {
             x
-        } else if (f64::MIN_POSITIVE..=f64::MAX).contains(&x) {
+        } else if self.exponent < 1.0 && (f64::MIN_POSITIVE..=f64::MAX).contains(&x) {
             pow_positive(x, self.exponent)
         } else {
             pow(x, self.exponent)
@@ -166,6 +166,8 @@ mod tests {
         assert!((white - 2.0).abs() < 1e-14 && slope == 0.0);
         assert_eq!(Compression::clamped(2.0).apply(f64::INFINITY), f64::INFINITY);
         assert!(Compression::clamped(2.0).apply(f64::NAN).is_nan());
+        assert_eq!(Compression::clamped(0.01).apply(1e4), f64::INFINITY);
+        assert_eq!(Compression::clamped(0.5).apply(3.0), 9.0);
         assert_eq!(Compression::logarithm(100.0).apply(0.0), 0.0);
         assert!((Compression::logarithm(100.0).apply(1.0) - 2.0_f64.ln()).abs() < 1e-15);
         assert_eq!(Compression::clamped(2.0).apply_with_slope(-1.0), (0.0, 0.0));

@@ -53,7 +53,9 @@ impl NodeType for BruteForce {
                 if (scene.geometry.width(), scene.geometry.height()) != (view.width, view.height) {
                     return Err(NodeFailure::new("the direct integrator's scene has another size than the view"));
                 }
-                search(&parameters, &view, context, &|point| direct_image(&view, &scene, point))?
+                let outcome = search(&parameters, &view, context, &|point| direct_image(&view, &scene, point));
+                view.judge.free_buffers();
+                outcome?
             }
         };
         // A cancelled search has no result.

@@ -61,7 +61,8 @@ const GAUSS: [f64; 2] = [-0.288_675_134_594_812_9, 0.288_675_134_594_812_9];
 /// Largest turn of the normal over a part, in widths of the lobe: the error stays below 2e-3 of its peak (see the test).
 const LARGEST_TURN: f64 = 0.4;
 
-/// The same for two positions of the quadrature rule in place of a part: their error is a smaller share of the fourth derivative.
+/// The same for two positions of the quadrature rule in place of a part. Their error is `h^4 f'''' / 4320` instead of `/ 1920`, so the turn
+/// may be a third larger within the same 2e-3.
 const LARGEST_TURN_OF_POSITIONS: f64 = 0.53;
 
 /// Most parts along a side of a pixel.
@@ -111,7 +112,7 @@ mod tests {
     #[test]
     fn the_mean_of_a_lobe_is_within_a_five_hundredth_of_its_peak() {
         const TOLERANCE: f64 = 2e-3;
-        for q in [0.05, 0.3, 0.39, 0.41, 0.79, 0.99, 1.4, 1.9, 2.39] {
+        for q in [0.05, 0.3, 0.39, 0.41, 0.52, 0.79, 0.99, 1.05, 1.4, 1.58, 1.9, 2.39] {
             let lobe = |x: f64| 1.0 / ((1.0 + x * x) * (1.0 + x * x));
             // Second derivative by the lobe's variable.
             let bend = |x: f64| (20.0 * x * x - 4.0) / (1.0 + x * x).powi(4);
@@ -138,8 +139,9 @@ mod tests {
             ([0.41, 0.1], 1.0, 2),
             ([0.41, 1.3], 1.0, 8),
             // Positions instead of parts: along one axis, along both.
-            ([0.41, 0.1], 0.15, 4),
-            ([0.41, 0.2], 0.15, 8),
+            ([0.41, 0.1], 0.15, 2),
+            ([0.41, 0.2], 0.15, 4),
+            ([1.2, 0.2], 0.15, 12),
         ];
         for (turns, most, count) in cases {
             let parts = parts(turns, 1.0, most);

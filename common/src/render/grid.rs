@@ -164,6 +164,13 @@ mod tests {
     }
 
     #[test]
+    fn places_wrap_around_the_ring() {
+        for count in [1, 12, 13, 100] {
+            assert!((0..4 * count).all(|place| wrapped(place, count) == place % count));
+        }
+    }
+
+    #[test]
     fn nodes_are_visible_points_and_their_own_stencils() {
         for viewpoint in viewpoints() {
             let grid = Grid::new(viewpoint, 0.1);

@@ -1,7 +1,7 @@
 //! A transport table: the basis integrals of a list of pixels on a grid of lobe widths, and the radiance computed from them.
 //!
-//! `B[p] = sum_t weight_t(parameters) * T_t[p](width)`: see [`crate::brdf`]. Values are stored in `f32`, sums are `f64` in a
-//! fixed order.
+//! `B[p] = sum_t weight_t(parameters) * T_t[p](width)`: see [`crate::brdf`]. Values are stored in `f32`. Sums are `f64` in
+//! stage one and `f32` for full images, in a fixed order.
 
 use super::knots::Knots;
 use crate::{
@@ -108,12 +108,12 @@ impl TransportTable {
         }
     }
 
-    /// The basis integrals at the widths of a parameter vector, `term x channel x pixel`, in single precision: what images of other weights
-    /// are summed from.
+    /// The basis integrals at the widths of a parameter vector, `term x channel x pixel`, in single precision. Images of any weights are
+    /// sums of these.
     #[must_use]
     pub fn terms_single(&self, model: &dyn Model, parameters: &[f64]) -> Vec<f32> {
         let mut out = vec![0.0; term_count(model) * 3 * self.pixels];
-        let mut planes = out.chunks_exact_mut(3 * self.pixels);
+        let mut planes = out.chunks_exact_mut((3 * self.pixels).max(1));
         for (basis, table) in model.lobes().iter().zip(&self.lobes) {
             let (first, coefficients) = slice_weights(table, basis.width_at(parameters));
             for (t, plane) in planes.by_ref().take(table.terms).enumerate() {
@@ -164,7 +164,7 @@ impl TransportTable {
 /// Pixels whose sums stay in the first-level cache while all layers are added.
 const BLOCK: usize = 1024;
 
-/// Fills `sums` with the sum of scaled slices, which are as long, in their order.
+/// Sets `sums` to the sum of the scaled slices, added in their order. Every slice is as long as `sums`.
 fn sum_of(scaled: &[(&[f32], f32)], sums: &mut [f32]) {
     for (block, sums) in sums.chunks_mut(BLOCK).enumerate() {
         simd::dispatch(

@@ -2,7 +2,8 @@
 
 use super::scene::{Bench, capture, method};
 use crate::{
-    fit::{FullView, JudgedBy, Judges, Limits, MAX_EVALUATIONS, polish},
+    brdf::flat_bounds,
+    fit::{FullView, JudgedBy, Judges, Limits, MAX_EVALUATIONS, polish, stage_two::Renderer},
     graph::{Blob, NodeSpec},
     metric::{Judge, JudgeOptions},
     nodes::wire::{PolishedWire, read, write},
@@ -44,6 +45,50 @@ fn polish_starts_from_the_best_and_never_ends_worse_on_its_table() {
             let found = polish(&view, judges, &starts, Limits::of_polish(limit), &mut observe).unwrap();
             assert!(found.cssim <= score(&near) && found.evaluations <= limit, "{starts:?} {limit}: {found:?}");
             assert_eq!(found.cssim, score(&found.parameters));
+        }
+    }
+}
+
+/// Integrals that are kept from an earlier image, of the same widths or of others, change no bit.
+#[test]
+fn images_of_a_sequence_are_those_of_single_renderings() {
+    let capture = capture("ggx", &MATERIAL, 0.05);
+    let (width, height) = (capture.photo().width(), capture.photo().height());
+    let coverage = capture.scoring_coverage();
+    let places = (0..width * height).filter(|&i| coverage[i] > 0.0).map(|i| [i % width, i / width]);
+    let pixels: Vec<Pixel> = places.map(|place| place.map(|x| u32::try_from(x).unwrap())).collect();
+    let pyramid = LightPyramid::new((**capture.environment()).clone());
+    // One width, and two.
+    for name in ["ggx", "disney"] {
+        let model = crate::brdf::model(name).unwrap();
+        let plan = TransportPlan { model, knots: Knots::covering(0.1, 0.4, 5.0), accuracy: Accuracy::COARSE };
+        let shards = pixels.chunks(pixels.len() / 2 + 1);
+        let table: Vec<_> = shards.map(|shard| Arc::new(plan.integrate(capture.geometry(), &pyramid, shard))).collect();
+        let view = FullView { model, table: &table, pixels: &pixels, coverage: &coverage, stride: 1, width, height };
+        let renderer = Renderer::new(&view);
+        let (lower, upper) = flat_bounds(model.parameters());
+        let last = lower.len() - 1;
+        // The entry that is moved, from the first point on: a weight, the first width of `disney`, the last width.
+        for (entry, share) in [(0, 0.3), (0, 0.4), (last, 0.2), (6, 0.5), (0, 0.3), (last, 0.3), (last, 0.2), (0, 0.1)]
+        {
+            let mut point: Vec<f64> = lower.iter().zip(&upper).map(|(l, u)| l + 0.35 * (u - l)).collect();
+            point[entry] = lower[entry] + share * (upper[entry] - lower[entry]);
+            let image = view.render(&point);
+            assert_eq!(renderer.render(&point), image);
+            let mut exact = crate::render::table::Planes::default();
+            for shard in &table {
+                let mut planes = shard.planes();
+                shard.radiance(model, &point, &mut planes);
+                exact.iter_mut().zip(planes).for_each(|(all, plane)| all.extend(plane));
+            }
+            for (k, &[column, row]) in pixels.iter().enumerate() {
+                let place = row as usize * width + column as usize;
+                for (channel, exact) in exact.iter().enumerate() {
+                    let exact = exact[k] * f64::from(coverage[place]);
+                    let found = f64::from(image.pixels()[place][channel]);
+                    assert!((found - exact).abs() < 3e-6 * exact.abs() + 1e-9, "{name} {point:?}: {found} {exact}");
+                }
+            }
         }
     }
 }

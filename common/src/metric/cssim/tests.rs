@@ -90,6 +90,9 @@ fn single_precision_is_exact_enough_for_a_search() {
         let (image, _) = framed(&plastic(alpha), 120, 100, (20, 10));
         let [exact, found] = [double.score(&image).unwrap(), single.score(&image).unwrap()];
         // A buffer that another image has used changes no bit.
+        assert_eq!(judge(&reference, &coverage, Lanes::Detected).score(&image).unwrap(), exact);
+        double.free_buffers();
+        assert_eq!(double.score(&image).unwrap(), exact);
         assert_eq!((plain.score(&image).unwrap(), single.score(&image).unwrap()), (found, found));
         let scores = [(exact.cssim, found.cssim), (exact.cssim_object, found.cssim_object)];
         assert!(scores.iter().all(|(e, f)| (e - f).abs() < 2e-6), "{alpha}: {exact:?} {found:?}");
