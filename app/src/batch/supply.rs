@@ -166,7 +166,10 @@ impl Parts for Supply {
         self.give_up(part.number, &failure.to_string())
     }
 
-    fn newly_safe(&mut self) -> Vec<u32> {
+    fn newly_safe(&mut self, is_last: bool) -> Vec<u32> {
+        if is_last {
+            self.writers.backlog().wait_until(|load| load.fits == 0);
+        }
         self.writers.newly_safe()
     }
 }

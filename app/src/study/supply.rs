@@ -345,7 +345,7 @@ impl Parts for Supply {
         Ok(())
     }
 
-    fn newly_safe(&mut self) -> Vec<u32> {
+    fn newly_safe(&mut self, _is_last: bool) -> Vec<u32> {
         std::mem::take(&mut self.safe)
     }
 }

@@ -92,8 +92,10 @@ pub trait Parts {
     fn failed(&mut self, part: Part<Self::Planner>, failure: PartFailure) -> Result<(), PlanError>;
 
     /// The parts that have become safe since the last call: they have completed and will not run again, even if this run is resumed. The
-    /// outputs that only they needed are forgotten.
-    fn newly_safe(&mut self) -> Vec<u32> {
+    /// outputs that only they needed are forgotten. With `is_last`, all parts have ended: the call must block until it is known of each
+    /// completed part whether it is safe.
+    fn newly_safe(&mut self, is_last: bool) -> Vec<u32> {
+        let _ = is_last;
         Vec::new()
     }
 }
@@ -120,10 +122,18 @@ impl<S: Parts> Many<S> {
 
     /// Forget outputs that will not be needed again, and start parts while the workers need more nodes.
     fn start_more(&mut self, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
-        for number in self.parts.newly_safe() {
+        self.settle(false, graph);
+        self.start_parts(graph)?;
+        if self.is_exhausted && self.active.is_empty() {
+            self.settle(true, graph);
+        }
+        Ok(())
+    }
+
+    fn settle(&mut self, is_last: bool, graph: &mut GraphEdit<'_>) {
+        for number in self.parts.newly_safe(is_last) {
             self.sharing.settle(number, graph.graph());
         }
-        self.start_parts(graph)
     }
 
     fn start_parts(&mut self, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {

@@ -88,6 +88,8 @@ struct Bench {
     /// How many may start until the test raises it; does not apply to a part that is waited for.
     there: Option<u32>,
     safe: Vec<u32>,
+    /// Whether it was asked for the safe parts after the last one had ended.
+    is_asked_last: bool,
     ended: Vec<(String, Result<Vec<u8>, String>)>,
 }
 
@@ -131,7 +133,9 @@ impl Parts for Bench {
         if self.is_fail_fast { Err(PlanError::new("one has failed")) } else { Ok(()) }
     }
 
-    fn newly_safe(&mut self) -> Vec<u32> {
+    fn newly_safe(&mut self, is_last: bool) -> Vec<u32> {
+        assert!(!is_last || self.coming.is_empty(), "more parts come");
+        self.is_asked_last |= is_last;
         std::mem::take(&mut self.safe)
     }
 }
@@ -140,6 +144,7 @@ fn run(bench: Bench, execution: Execution) -> (Bench, Vec<Vec<u8>>) {
     let leaf = Leaf::default();
     let registry = Registry::default().with(leaf.clone());
     let parts = run_in_process(Many::new(bench), &registry, execution).unwrap().into_parts();
+    assert!(parts.is_asked_last);
     let ran = leaf.0.lock().unwrap().clone();
     (parts, ran)
 }
