@@ -92,8 +92,8 @@ pub trait Parts {
     fn failed(&mut self, part: Part<Self::Planner>, failure: PartFailure) -> Result<(), PlanError>;
 
     /// The parts that have become safe since the last call: they have completed and will not run again, even if this run is resumed. The
-    /// outputs that only they needed are forgotten. With `is_last`, all parts have ended: the call must block until it is known of each
-    /// completed part whether it is safe.
+    /// outputs that only they needed are forgotten. With `is_last`, all parts but those that stay have ended: the call must block until
+    /// it is known of each completed part whether it is safe.
     fn newly_safe(&mut self, is_last: bool) -> Vec<u32> {
         let _ = is_last;
         Vec::new()
@@ -124,7 +124,7 @@ impl<S: Parts> Many<S> {
     fn start_more(&mut self, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
         self.settle(false, graph);
         self.start_parts(graph)?;
-        if self.is_exhausted && self.active.is_empty() {
+        if self.is_exhausted && self.active.values().all(|part| part.stays) {
             self.settle(true, graph);
         }
         Ok(())
