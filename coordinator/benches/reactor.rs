@@ -25,8 +25,14 @@ impl Planner for Independent {
     fn start(&mut self, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
         (0..NODES).try_for_each(|number| {
             let (kind, label, parameters) = ("nothing".into(), format!("node {number}"), number.to_le_bytes().to_vec());
-            let spec =
-                NodeSpec { kind, label, parameters, inputs: Vec::new(), placement: Placement::Worker, priority: 0 };
+            let spec = NodeSpec {
+                kind,
+                label: label.into(),
+                parameters,
+                inputs: Vec::new(),
+                placement: Placement::Worker,
+                priority: 0,
+            };
             graph.add_node(spec).map(|_| ())
         })
     }

@@ -3,7 +3,7 @@
 use std::fmt;
 use std::time::Duration;
 
-use lookalike::graph::{FailureReason, NodeId, WorkerId};
+use lookalike::graph::{FailureReason, Label, NodeId, WorkerId};
 
 /// Why a worker has left.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -88,7 +88,7 @@ pub struct NodeName {
     /// Its kind.
     pub kind: String,
     /// Its label.
-    pub label: String,
+    pub label: Label,
     /// The number of the part that it belongs to, in a run of [`Many`](lookalike::graph::Many) planners; otherwise 0.
     pub part: u32,
 }

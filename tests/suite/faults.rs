@@ -164,7 +164,7 @@ fn nodes_that_kill_their_workers_fail_and_local_workers_are_restarted() {
     let failed: Vec<_> = events
         .iter()
         .filter_map(|event| match event {
-            RunEvent::NodeFailed { name, reason } => Some((name.label.as_str(), reason.clone())),
+            RunEvent::NodeFailed { name, reason } => Some((name.label.to_string(), reason.clone())),
             _ => None,
         })
         .collect();

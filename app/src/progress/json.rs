@@ -5,7 +5,7 @@ use super::{
     parts::{PartCount, PartEvent, Shape},
     print_line,
 };
-use lookalike::graph::split_label;
+use lookalike::graph::Label;
 use lookalike_coordinator::events::{NodeName, RunEvent, Site};
 use serde_json::{Value, json};
 use std::time::Instant;
@@ -148,7 +148,7 @@ fn of_node(noun: &str, event: &RunEvent) -> Option<Value> {
 
 /// An event of a node: number, kind, label, the fit of a batch or the cell of a study, and the rest.
 fn node(noun: &str, event: &str, name: &NodeName, rest: Value) -> Value {
-    let (part, label) = split_label(&name.label);
+    let Label { part, name: label } = &name.label;
     let mut object = json!({ "event": event, "node": name.node.0, "kind": name.kind, "label": label });
     if let Some(part) = part {
         object[noun] = json!(part);

@@ -82,7 +82,7 @@ mod tests {
         }
         let added = |label: &str, part| {
             let (node, kind) = (NodeId(7), nodes::SEARCH.to_owned());
-            RunEvent::NodeAdded { name: NodeName { node, kind, label: label.to_owned(), part } }
+            RunEvent::NodeAdded { name: NodeName { node, kind, label: label.into(), part } }
         };
         let owner = |rows: &mut Rows, event: &RunEvent| rows.note(event).map(|(number, ..)| number);
         assert_eq!(owner(&mut rows, &added("gold: gamma 1", 4)), Some(4));

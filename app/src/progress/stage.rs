@@ -136,7 +136,7 @@ mod tests {
     use std::time::Duration;
 
     fn name(node: u64, kind: &str) -> NodeName {
-        NodeName { node: NodeId(node), kind: kind.to_owned(), label: String::new(), part: 0 }
+        NodeName { node: NodeId(node), kind: kind.to_owned(), label: "".into(), part: 0 }
     }
 
     fn added(tally: &mut Tally, node: u64, kind: &str) -> (Stage, Count) {

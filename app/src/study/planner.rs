@@ -81,7 +81,7 @@ impl Planner for CellPlanner {
                 Inner::Fit(planner) => planner.work_of(node, &spec.kind),
                 Inner::Survey(planner) => planner.work_of(node, &spec.kind),
             };
-            self.work.insert(spec.label.clone(), work);
+            self.work.insert(spec.label.to_string(), work);
         }
         self.inner().completed(node, output, graph)
     }

@@ -50,7 +50,7 @@ impl Seconds {
     pub(super) fn note(&mut self, event: &RunEvent) {
         let RunEvent::NodeFinished { name, elapsed, .. } = event else { return };
         let seconds = elapsed.as_secs_f64();
-        *self.now.entry(name.label.clone()).or_default() += seconds;
+        *self.now.entry(name.label.to_string()).or_default() += seconds;
         if let Err(error) = writeln!(self.file, "{seconds}\t{}", name.label) {
             tracing::warn!("cannot write {FILE}: {error}");
         }

@@ -15,7 +15,6 @@ use thiserror::Error;
 
 use super::{
     Blob, FailureReason, GraphEdit, NodeId, NodeSpec, PlanError, Planner,
-    part_label::split_label,
     sharing::{PartId, Sharing},
 };
 
@@ -229,8 +228,8 @@ impl<S: Parts> Planner for Many<S> {
     fn failed(&mut self, node: NodeId, reason: &FailureReason, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
         let (kind, label) = graph.spec(node).map(|spec| (spec.kind.clone(), spec.label.clone())).unwrap_or_default();
         for number in self.sharing.end(node) {
-            let (kind, label) = (kind.clone(), split_label(&label).1.to_owned());
-            self.fail_part(number, PartFailure::Node { kind, label, reason: reason.clone() }, graph)?;
+            let failure = PartFailure::Node { kind: kind.clone(), label: label.name.clone(), reason: reason.clone() };
+            self.fail_part(number, failure, graph)?;
         }
         self.start_more(graph)
     }

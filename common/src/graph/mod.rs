@@ -24,9 +24,9 @@ mod edit;
 mod error;
 mod in_process;
 mod key;
+mod label;
 mod many;
 mod node;
-mod part_label;
 mod planner;
 mod registry;
 mod sharing;
@@ -40,12 +40,12 @@ pub use edit::GraphEdit;
 pub use error::PlanError;
 pub use in_process::{Execution, run_in_process};
 pub use key::NodeKey;
+pub use label::{Label, MAX_PART_NAME_BYTES};
 pub use many::{Many, Next, Part, PartFailure, Parts};
 pub use node::{
     FailureReason, Input, MAX_INPUTS, MAX_NAME_BYTES, MAX_PARAMETER_BYTES, NodeFailure, NodeId, NodeSpec, Placement,
     WorkerId,
 };
-pub use part_label::{MAX_PART_NAME_BYTES, split_label};
 pub use planner::Planner;
 pub use registry::{NodeType, Registry};
 pub use state::{Change, Completion, Graph, NodeState};

@@ -4,7 +4,7 @@ use std::fmt;
 
 use thiserror::Error;
 
-use super::BlobHash;
+use super::{BlobHash, Label};
 
 /// The longest `kind` and `label`, in bytes.
 pub const MAX_NAME_BYTES: usize = 256;
@@ -69,8 +69,8 @@ impl Input {
 pub struct NodeSpec {
     /// The name of its [`NodeType`](super::NodeType), at most [`MAX_NAME_BYTES`].
     pub kind: String,
-    /// For people, such as `search gamma 1.3`; at most [`MAX_NAME_BYTES`]. Does not affect any result.
-    pub label: String,
+    /// What it is called; at most [`MAX_NAME_BYTES`].
+    pub label: Label,
     /// Small parameters in the encoding of the node type; at most [`MAX_PARAMETER_BYTES`].
     pub parameters: Vec<u8>,
     /// Inputs in the order in which the node type receives them; at most [`MAX_INPUTS`].
@@ -149,6 +149,6 @@ pub enum FailureReason {
         /// The input that failed.
         node: NodeId,
         /// Its label.
-        label: String,
+        label: Label,
     },
 }

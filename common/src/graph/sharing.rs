@@ -3,7 +3,7 @@
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
-use super::{Blob, BlobHash, Graph, Input, NodeId, NodeSpec, Placement, PlanError, part_label::part_label};
+use super::{Blob, BlobHash, Graph, Input, NodeId, NodeSpec, Placement, PlanError};
 
 /// The number of a planner among those that share a graph.
 pub(super) type PartId = u32;
@@ -145,7 +145,7 @@ impl PartEdit<'_> {
         if let Some(node) = self.join(graph, key) {
             return Ok(node);
         }
-        let label = part_label(self.name, &spec.label);
+        let label = spec.label.clone().in_part(self.name);
         let node = graph.add_node(NodeSpec { label, priority: part, ..spec })?;
         self.sharing.by_key.insert(key, node);
         self.sharing.nodes.insert(node, Shared { key, parts: vec![part], is_notified: false });

@@ -125,7 +125,7 @@ impl Graph {
     /// If an input is unknown or was released, or a size limit is exceeded.
     pub fn add_node(&mut self, spec: NodeSpec) -> Result<NodeId, PlanError> {
         check_limit("kind", spec.kind.len(), MAX_NAME_BYTES)?;
-        check_limit("label", spec.label.len(), MAX_NAME_BYTES)?;
+        check_limit("label", spec.label.bytes(), MAX_NAME_BYTES)?;
         check_limit("parameters", spec.parameters.len(), MAX_PARAMETER_BYTES)?;
         check_limit("inputs", spec.inputs.len(), MAX_INPUTS)?;
         let Inputs { read, awaited, failed } = self.look_at_inputs(&spec)?;

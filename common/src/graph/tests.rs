@@ -68,7 +68,7 @@ impl Planner for FanOut {
 fn spec(kind: &str, parameters: &[u8], inputs: Vec<Input>) -> NodeSpec {
     let label = format!("{kind} {parameters:?}");
     let (kind, parameters) = (kind.into(), parameters.to_vec());
-    NodeSpec { kind, label, parameters, inputs, placement: Placement::Worker, priority: 0 }
+    NodeSpec { kind, label: label.into(), parameters, inputs, placement: Placement::Worker, priority: 0 }
 }
 
 fn registry() -> Registry {

@@ -199,7 +199,8 @@ impl FitPlanner {
                 let of_subset = if self.subsets.len() == 1 { String::new() } else { format!(", subset {s}") };
                 let node = graph.add_node(NodeSpec {
                     kind: nodes::SEARCH.to_owned(),
-                    label: format!("search gamma {gamma}{of_subset}{}", if again { ", with sharp lobes" } else { "" }),
+                    label: format!("search gamma {gamma}{of_subset}{}", if again { ", with sharp lobes" } else { "" })
+                        .into(),
                     parameters: encode("parameters", &parameters)?,
                     inputs: inputs.clone(),
                     placement: Placement::Worker,

@@ -56,7 +56,7 @@ impl Planner for PhotoPlanner {
         let parameters = nodes::RenderParameters { geometry, samples, seed, material };
         graph.add_node(NodeSpec {
             kind: nodes::RENDER.to_owned(),
-            label: format!("render {what}"),
+            label: format!("render {what}").into(),
             parameters: encode("parameters", &parameters)?,
             inputs,
             placement: Placement::Worker,

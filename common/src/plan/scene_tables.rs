@@ -125,7 +125,7 @@ impl SceneTables {
             };
             let spec = NodeSpec {
                 kind: kind.to_owned(),
-                label: format!("transport {what}, pixels {first} to {}", first + range.1 as usize - 1),
+                label: format!("transport {what}, pixels {first} to {}", first + range.1 as usize - 1).into(),
                 parameters: encode("parameters", &parameters)?,
                 inputs: inputs.clone(),
                 placement: Placement::Worker,
@@ -198,7 +198,7 @@ impl SceneTables {
     ) -> Result<NodeId, PlanError> {
         graph.add_node(NodeSpec {
             kind: kind.to_owned(),
-            label: label.to_owned(),
+            label: label.into(),
             parameters: encode("parameters", parameters)?,
             inputs,
             placement: self.stage_two,

@@ -119,7 +119,7 @@ impl Batch {
     pub(crate) fn note_event(&mut self, event: &RunEvent, core: &Core, now: Duration) {
         match event {
             RunEvent::NodeAdded { name } => {
-                self.touch(name.node, core).added = Some((name.kind.clone(), name.label.clone()));
+                self.touch(name.node, core).added = Some((name.kind.clone(), name.label.to_string()));
             }
             RunEvent::NodeReady { node } => _ = self.touch(*node, core),
             RunEvent::NodeStarted { name, .. } => self.started.push(numbers(name.node, core)),

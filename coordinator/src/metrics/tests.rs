@@ -12,7 +12,7 @@ use lookalike::graph::{FailureReason, NodeFailure, NodeId, WorkerId};
 use std::time::{Duration, Instant};
 
 fn name(node: u64, kind: &str) -> NodeName {
-    NodeName { node: NodeId(node), kind: kind.to_owned(), label: format!("{kind} {node}"), part: 0 }
+    NodeName { node: NodeId(node), kind: kind.to_owned(), label: format!("{kind} {node}").into(), part: 0 }
 }
 
 /// The value of a sample, which must occur once.

@@ -366,7 +366,7 @@ impl<W: World, P: Planner, O: FnMut(&RunEvent)> Driver<W, P, O> {
         let assignment = Assignment {
             lease: name_of(lease),
             kind: spec.kind.clone(),
-            label: spec.label.clone(),
+            label: spec.label.to_string(),
             parameters: spec.parameters.clone(),
             inputs: inputs.iter().map(|blob| blob.hash().0).collect(),
         };

@@ -254,7 +254,7 @@ impl Core {
         let inputs = self.graph.input_hashes(node).unwrap_or_default();
         let spec = self.graph.spec(node);
         let parameters = spec.map_or(0, |spec| spec.parameters.len());
-        let named = spec.map_or(0, |spec| spec.kind.len() + spec.label.len());
+        let named = spec.map_or(0, |spec| spec.kind.len() + spec.label.bytes());
         let bytes = ASSIGNMENT_BYTES + parameters + named + inputs.len() * size_of::<BlobHash>();
         let size = Size { bytes, time: weight(spec.and_then(|spec| self.pace.established(&spec.kind))) };
         self.members.change(worker, |member| {

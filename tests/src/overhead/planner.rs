@@ -105,7 +105,14 @@ impl Planner for Rounds {
 /// A node whose output no other node uses, different from any other.
 pub(super) fn node(kind: &str, number: u64) -> NodeSpec {
     let (label, parameters) = (format!("{kind} {number}"), number.to_le_bytes().to_vec());
-    NodeSpec { kind: kind.into(), label, parameters, inputs: Vec::new(), placement: Placement::Worker, priority: 0 }
+    NodeSpec {
+        kind: kind.into(),
+        label: label.into(),
+        parameters,
+        inputs: Vec::new(),
+        placement: Placement::Worker,
+        priority: 0,
+    }
 }
 
 /// The processor time used by this process or its children.

@@ -78,7 +78,7 @@ fn wait_for_start(cluster: &Cluster) {
 /// Wait until a node has its output, and return its label.
 fn wait_for_result(cluster: &Cluster) -> String {
     cluster.wait_for(|event| match event {
-        RunEvent::NodeFinished { name, .. } => Some(name.label.clone()),
+        RunEvent::NodeFinished { name, .. } => Some(name.label.to_string()),
         _ => None,
     })
 }

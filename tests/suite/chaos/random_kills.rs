@@ -41,7 +41,7 @@ fn run(seed: u64, gates: usize, has_killer: bool, kills: u32) -> Ending {
     let (result, summary) = outcome.unwrap();
     assert!(killed.load(Ordering::Relaxed) >= kills / 2, "seed {seed}: too few kills: {summary:?}");
     let failed = events.into_iter().filter_map(|event| match event {
-        RunEvent::NodeFailed { name, reason } => Some((name.label, reason.to_string())),
+        RunEvent::NodeFailed { name, reason } => Some((name.label.to_string(), reason.to_string())),
         _ => None,
     });
     (result, failed.collect())

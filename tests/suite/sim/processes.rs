@@ -79,15 +79,15 @@ impl Watcher {
     fn watch(&mut self, event: &RunEvent) {
         self.stage.say(Place::Coordinator, &format!("{event:?}"));
         match event {
-            RunEvent::NodeAdded { name } => self.labels.push(name.label.clone()),
+            RunEvent::NodeAdded { name } => self.labels.push(name.label.to_string()),
             RunEvent::NodeFinished { name, .. } => {
-                self.stage.state().finished.entry(name.label.clone()).or_insert(self.process);
+                self.stage.state().finished.entry(name.label.to_string()).or_insert(self.process);
             }
             RunEvent::NodeAssigned { node, .. } => {
                 let label = usize::try_from(node.0).ok().and_then(|node| self.labels.get(node)).cloned();
                 label.into_iter().for_each(|label| self.given_out(&label));
             }
-            RunEvent::NodeStarted { name, .. } => self.given_out(&name.label),
+            RunEvent::NodeStarted { name, .. } => self.given_out(&name.label.to_string()),
             RunEvent::WorkerJoined { worker, process, .. } => {
                 self.members.insert(*worker, *process);
                 self.stage.state().joined.insert(*process);

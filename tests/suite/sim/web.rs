@@ -59,7 +59,7 @@ impl Web {
         };
         let parameters = [&bytes.to_le_bytes(), label.as_bytes()].concat();
         let priority = u32::try_from(chance.between(0, 2)).unwrap_or(0);
-        graph.add_node(NodeSpec { kind: kind.into(), label, parameters, inputs, placement, priority })
+        graph.add_node(NodeSpec { kind: kind.into(), label: label.into(), parameters, inputs, placement, priority })
     }
 }
 
@@ -85,7 +85,7 @@ impl Planner for Web {
     }
 
     fn completed(&mut self, node: NodeId, output: &Blob, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
-        let label = graph.spec(node).map(|spec| spec.label.clone()).unwrap_or_default();
+        let label = graph.spec(node).map(|spec| spec.label.to_string()).unwrap_or_default();
         if label == FRINGE {
             return Ok(());
         }
@@ -114,7 +114,8 @@ impl Planner for Web {
     }
 
     fn failed(&mut self, node: NodeId, reason: &FailureReason, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
-        let (kind, label) = graph.spec(node).map(|spec| (spec.kind.clone(), spec.label.clone())).unwrap_or_default();
+        let (kind, label) =
+            graph.spec(node).map(|spec| (spec.kind.clone(), spec.label.to_string())).unwrap_or_default();
         let why = match reason {
             FailureReason::Crashed { .. } if kind == "deadly" => "deadly".into(),
             // If several inputs fail, the one that is named depends on which failed first.

@@ -26,7 +26,7 @@ impl Fit {
 
 fn node(kind: &str, label: &str, parameters: Vec<u8>, inputs: Vec<Input>) -> NodeSpec {
     let (kind, label) = (kind.to_owned(), label.to_owned());
-    NodeSpec { kind, label, parameters, inputs, placement: Placement::Worker, priority: 0 }
+    NodeSpec { kind, label: label.into(), parameters, inputs, placement: Placement::Worker, priority: 0 }
 }
 
 impl Planner for Fit {
@@ -181,7 +181,8 @@ fn earlier_parts_end_earlier_and_parts_start_only_when_needed() {
     let mut graph = Graph::new();
     Many::new(Bench::new(fits)).start(&mut GraphEdit::new(&mut graph)).unwrap();
     assert_eq!((graph.len(), graph.spec(NodeId(3)).unwrap().priority), (4, 1));
-    assert_eq!(split_label(&graph.spec(NodeId(3)).unwrap().label), (Some("fit-1"), "leaf"));
+    let label = &graph.spec(NodeId(3)).unwrap().label;
+    assert_eq!((label.part.as_deref(), &*label.name), (Some("fit-1"), "leaf"));
 }
 
 #[test]
