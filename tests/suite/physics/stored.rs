@@ -1,7 +1,8 @@
 //! References by the direct integrator, stored in `references.json` because integration takes minutes.
 //!
 //! `LOOKALIKE_BLESS=1 cargo test --release --features slow -p lookalike-tests --test suite physics::stored` writes the file again. Review
-//! the difference: it changes only with a scene, a lobe or the integrator.
+//! the difference: references change only with a scene, a lobe or the integrator. The `level` of each, to which errors are compared,
+//! comes from a coarse table, so it also changes with the tables, by a few percent at most.
 
 use super::Case;
 use lookalike_tests::scene::{agreement::References, reference::Reference};
