@@ -159,7 +159,7 @@ impl Planner for TestPlanner {
             return self.leaf_is_done(graph);
         }
         let (kind, label) = graph.spec(id).map(|spec| (spec.kind.clone(), spec.label.clone())).unwrap_or_default();
-        Err(PlanError::NodeFailed { kind, label, reason: reason.clone() })
+        Err(PlanError::NodeFailed { kind, label: label.to_string(), reason: reason.clone() })
     }
 }
 

@@ -4,7 +4,7 @@ use std::error::Error as StdError;
 
 use thiserror::Error;
 
-use super::{BlobHash, FailureReason, Label, NodeId};
+use super::{BlobHash, FailureReason, NodeId};
 
 /// Why a plan cannot continue.
 #[derive(Debug, Error)]
@@ -16,7 +16,7 @@ pub enum PlanError {
         /// The kind of the node.
         kind: String,
         /// Its label.
-        label: Label,
+        label: String,
         /// Why it failed.
         reason: FailureReason,
     },
@@ -24,7 +24,7 @@ pub enum PlanError {
     #[error("{label:?} needs blob {hash}, which was not added; add it before the node")]
     UnknownBlob {
         /// The label of the new node.
-        label: Label,
+        label: String,
         /// The missing blob.
         hash: BlobHash,
     },
@@ -32,7 +32,7 @@ pub enum PlanError {
     #[error("{label:?} needs the output of {node}, which does not exist; add it before this node")]
     UnknownInput {
         /// The label of the new node.
-        label: Label,
+        label: String,
         /// The missing node.
         node: NodeId,
     },
@@ -42,7 +42,7 @@ pub enum PlanError {
     )]
     Released {
         /// The label of the new node.
-        label: Label,
+        label: String,
         /// The node without an output.
         node: NodeId,
     },

@@ -59,6 +59,9 @@ impl From<&str> for Label {
 
 impl PartialEq<&str> for Label {
     fn eq(&self, text: &&str) -> bool {
-        self.to_string() == *text
+        match &self.part {
+            None => self.name == *text,
+            Some(part) => text.strip_prefix(&**part).and_then(|rest| rest.strip_prefix(": ")) == Some(&*self.name),
+        }
     }
 }

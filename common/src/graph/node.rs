@@ -149,6 +149,6 @@ pub enum FailureReason {
         /// The input that failed.
         node: NodeId,
         /// Its label.
-        label: Label,
+        label: String,
     },
 }

@@ -25,7 +25,8 @@ pub trait Planner {
     /// # Errors
     /// By default an error that names the node. The error ends the run.
     fn failed(&mut self, node: NodeId, reason: &FailureReason, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
-        let (kind, label) = graph.spec(node).map(|spec| (spec.kind.clone(), spec.label.clone())).unwrap_or_default();
+        let (kind, label) =
+            graph.spec(node).map(|spec| (spec.kind.clone(), spec.label.to_string())).unwrap_or_default();
         Err(PlanError::NodeFailed { kind, label, reason: reason.clone() })
     }
 

@@ -149,7 +149,7 @@ impl Graph {
     }
 
     fn look_at_inputs(&self, spec: &NodeSpec) -> Result<Inputs, PlanError> {
-        let label = || spec.label.clone();
+        let label = || spec.label.to_string();
         let Inputs { mut read, mut awaited, mut failed } = Inputs::default();
         for input in &spec.inputs {
             match *input {
@@ -398,7 +398,7 @@ impl Graph {
     }
 
     fn input_failed(&self, node: NodeId) -> FailureReason {
-        let label = self.spec(node).map(|spec| spec.label.clone()).unwrap_or_default();
+        let label = self.spec(node).map(|spec| spec.label.to_string()).unwrap_or_default();
         FailureReason::InputFailed { node, label }
     }
 

@@ -70,7 +70,7 @@ impl Planner for Script {
     fn failed(&mut self, node: NodeId, reason: &FailureReason, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
         self.failed.push((node, reason.clone()));
         let (kind, label) = graph.spec(node).map(|spec| (spec.kind.clone(), spec.label.clone())).unwrap();
-        let error = PlanError::NodeFailed { kind, label, reason: reason.clone() };
+        let error = PlanError::NodeFailed { kind, label: label.to_string(), reason: reason.clone() };
         if self.tolerates_failures { Ok(()) } else { Err(error) }
     }
 
