@@ -1,18 +1,19 @@
 //! Notes for the user on a result.
 
 use lookalike::{
-    brdf::{Model, flat_bounds, flat_names},
-    fit::{Method, Uncertainty, gamma_range},
+    brdf::{Model, flat_names},
+    fit::{Method, Ranges, Uncertainty, gamma_range},
     plan::FitOutcome,
 };
 
-/// Notes on the winner: its gamma is the first or the last one, parameters are at their bounds, it reflects more light than it
+/// Notes on the winner: without polish, its gamma is the first or the last one; parameters are at their bounds, it reflects more light than it
 /// receives.
 pub(crate) fn notes(method: &Method, outcome: &FitOutcome) -> Vec<String> {
     let winner = &outcome.judged[outcome.winner].candidate;
     let last = outcome.polished.as_ref().map_or(&winner.parameters, |p| &p.parameters);
     let mut notes = Vec::new();
-    if let Some((low, high)) = gamma_range(&method.gammas).filter(|(low, high)| low < high) {
+    // With polish a wider range does not pay (docs/method.md).
+    if let Some((low, high)) = gamma_range(&method.gammas).filter(|(low, high)| low < high && !method.polish) {
         if winner.gamma == high {
             notes.push(format!(
                 "the winning gamma {high} is the largest that was tried: a wider range may match better, \
@@ -27,15 +28,21 @@ pub(crate) fn notes(method: &Method, outcome: &FitOutcome) -> Vec<String> {
             ));
         }
     }
-    let is_determined = |i: usize| outcome.uncertainty.get(i) != Some(&Uncertainty::Undetermined);
-    notes.extend(at_bounds(method.model, last, is_determined));
+    let known = |i: usize| !matches!(outcome.uncertainty.get(i), Some(Uncertainty::Undetermined | Uncertainty::Held));
+    notes.extend(at_bounds(method.model, &method.ranges, last, known));
+    notes.extend(method.model.remark(last, &known));
     notes.extend(undetermined(method.model, &outcome.uncertainty));
     notes.extend(bright(method.model, last));
     notes
 }
 
-fn at_bounds(model: &dyn Model, parameters: &[f64], is_determined: impl Fn(usize) -> bool) -> Option<String> {
-    let (lower, upper) = flat_bounds(model.parameters());
+fn at_bounds(
+    model: &dyn Model,
+    ranges: &Ranges,
+    parameters: &[f64],
+    is_determined: impl Fn(usize) -> bool,
+) -> Option<String> {
+    let (lower, upper) = ranges.bounds(model);
     let names = flat_names(model.parameters());
     // A parameter at its lower bound is a valid result (no diffuse part, a dielectric), except for a width. At its upper bound
     // it is limited by the model, unless that bound stands for a kind of surface.
@@ -49,7 +56,7 @@ fn at_bounds(model: &dyn Model, parameters: &[f64], is_determined: impl Fn(usize
         .map(|i| format!("{} = {}", names[i], parameters[i]))
         .collect();
     let list = limited.join(", ");
-    (!limited.is_empty()).then(|| format!("at the limit of the model's range: {list}; the photo asks for more"))
+    (!limited.is_empty()).then(|| format!("at the limit of the range: {list}; the photo asks for more"))
 }
 
 /// The parameters that the photo does not determine: values from much of their range match it equally well.
@@ -85,7 +92,7 @@ fn bright(model: &dyn Model, parameters: &[f64]) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use lookalike::brdf::{CookTorrance, Disney, GgxF90};
+    use lookalike::brdf::{CookTorrance, Disney, Ggx};
 
     const KNOWN: Uncertainty = Uncertainty::StandardError(0.01);
 
@@ -104,17 +111,25 @@ mod tests {
     #[test]
     fn undetermined_parameter_at_its_bound_is_not_called_a_limit_of_the_model() {
         let parameters = [0.3, 0.3, 0.3, 0.0, 0.0, 0.0, 0.5, 1.0];
-        assert!(at_bounds(&CookTorrance, &parameters, |_| true).is_some_and(|note| note.contains("m = 1")));
-        assert_eq!(at_bounds(&CookTorrance, &parameters, |i| i != 7), None);
+        let note =
+            |is_determined: fn(usize) -> bool| at_bounds(&CookTorrance, &Ranges::default(), &parameters, is_determined);
+        assert!(note(|_| true).is_some_and(|note| note.contains("m = 1")));
+        assert_eq!(note(|i| i != 7), None);
     }
 
     #[test]
-    fn metal_and_full_rim_are_valid_results_and_a_full_coat_is_a_limit() {
-        let rim = |f90: f64, f0: f64| at_bounds(&GgxF90, &[0.3, 0.3, 0.3, f0, 0.1, 0.1, f90, 0.2], |_| true);
-        assert_eq!(rim(1.0, 0.1), None);
-        assert!(rim(1.0, 1.0).is_some_and(|note| note.contains("f0.r = 1;")));
+    fn metal_is_a_valid_result_and_a_full_coat_or_the_end_of_a_given_range_is_a_limit() {
+        let mut ranges = Ranges::default();
+        ranges.narrow(&Ggx, "alpha", 0.01, 0.2).unwrap();
+        let ggx =
+            |f0: f64, ranges: &Ranges| at_bounds(&Ggx, ranges, &[0.3, 0.3, 0.3, f0, 0.1, 0.1, 1.0, 0.2], |_| true);
+        assert_eq!(ggx(1.0, &Ranges::default()), None);
+        assert!(ggx(2.0, &Ranges::default()).is_some_and(|note| note.contains("f0.r = 2;")));
+        assert!(ggx(0.1, &ranges).is_some_and(|note| note.contains("alpha = 0.2;")));
         // The order is base colour, subsurface, metallic, specular, roughness, sheen, clear coat, clear-coat gloss.
-        let disney = |coat: f64| at_bounds(&Disney, &[0.5, 0.5, 0.5, 1.0, 1.0, 0.5, 0.5, 0.0, coat, 0.5], |_| true);
+        let disney = |coat: f64| {
+            at_bounds(&Disney, &Ranges::default(), &[0.5, 0.5, 0.5, 1.0, 1.0, 0.5, 0.5, 0.0, coat, 0.5], |_| true)
+        };
         assert_eq!(disney(0.5), None);
         assert!(disney(1.0).is_some_and(|note| note.contains("clearcoat = 1;") && !note.contains("metallic")));
     }
