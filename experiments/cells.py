@@ -3,7 +3,7 @@
 
 Usage: cells.py --data DIR --make-merl make_merl.py [--lookalike PROGRAM] [--work DIR]
 
-Renders the ten materials under the three probes as the study does (existing photos are kept), fits each with ggx and ggx-f90, and prints the
+Renders the ten materials under the three probes as the study does (existing photos are kept), fits each with ggx, f90 held at 1 and free, and prints the
 differences of the polished CSSIM. The photos have other noise than the study's. Needs Python 3.10 and, for make_merl.py, numpy.
 """
 import argparse
@@ -15,7 +15,8 @@ import sys
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 PROBES = {"Grace Cathedral": "grace_cross.hdr", "Uffizi Gallery": "uffizi.hdr", "Eucalyptus Grove": "rnl_cross.hdr"}
-STORED = {"ggx": "results", "ggx-f90": "results-ggx-f90"}
+# The study's names of the model, where its scores are, and the flags of the same model today.
+STORED = {"ggx": ("results", ["--fix", "f90=1"]), "ggx-f90": ("results-ggx-f90", [])}
 
 
 def main():
@@ -49,17 +50,17 @@ def main():
     print("| material | light | " + " | ".join(f"{model}, stored | now | difference" for model in STORED) + " |")
     print("|---|---|" + "---|" * 3 * len(STORED))
     stored = {}
-    for model, folder in STORED.items():
+    for model, (folder, _) in STORED.items():
         with open(ROOT / "docs" / folder / "figures-cells.csv", newline="") as file:
             for row in csv.DictReader(file):
                 if row["light"] in PROBES and " of " not in row["material"]:
                     stored.setdefault((row["material"], row["light"]), {})[model] = float(row["ours + polish"])
     for (material, light), before in stored.items():
         line = f"| {material} | {light} |"
-        for model in STORED:
+        for model, (_, flags) in STORED.items():
             out = options.work / "fit"
             env = options.data / "probes" / PROBES[light]
-            run(options.lookalike, "fit", photo(material, light), "--env", env, "--model", model, "--out", out, "--force", "--progress", "none")
+            run(options.lookalike, "fit", photo(material, light), "--env", env, "--model", "ggx", *flags, "--out", out, "--force", "--progress", "none")
             now = json.loads((out / "fit.json").read_text())["polished"]["cssim"]
             differences[model].append(now - before[model])
             line += f" {before[model]:.4f} | {now:.4f} | {now - before[model]:+.4f} |"

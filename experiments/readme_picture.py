@@ -6,7 +6,7 @@
     experiments/readme_picture.py [--data DIR] [--make-merl make_merl.py] [--lookalike PROGRAM] [--work DIR]
 
 The photos are renderings of network fits of MERL measurements (Sztrajman et al. 2021) under two CC0 maps of Poly Haven, 192 x 192
-pixels, by `lookalike render --brdf`. Each is fitted by `lookalike fit --model ggx-f90` with 256 samples and seed 0. The difference
+pixels, by `lookalike render --brdf`. Each is fitted by `lookalike fit` with 256 samples and seed 0. The difference
 is the absolute difference of the two displayed images, four times as bright. DIR holds probes/ and materials/; the default is
 LOOKALIKE_DATA, else ../shared/data beside the checkout; make_merl.py is looked for in DIR/../tools. Photos and fits that are in the
 work folder already are kept. About 10 minutes on two cores.
@@ -25,7 +25,7 @@ from PIL import Image, ImageDraw, ImageFont
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 MATERIALS = [("aluminium", "metal"), ("specular-red-phenolic", "plastic"), ("gold-metallic-paint3", "paint")]
 LIGHTS = [("studio_small_05_1k", "Studio Small 05"), ("noon_grass_1k", "Noon Grass")]
-MODEL = "ggx-f90"
+MODEL = "ggx"
 # Columns and rows of the photos, and samples per pixel.
 SIZE, SAMPLES = 192, 1024
 BRIGHTER = 4

@@ -12,7 +12,9 @@ use std::{hint::black_box, ops::ControlFlow, sync::Arc, time::Instant};
 use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_main};
 use lookalike::{
     brdf::{Ggx, LinearModel, Material, Tail},
-    fit::{Candidate, FullView, JudgedBy, Judges, Limits, Method, Objective, ScannedTable, polish, search_gamma},
+    fit::{
+        Candidate, FullView, JudgedBy, Judges, Limits, Method, Objective, Ranges, ScannedTable, polish, search_gamma,
+    },
     image::Image,
     light::{Environment, LightDistribution},
     math::{Rgb, Vec3, luminance, narrow, to_f32},
@@ -33,7 +35,7 @@ use rayon::prelude::*;
 
 const SIZE: u32 = 256;
 /// A reddish plastic: kd, f0, alpha.
-const TRUTH: [f64; 7] = [0.4, 0.15, 0.08, 0.05, 0.05, 0.05, 0.1];
+const TRUTH: [f64; 8] = [0.4, 0.15, 0.08, 0.05, 0.05, 0.05, 1.0, 0.1];
 
 /// A dim room with texture and four windows, 512 x 256.
 fn room() -> Environment {
@@ -189,13 +191,14 @@ fn full_image(criterion: &mut Criterion, study: &Study) {
     let judges = Judges { searching: &searching, reporting: &judge, by: JudgedBy::Image };
     let mut start = TRUTH;
     start[..3].fill(0.3);
-    start[6] = 0.08;
+    start[7] = 0.08;
+    let ranges = Ranges::default();
     let mut group = criterion.benchmark_group("full image");
     group.sample_size(10);
     group.bench_function("table of 256 x 256 pixels", |b| b.iter(integrate));
     group.bench_function("polish, at most 100 evaluations", |b| {
         let starts = [start.to_vec()];
-        b.iter(|| polish(&view, judges, &starts, Limits::of_polish(100), &mut |_| ControlFlow::Continue(())));
+        b.iter(|| polish(&view, judges, &starts, Limits::of_polish(&ranges, 100), &mut |_| ControlFlow::Continue(())));
     });
     group.finish();
 }

@@ -61,7 +61,7 @@ fn surface(kind: &str, value: f64) -> Result<Box<dyn Reflectance>, Box<dyn Error
     Ok(match kind {
         "diffuse" => Box::new(Diffuse { albedo: value }),
         "separable" => Box::new(Separable { alpha: value }),
-        "correlated" => Box::new(Material::new(&Ggx, vec![0.0, 0.0, 0.0, 1.0, 1.0, 1.0, value])?),
+        "correlated" => Box::new(Material::new(&Ggx, vec![0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0, value])?),
         other => return Err(format!("unknown surface '{other}': expected diffuse, correlated or separable").into()),
     })
 }

@@ -92,7 +92,7 @@ fn bad_usage_is_code_two_and_lists_what_is_possible() {
         ("fitt".to_owned(), &["unrecognized subcommand 'fitt'", "'fit'"][..]),
         ("fit ball.exr".into(), &["required arguments", "--env <MAP>", "--out <DIR>"]),
         (format!("{fit} --sampel 3"), &["unexpected argument '--sampel'", "'--samples'"]),
-        (format!("{fit} --model phong"), &["'phong'", "--model", "possible values: ggx, ggx-f90, cook-torrance"]),
+        (format!("{fit} --model phong"), &["'phong'", "--model", "possible values: ggx, cook-torrance"]),
         (format!("{fit} --search simplex"), &["'simplex'", "[possible values: least-squares, pattern]"]),
         (format!("{fit} --polish maybe"), &["'maybe'", "[possible values: on, off]"]),
         (format!("{fit} --gammas 3:1:0.1"), &["--gammas", "the last gamma must lie between"]),

@@ -59,7 +59,7 @@ fn metadata_record_what_was_rendered() {
     let hash = lookalike::image::content_hash(&map.image).to_hex();
     for (key, expected) in [
         (keys::MODEL, "ggx"),
-        (keys::PARAMETERS, "kd.r=0.2,kd.g=0.1,kd.b=0.1,f0.r=0.5,f0.g=0.5,f0.b=0.5,alpha=0.1"),
+        (keys::PARAMETERS, "kd.r=0.2,kd.g=0.1,kd.b=0.1,f0.r=0.5,f0.g=0.5,f0.b=0.5,f90=1,alpha=0.1"),
         (keys::CAMERA, "perspective:20"),
         (keys::SAMPLES, "16"),
         (keys::SEED, "7"),
@@ -186,8 +186,8 @@ fn bad_settings_are_refused_with_the_valid_values() {
     let render = |flags: &str| lookalike(folder.path(), &format!("render --env white.exr -o a.exr {flags}"));
     for (flags, phrases) in [
         ("--model ggx --params kd=.5,f0=.04", &["--params", "'alpha' of model ggx is missing: give alpha=0.1"][..]),
-        ("--model ggx --params kd=.5,f0=.04,roughness=.3", &["no parameter 'roughness': it has kd, f0, alpha"]),
-        ("--model ggx --params kd=.5,f0=2,alpha=.3", &["parameter 'f0' is 2: expected a value in [0, 1]"]),
+        ("--model ggx --params kd=.5,f0=.04,roughness=.3", &["no parameter 'roughness': it has kd, f0, f90, alpha"]),
+        ("--model ggx --params kd=.5,f0=3,alpha=.3", &["parameter 'f0' is 3: expected a value in [0, 2]"]),
         ("--model ggx --params kd=.5,f0=0,alpha=.3,.3,.3", &["'alpha' takes 1 number(s), found 3"]),
         ("--model ggx --params kd=.5,f0=0,alpha=.3 --size 1", &["cannot place the sphere", "at least 2 x 2"]),
         ("--model ggx --params kd=.5,f0=0,alpha=.3 --size 99999", &["--size must be at most 16384"]),

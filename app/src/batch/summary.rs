@@ -182,7 +182,7 @@ mod tests {
 
     fn summary() -> Summary {
         let rows = vec![
-            row("one", "ggx", scores((1..=7).map(f64::from).collect(), false)),
+            row("one", "ggx", scores((1..=8).map(f64::from).collect(), false)),
             row("two", "cook-torrance", scores((1..=8).map(f64::from).collect(), true)),
             row("three", "ggx", State::Failed("it said \"no\"".to_owned())),
         ];
@@ -194,14 +194,14 @@ mod tests {
     fn csv_has_a_column_for_every_parameter_of_every_model() {
         let csv = summary().csv();
         let lines: Vec<&str> = csv.lines().collect();
-        let parameters = "kd.r,kd.g,kd.b,f0.r,f0.g,f0.b,alpha,ks.r,ks.g,ks.b,f0,m";
+        let parameters = "kd.r,kd.g,kd.b,f0.r,f0.g,f0.b,f90,alpha,ks.r,ks.g,ks.b,f0,m";
         assert!(lines[0].ends_with(&format!(",seconds,error,{parameters}")), "{csv}");
-        assert_eq!(lines[1], "one,\"a, b.exr\",m.hdr,ggx,done,0.25,0.125,1.5,true,1.235,,1,2,3,4,5,6,7,,,,,");
+        assert_eq!(lines[1], "one,\"a, b.exr\",m.hdr,ggx,done,0.25,0.125,1.5,true,1.235,,1,2,3,4,5,6,7,8,,,,,");
         assert_eq!(
             lines[2],
-            "two,\"a, b.exr\",m.hdr,cook-torrance,missed,0.25,0.125,1.5,true,1.235,,1,2,3,,,,,4,5,6,7,8"
+            "two,\"a, b.exr\",m.hdr,cook-torrance,missed,0.25,0.125,1.5,true,1.235,,1,2,3,,,,,,4,5,6,7,8"
         );
-        assert_eq!(lines[3], "three,\"a, b.exr\",m.hdr,ggx,failed,,,,,1.235,\"it said \"\"no\"\"\",,,,,,,,,,,,");
+        assert_eq!(lines[3], "three,\"a, b.exr\",m.hdr,ggx,failed,,,,,1.235,\"it said \"\"no\"\"\",,,,,,,,,,,,,");
     }
 
     #[test]
@@ -210,7 +210,7 @@ mod tests {
         assert_eq!((&json["schema"], &json["count"]["failed"]), (&json!("lookalike.batch/1"), &json!(1)));
         assert_eq!(
             json["fits"][0]["parameters"],
-            json!({ "kd": [1.0, 2.0, 3.0], "f0": [4.0, 5.0, 6.0], "alpha": 7.0 })
+            json!({ "kd": [1.0, 2.0, 3.0], "f0": [4.0, 5.0, 6.0], "f90": 7.0, "alpha": 8.0 })
         );
         assert_eq!((&json["fits"][1]["state"], &json["fits"][1]["error"]), (&json!("missed"), &Value::Null));
         assert_eq!((&json["fits"][2]["cssim"], &json["fits"][2]["parameters"]), (&Value::Null, &Value::Null));

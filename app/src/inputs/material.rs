@@ -24,7 +24,8 @@ pub fn load_table(path: &Path) -> anyhow::Result<LoadedTable> {
     Ok(LoadedTable { table, source })
 }
 
-/// The flat parameter vector of a model from values by name. All parameters are required; a single value for a colour means grey.
+/// The flat parameter vector of a model from values by name. Every parameter without a usual value is required; a single value for a colour means
+/// grey.
 ///
 /// # Errors
 /// [`ParameterError::UnknownParameter`], [`ParameterError::Missing`] and [`ParameterError::Count`]; bounds are checked by the material.
@@ -41,11 +42,12 @@ pub fn flat_parameters(model: &'static dyn Model, given: &ModelParams) -> Result
             Channels::Scalar => (1, "0.1"),
             Channels::Rgb => (3, "0.5,0.4,0.3"),
         };
-        match given.entries().iter().find(|(name, _)| name == parameter.name) {
-            None => return Err(ParameterError::Missing { model: model.name(), name: parameter.name, example }),
-            Some((_, values)) if values.len() == expected => flat.extend_from_slice(values),
-            Some((_, values)) if values.len() == 1 => flat.extend(std::iter::repeat_n(values[0], expected)),
-            Some((_, values)) => {
+        match (given.entries().iter().find(|(name, _)| name == parameter.name), parameter.usual) {
+            (None, Some(usual)) => flat.extend(std::iter::repeat_n(usual, expected)),
+            (None, None) => return Err(ParameterError::Missing { model: model.name(), name: parameter.name, example }),
+            (Some((_, values)), _) if values.len() == expected => flat.extend_from_slice(values),
+            (Some((_, values)), _) if values.len() == 1 => flat.extend(std::iter::repeat_n(values[0], expected)),
+            (Some((_, values)), _) => {
                 return Err(ParameterError::Count { name: parameter.name, expected, found: values.len() });
             }
         }
@@ -64,7 +66,8 @@ mod tests {
 
     #[test]
     fn parameters_by_name_in_any_order_become_the_flat_vector() {
-        assert_eq!(flat("alpha=.1,kd=.5,.4,.3,f0=.04").unwrap(), [0.5, 0.4, 0.3, 0.04, 0.04, 0.04, 0.1]);
+        assert_eq!(flat("alpha=.1,kd=.5,.4,.3,f0=.04").unwrap(), [0.5, 0.4, 0.3, 0.04, 0.04, 0.04, 1.0, 0.1]);
+        assert_eq!(flat("alpha=.1,kd=.5,f0=.04,f90=.3").unwrap()[6], 0.3);
     }
 
     #[test]
@@ -72,7 +75,7 @@ mod tests {
         for (text, phrase) in [
             ("kd=.5,f0=.04", "parameter 'alpha' of model ggx is missing: give alpha=0.1"),
             ("f0=.04,alpha=.1", "give kd=0.5,0.4,0.3"),
-            ("kd=.5,f0=.04,roughness=.1", "no parameter 'roughness': it has kd, f0, alpha"),
+            ("kd=.5,f0=.04,roughness=.1", "no parameter 'roughness': it has kd, f0, f90, alpha"),
             ("kd=.5,f0=.04,alpha=.1,.2,.3", "'alpha' takes 1 number(s), found 3"),
         ] {
             let message = flat(text).unwrap_err();

@@ -150,16 +150,17 @@ fn by_name(model: &dyn Model, entries: &[Value]) -> Value {
 }
 
 /// How well the photo determines each parameter: the standard error relative to the value (`null` if it is unknown), and
-/// whether the value is `determined`, held `at-bound`, or `undetermined`.
+/// whether the value is `determined`, `at-bound`, `undetermined`, or `held` by the settings.
 fn uncertainty_json(model: &dyn Model, parameters: &[f64], uncertainty: &[Uncertainty]) -> Value {
     let relative = parameters.iter().zip(uncertainty).map(|(value, known)| match known {
         Uncertainty::StandardError(error) => json!(error / value.abs()),
-        Uncertainty::AtBound | Uncertainty::Undetermined => Value::Null,
+        Uncertainty::AtBound | Uncertainty::Undetermined | Uncertainty::Held => Value::Null,
     });
     let state = uncertainty.iter().map(|known| match known {
         Uncertainty::StandardError(_) => json!("determined"),
         Uncertainty::AtBound => json!("at-bound"),
         Uncertainty::Undetermined => json!("undetermined"),
+        Uncertainty::Held => json!("held"),
     });
     let relative = by_name(model, &relative.collect::<Vec<_>>());
     json!({ "relative": relative, "state": by_name(model, &state.collect::<Vec<_>>()) })

@@ -7,6 +7,7 @@ use super::{
 use crate::wrap::wrap;
 use lookalike::{
     brdf::{Channels, Model},
+    fit::Method,
     plan::FitOutcome,
 };
 use std::{fmt::Write as _, io};
@@ -22,7 +23,7 @@ fn summary(record: &FitRecord<'_>, timing: &Timing, out: &str) -> String {
     let mut text = format!("{} on {} of {usable} usable pixels", model.name(), record.method.samples);
     let gammas = counted(record.method.gammas.len(), "gamma");
     let _ = writeln!(text, ", {gammas}, seed {}\n", record.method.seed);
-    text.push_str(&aligned(&rows(model, outcome)));
+    text.push_str(&aligned(&rows(record.method, outcome)));
     let _ = writeln!(text, "\n  {CSSIM_HINT}");
     for note in record.notes {
         let _ = writeln!(text, "\n{}", wrap(&format!("note: {note}")));
@@ -35,8 +36,9 @@ fn summary(record: &FitRecord<'_>, timing: &Timing, out: &str) -> String {
 }
 
 /// One row per score and parameter, one column per result. A model may have too many parameters for columns.
-fn rows(model: &dyn Model, outcome: &FitOutcome) -> Vec<Vec<String>> {
-    let mut rows = names(model);
+fn rows(method: &Method, outcome: &FitOutcome) -> Vec<Vec<String>> {
+    let (model, held) = (method.model, method.ranges.held());
+    let mut rows = names(model, |name| held.get(name).is_some());
     if let Some(j) = outcome.judged.iter().find(|j| j.candidate.gamma == 1.0) {
         add(&mut rows, column(model, "L2 baseline", "1", j.cssim, j.cssim_object, &j.candidate.parameters));
     }
@@ -50,9 +52,10 @@ fn rows(model: &dyn Model, outcome: &FitOutcome) -> Vec<Vec<String>> {
 }
 
 /// Rows that have only their names.
-fn names(model: &dyn Model) -> Vec<Vec<String>> {
-    let scores = ["", "gamma", "CSSIM on object", "CSSIM on image"].into_iter();
-    scores.chain(model.parameters().iter().map(|p| p.name)).map(|name| vec![name.to_owned()]).collect()
+fn names(model: &dyn Model, is_held: impl Fn(&str) -> bool) -> Vec<Vec<String>> {
+    let scores = ["", "gamma", "CSSIM on object", "CSSIM on image"].map(str::to_owned).into_iter();
+    let parameter = |name: &str| if is_held(name) { format!("{name} (held)") } else { name.to_owned() };
+    scores.chain(model.parameters().iter().map(|p| parameter(p.name))).map(|name| vec![name]).collect()
 }
 
 fn add(rows: &mut [Vec<String>], column: Vec<String>) {
@@ -85,7 +88,7 @@ mod tests {
             let (_, upper) = flat_bounds(model.parameters());
             let results =
                 ["L2 baseline", "stage two", "polished"].map(|name| column(*model, name, "1.5", 0.5, 0.5, &upper));
-            let mut rows = names(*model);
+            let mut rows = names(*model, |_| true);
             results.into_iter().for_each(|result| add(&mut rows, result));
             let text = aligned(&rows);
             assert!(text.lines().all(|line| line.len() <= COLUMNS), "{text}");

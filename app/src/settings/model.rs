@@ -1,9 +1,13 @@
 //! `--model` and `--params`: which BRDF, and with which values.
 
 use anyhow::{Context, bail};
-use clap::{ValueEnum, builder::PossibleValue};
-use lookalike::brdf::{DEFAULT_MODEL, MODELS, Model};
-use std::{fmt, str::FromStr, sync::LazyLock};
+use clap::{
+    Arg, Command, ValueEnum,
+    builder::{EnumValueParser, PossibleValue, TypedValueParser},
+    error::ErrorKind,
+};
+use lookalike::brdf::{self, DEFAULT_MODEL, MODELS, Model, ParameterError};
+use std::{ffi::OsStr, fmt, str::FromStr, sync::LazyLock};
 
 /// A BRDF model of the registry (design section 4).
 #[derive(Debug, Clone, Copy)]
@@ -54,6 +58,55 @@ impl ValueEnum for ModelName {
 impl fmt::Display for ModelName {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(self.as_str())
+    }
+}
+
+/// Parses `--model`. The name of a model that has become another one is refused with what to use instead.
+#[derive(Debug, Clone, Copy)]
+pub struct ModelParser;
+
+impl TypedValueParser for ModelParser {
+    type Value = ModelName;
+
+    fn parse_ref(&self, command: &Command, flag: Option<&Arg>, value: &OsStr) -> Result<ModelName, clap::Error> {
+        if let Some(Err(error @ ParameterError::Renamed { .. })) = value.to_str().map(brdf::model) {
+            return Err(command.clone().error(ErrorKind::InvalidValue, error));
+        }
+        EnumValueParser::new().parse_ref(command, flag, value)
+    }
+
+    fn possible_values(&self) -> Option<Box<dyn Iterator<Item = PossibleValue> + '_>> {
+        Some(Box::new(ModelName::value_variants().iter().filter_map(ValueEnum::to_possible_value)))
+    }
+}
+
+/// Ranges of a model's parameters by name, in the order given; the model checks names and bounds.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct ModelBounds(Vec<(String, f64, f64)>);
+
+impl ModelBounds {
+    /// Names, lower and upper bounds.
+    #[must_use]
+    pub fn entries(&self) -> &[(String, f64, f64)] {
+        &self.0
+    }
+}
+
+impl FromStr for ModelBounds {
+    type Err = anyhow::Error;
+
+    /// `name=lower:upper,name=...`.
+    fn from_str(text: &str) -> anyhow::Result<Self> {
+        let range = |part: &str| {
+            let (name, range) = part.split_once('=')?;
+            let (lower, upper) = range.split_once(':')?;
+            let number = |text: &str| text.trim().parse::<f64>().ok().filter(|x| x.is_finite());
+            Some((name.trim().to_owned(), number(lower)?, number(upper)?))
+        };
+        let ranges = text.split(',').map(|part| {
+            range(part).with_context(|| format!("expected NAME=LOWER:UPPER, such as alpha=.05:.3, found {part:?}"))
+        });
+        ranges.collect::<anyhow::Result<_>>().map(Self)
     }
 }
 
@@ -124,6 +177,16 @@ mod tests {
         let params: ModelParams = "kd=.5,.4,0.3,f0=.04, alpha = 1e-1".parse().unwrap();
         let expected = [("kd", vec![0.5, 0.4, 0.3]), ("f0", vec![0.04]), ("alpha", vec![0.1])];
         assert_eq!(params.entries(), expected.map(|(name, values)| (name.to_owned(), values)));
+    }
+
+    #[test]
+    fn ranges_have_two_ends() {
+        let bounds: ModelBounds = "alpha=.05:.3, kd = 0:1e-1".parse().unwrap();
+        assert_eq!(bounds.entries(), [("alpha".to_owned(), 0.05, 0.3), ("kd".to_owned(), 0.0, 0.1)]);
+        for text in ["", "alpha", "alpha=.1", "alpha=.1:", "alpha=.1:wide", "alpha=.1:inf", "alpha=.1:.2,"] {
+            let message = text.parse::<ModelBounds>().unwrap_err().to_string();
+            assert!(message.starts_with("expected NAME=LOWER:UPPER"), "{text}: {message}");
+        }
     }
 
     #[test]

@@ -419,14 +419,16 @@ fn product(lights: usize, materials: &[usize]) -> impl Iterator<Item = (usize, u
 
 /// The starts of brute force: the paper's start, a plastic, and a metal.
 fn starts(model: &dyn Model) -> Vec<(&'static str, Vec<f64>)> {
-    let paper: Vec<f64> =
-        model.parameters().iter().flat_map(|p| std::iter::repeat_n(p.start, p.channels.count())).collect();
-    let mut starts = vec![("paper", paper.clone())];
+    let flat = |value: fn(&brdf::Parameter) -> f64| -> Vec<f64> {
+        model.parameters().iter().flat_map(|p| std::iter::repeat_n(value(p), p.channels.count())).collect()
+    };
+    let usual = flat(|p| p.usual.unwrap_or(p.start));
+    let mut starts = vec![("paper", flat(|p| p.start))];
     let offset = |name| brdf::offset_of(model.parameters(), name);
     let Some(width) = model.lobes().iter().find_map(|basis| basis.width) else { return starts };
     let (Some(kd), Some(specular)) = (offset("kd"), offset("f0").or_else(|| offset("ks"))) else { return starts };
     for (name, diffuse, reflectance, share) in [("plastic", 0.3, 0.04, 0.05_f64), ("metal", 0.05, 0.7, 0.1)] {
-        let mut start = paper.clone();
+        let mut start = usual.clone();
         start[kd..kd + 3].fill(diffuse);
         let colours = if width.entry > specular + 1 { 3.min(width.entry - specular) } else { 1 };
         start[specular..specular + colours].fill(reflectance);
@@ -503,6 +505,6 @@ mod tests {
                 assert!(inside, "{} {name} {start:?}", model.name());
             }
         }
-        assert_eq!(starts(brdf::DEFAULT_MODEL)[1].1, [0.3, 0.3, 0.3, 0.04, 0.04, 0.04, 0.05]);
+        assert_eq!(starts(brdf::DEFAULT_MODEL)[1].1, [0.3, 0.3, 0.3, 0.04, 0.04, 0.04, 1.0, 0.05]);
     }
 }

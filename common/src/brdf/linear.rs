@@ -71,7 +71,12 @@ pub trait LinearModel: Debug + Sync {
     const WEIGHTS: &'static [Weight];
     /// Albedo of the diffuse lobe of weight 1 at normal incidence.
     const DIFFUSE_ALBEDO: f64 = 1.0;
+    /// [`Model::remark`].
+    const REMARK: Option<Remark> = None;
 }
+
+/// [`Model::remark`] of a model declared by constants.
+pub type Remark = fn(&[f64], &dyn Fn(usize) -> bool) -> Option<String>;
 
 impl<M: LinearModel> Model for M {
     fn name(&self) -> &'static str {
@@ -123,5 +128,9 @@ impl<M: LinearModel> Model for M {
 
     fn diffuse_albedo(&self, p: &[f64]) -> Rgb {
         M::WEIGHTS[0].at(p) * M::DIFFUSE_ALBEDO
+    }
+
+    fn remark(&self, p: &[f64], is_determined: &dyn Fn(usize) -> bool) -> Option<String> {
+        M::REMARK.and_then(|remark| remark(p, is_determined))
     }
 }

@@ -19,7 +19,6 @@ mod blinn_phong;
 mod cook_torrance;
 mod disney;
 mod ggx;
-mod ggx_f90;
 mod lambert;
 mod lights;
 mod linear;
@@ -39,12 +38,11 @@ pub use blinn_phong::BlinnPhong;
 pub use cook_torrance::CookTorrance;
 pub use disney::Disney;
 pub use ggx::Ggx;
-pub use ggx_f90::GgxF90;
 pub use lambert::Lambert;
 #[cfg(test)]
 pub(crate) use lights::Incident;
 pub use lights::{BLOCK, Lights, Spread};
-pub use linear::{LinearModel, Weight};
+pub use linear::{LinearModel, Remark, Weight};
 pub use lobe::{Expected, Lobe, Split, Tail};
 pub use model::{BasisLobe, Model, lobe_terms, term_count};
 pub use parameter::{Channels, Parameter, ParameterError, Role, Scale, flat_bounds, flat_len, flat_names, offset_of};
@@ -53,7 +51,7 @@ pub use ward::Ward;
 pub use width::Width;
 
 /// Every model, in the order in which lists show them.
-pub static MODELS: &[&dyn Model] = &[&Ggx, &GgxF90, &CookTorrance, &Ward, &BlinnPhong, &AshikhminShirley, &Disney];
+pub static MODELS: &[&dyn Model] = &[&Ggx, &CookTorrance, &Ward, &BlinnPhong, &AshikhminShirley, &Disney];
 
 /// The default model.
 pub static DEFAULT_MODEL: &dyn Model = &Ggx;
@@ -61,11 +59,17 @@ pub static DEFAULT_MODEL: &dyn Model = &Ggx;
 /// The model of the papers' results and of `--preset paper`.
 pub static PAPER_MODEL: &dyn Model = &CookTorrance;
 
+/// Names of earlier versions, and what to use instead.
+const RENAMED: &[(&str, &str)] = &[("ggx-f90", "ggx, which has the parameter f90; --fix f90=1 is the ggx of before")];
+
 /// Looks a model up by name.
 ///
 /// # Errors
-/// [`ParameterError::UnknownModel`], which lists the known models.
+/// [`ParameterError::UnknownModel`], which lists the known models, or [`ParameterError::Renamed`].
 pub fn model(name: &str) -> Result<&'static dyn Model, ParameterError> {
+    if let Some(&(name, now)) = RENAMED.iter().find(|(old, _)| *old == name) {
+        return Err(ParameterError::Renamed { name, now });
+    }
     MODELS.iter().copied().find(|m| m.name() == name).ok_or_else(|| ParameterError::UnknownModel {
         name: name.to_owned(),
         known: MODELS.iter().map(|m| m.name()).collect::<Vec<_>>().join(", "),

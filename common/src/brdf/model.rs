@@ -72,6 +72,12 @@ pub trait Model: Debug + Sync {
 
     /// The diffuse albedo at normal incidence, for reports.
     fn diffuse_albedo(&self, parameters: &[f64]) -> Rgb;
+
+    /// What a user should know about a fit with these parameters, if anything. `is_determined` says of an entry whether the photo
+    /// determines it.
+    fn remark(&self, _parameters: &[f64], _is_determined: &dyn Fn(usize) -> bool) -> Option<String> {
+        None
+    }
 }
 
 /// Terms of one lobe.

@@ -65,6 +65,8 @@ pub struct Parameter {
     pub role: Role,
     /// Whether the upper bound is a kind of surface, such as a metal or a smooth interface, and not a limit of the model.
     pub upper_is_kind: bool,
+    /// The value of a material for which none is given; `None` if it must be given.
+    pub usual: Option<f64>,
     /// The coordinate of pattern search. Least squares always uses the logarithm of the main lobe's width.
     pub scale: Scale,
 }
@@ -80,7 +82,30 @@ impl Parameter {
     #[must_use]
     pub const fn scalar(name: &'static str, meaning: &'static str, role: Role) -> Self {
         let (channels, scale) = (Channels::Scalar, Scale::Linear);
-        Self { name, meaning, channels, lower: 0.0, upper: 1.0, start: 0.3, role, upper_is_kind: false, scale }
+        Self {
+            name,
+            meaning,
+            channels,
+            lower: 0.0,
+            upper: 1.0,
+            start: 0.3,
+            role,
+            upper_is_kind: false,
+            usual: None,
+            scale,
+        }
+    }
+
+    /// The same with another upper bound.
+    #[must_use]
+    pub const fn up_to(self, upper: f64) -> Self {
+        Self { upper, ..self }
+    }
+
+    /// The same with a value for materials for which none is given.
+    #[must_use]
+    pub const fn usually(self, value: f64) -> Self {
+        Self { usual: Some(value), ..self }
     }
 
     /// The share of one kind of surface in a mixture of two: the scan tries these values.
@@ -100,6 +125,14 @@ impl Parameter {
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum ParameterError {
+    /// A model of that name has become another one.
+    #[error("the model '{name}' is now {now}")]
+    Renamed {
+        /// As given.
+        name: &'static str,
+        /// What to use instead.
+        now: &'static str,
+    },
     /// No model of that name.
     #[error("unknown model '{name}': expected one of {known}")]
     UnknownModel {
@@ -137,6 +170,22 @@ pub enum ParameterError {
         expected: usize,
         /// Entries given.
         found: usize,
+    },
+    /// Held or narrowed twice.
+    #[error("parameter '{name}' is given twice: --fix and --bounds take each once")]
+    Twice {
+        /// The parameter.
+        name: &'static str,
+    },
+    /// A range without values.
+    #[error("parameter '{name}' has an empty range: {lower} is above {upper}")]
+    EmptyRange {
+        /// The parameter.
+        name: &'static str,
+        /// The lower bound given.
+        lower: f64,
+        /// The upper bound given.
+        upper: f64,
     },
     /// Outside its bounds, or not a number.
     #[error("parameter '{name}' is {found}: expected a value in [{lower}, {upper}]")]

@@ -13,6 +13,7 @@ pub(super) const EXPONENT: Parameter = Parameter {
     start: 20.0,
     role: Role::Width,
     upper_is_kind: false,
+    usual: None,
     scale: Scale::Logarithmic,
 };
 

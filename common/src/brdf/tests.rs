@@ -339,8 +339,13 @@ fn no_two_lobes_of_a_model_share_a_width() {
 #[test]
 fn bad_parameters_are_named() {
     let message = |p: Vec<f64>| Material::new(&Ggx, p).unwrap_err().to_string();
-    assert_eq!(message(vec![0.1, 0.1, 0.1, 0.5, 1.5, 0.5, 0.1]), "parameter 'f0' is 1.5: expected a value in [0, 1]");
-    assert!(message(vec![0.1, 0.1, 0.1, 0.5, 0.5, 0.5, f64::NAN]).contains("'alpha' is NaN"));
+    assert_eq!(
+        message(vec![0.1, 0.1, 0.1, 0.5, 2.5, 0.5, 1.0, 0.1]),
+        "parameter 'f0' is 2.5: expected a value in [0, 2]"
+    );
+    assert!(message(vec![0.1, 0.1, 0.1, 0.5, 0.5, 0.5, 1.0, f64::NAN]).contains("'alpha' is NaN"));
     let unknown = model("phong").unwrap_err().to_string();
     assert!(MODELS.iter().all(|model| unknown.contains(model.name())), "{unknown}");
+    let renamed = model("ggx-f90").unwrap_err().to_string();
+    assert!(renamed.starts_with("the model 'ggx-f90' is now ggx, which has the parameter f90"), "{renamed}");
 }

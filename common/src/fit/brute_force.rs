@@ -1,7 +1,7 @@
 //! The baseline that the method is measured against (\[BP20b\] section 1): minimise CSSIM itself, at full resolution, by pattern
 //! search with MATLAB's defaults from a generic start.
 
-use super::{method::SearchKind, stage_one::search_bounds};
+use super::{method::SearchKind, ranges::Ranges, stage_one::search_bounds};
 use crate::{
     brdf::Model,
     search::{
@@ -23,7 +23,7 @@ pub fn brute_force(
     limit: Option<usize>,
     observe: &mut dyn FnMut(&Progress<'_>) -> ControlFlow<()>,
 ) -> Result<Minimum, SearchError> {
-    let bounds = search_bounds(model, SearchKind::Pattern)?;
+    let bounds = search_bounds(model, &Ranges::default(), SearchKind::Pattern)?;
     let mut options = PatternOptions::matlab(bounds.dimension());
     options.max_evaluations = limit.unwrap_or(options.max_evaluations);
     pattern::minimise_observed(score, start, &bounds, &options, observe)

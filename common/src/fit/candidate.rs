@@ -75,7 +75,7 @@ mod tests {
     use crate::brdf::{BlinnPhong, Ggx};
 
     fn candidate(alpha: f64) -> Candidate {
-        let parameters = vec![0.1, 0.2, 0.3, 0.04, 0.04, 0.04, alpha];
+        let parameters = vec![0.1, 0.2, 0.3, 0.04, 0.04, 0.04, 1.0, alpha];
         let termination = Termination::GradientTolerance;
         Candidate { gamma: 1.0, subset: 0, parameters, cost: 1.0, evaluations: 1, termination }
     }

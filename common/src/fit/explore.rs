@@ -4,11 +4,12 @@
 
 use super::{
     polish::{Judges, Limits, Polished, polish},
+    ranges::Ranges,
     stage_one::paper_start,
     stage_two::FullView,
 };
 use crate::{
-    brdf::{Model, flat_bounds},
+    brdf::Model,
     math::elementary::{exp, ln},
     search::{Progress, SearchError, Termination},
 };
@@ -37,8 +38,8 @@ const SHARPEST: f64 = 0.015;
 const INSIDE: f64 = 0.01;
 
 /// The starts: the winner, the winner with other lobes, and the paper's generic start.
-pub(crate) fn starts(model: &dyn Model, won: &[f64]) -> Vec<Vec<f64>> {
-    let (lower, upper) = flat_bounds(model.parameters());
+pub(crate) fn starts(model: &dyn Model, ranges: &Ranges, won: &[f64]) -> Vec<Vec<f64>> {
+    let (lower, upper) = ranges.bounds(model);
     let width = model.lobes().iter().find_map(|basis| basis.width);
     let with_width = |alpha: f64| {
         let mut start = won.to_vec();
@@ -72,12 +73,12 @@ pub(crate) fn explore(
     view: &FullView<'_>,
     judges: Judges<'_>,
     starts: &[Vec<f64>],
-    max_evaluations: usize,
+    (ranges, max_evaluations): (&Ranges, usize),
     observe: &mut dyn FnMut(&Progress<'_>) -> ControlFlow<()>,
 ) -> Result<Polished, SearchError> {
     let score = |p: &Polished| judges.by.pick(p.cssim, p.cssim_object);
     let mut search = |start: Vec<f64>, evaluations: usize| {
-        let limits = Limits { evaluations: evaluations.min(max_evaluations), tolerance: TOLERANCE };
+        let limits = Limits { ranges, evaluations: evaluations.min(max_evaluations), tolerance: TOLERANCE };
         polish(view, judges, &[start], limits, &mut *observe)
     };
     let (mut found, mut failure, mut spent) = (Vec::new(), SearchError::NoParameters, 0);
@@ -141,12 +142,15 @@ mod tests {
 
     #[test]
     fn starts_are_different_lobes_inside_the_box() {
-        let won = vec![0.0, 0.0, 0.3, 1.0, 0.2, 0.0, 0.4];
-        let starts = starts(&Ggx, &won);
-        assert_eq!(starts.len(), 4);
-        assert_eq!(starts[0], [0.01, 0.01, 0.3, 0.99, 0.2, 0.01, 0.4]);
-        assert!((starts[1][6] / 0.03 - 1.0).abs() < 0.02 && (starts[2][6] / 0.1 - 1.0).abs() < 0.02);
-        assert_eq!(starts[3], [0.3; 7]);
+        let won = vec![0.0, 0.0, 0.3, 2.0, 0.2, 0.0, 0.7, 0.4];
+        let mut ranges = Ranges::default();
+        let free = starts(&Ggx, &ranges, &won);
+        assert_eq!(free.len(), 4);
+        assert_eq!(free[0], [0.01, 0.01, 0.3, 1.98, 0.2, 0.02, 0.7, 0.4]);
+        assert!((free[1][7] / 0.03 - 1.0).abs() < 0.02 && (free[2][7] / 0.1 - 1.0).abs() < 0.02);
+        assert_eq!(free[3], [0.3; 8]);
+        ranges.hold(&Ggx, "f90", &[1.0]).unwrap();
+        assert!(starts(&Ggx, &ranges, &won).iter().all(|start| start[6] == 1.0));
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! The settings of the method, with their defaults (design sections 1, 2 and 10).
 
-use super::gammas::Gammas;
+use super::{gammas::Gammas, ranges::Ranges};
 use crate::{
     brdf::{DEFAULT_MODEL, Model},
     choice::choice,
@@ -123,6 +123,8 @@ choice! { JudgedBy:
 pub struct Method {
     /// The BRDF model.
     pub model: &'static dyn Model,
+    /// The parameters of it that are held or have a narrower range.
+    pub ranges: Ranges,
     /// Gammas of stage one, ascending.
     pub gammas: Vec<f64>,
     /// Pixels of stage one.
@@ -151,6 +153,7 @@ impl Default for Method {
     fn default() -> Self {
         Self {
             model: DEFAULT_MODEL,
+            ranges: Ranges::default(),
             gammas: Gammas::DEFAULT.values(),
             samples: SampleCount::default(),
             sampling: Sampling::default(),
@@ -185,6 +188,12 @@ pub enum MethodError {
     /// The number of subsets is 0.
     #[error("the number of subsets must be at least 1, found 0")]
     NoSubsets,
+    /// No parameter is free.
+    #[error("--fix holds all parameters of {model}, so there is nothing to find: use lookalike render and compare")]
+    NothingFree {
+        /// The model.
+        model: &'static str,
+    },
     /// Several subsets of all pixels.
     #[error("{subsets} subsets of all pixels would be equal: use 1 subset, or give a number of samples")]
     SameSubsets {
@@ -216,6 +225,9 @@ impl Method {
         let positive = self.gammas.iter().all(|g| g.is_finite() && *g > 0.0);
         if self.gammas.is_empty() || !ascending || !positive {
             return Err(MethodError::Gammas { found: self.gammas.clone() });
+        }
+        if self.ranges.hold_everything(self.model) {
+            return Err(MethodError::NothingFree { model: self.model.name() });
         }
         if self.samples == SampleCount::Draws(0) {
             return Err(MethodError::NoSamples);
@@ -262,6 +274,7 @@ impl Method {
         // Without `..`: a new field has to be listed.
         let Self {
             model,
+            ranges,
             gammas,
             samples,
             sampling,
@@ -283,6 +296,8 @@ impl Method {
         let named = |choice: &dyn fmt::Debug| json!(format!("{choice:?}").to_lowercase());
         vec![
             Setting::new("--model", "model", json!(model.name())),
+            Setting::new("--fix", "fixed", ranges.held()),
+            Setting::new("--bounds", "bounds", ranges.narrowed()),
             Setting::new("--samples", "samples", samples),
             Setting::new("--sampling", "sampling", json!(sampling.to_string())),
             Setting::new("--subsets", "subsets", json!(subsets)),

@@ -16,6 +16,7 @@ mod gammas;
 mod method;
 mod objective;
 pub(crate) mod polish;
+mod ranges;
 mod scan;
 pub(crate) mod stage_one;
 mod stage_two;
@@ -32,6 +33,7 @@ pub use method::{
 };
 pub use objective::Objective;
 pub use polish::{Judges, Limits, MAX_EVALUATIONS, Polished, polish};
+pub use ranges::Ranges;
 pub use stage_one::{ScannedTable, SearchFailure, search_gamma};
 pub use stage_two::{FullView, Judged, judge_candidates, winner};
 pub use uncertainty::{LARGEST_SHARE, Uncertainty};

@@ -191,7 +191,7 @@ mod tests {
         let subset = PixelSubset { pixels: vec![[0, 0], [1, 0]], weights: vec![1.0; 2] };
         let cost = |red: f32| {
             let photo = [[red, 0.2, 0.7], [0.4, 0.3, 0.2]];
-            Objective::new(model, &table, &subset, &photo, Compression::new(3.0, 0.2)).cost(&[0.2; 7])
+            Objective::new(model, &table, &subset, &photo, Compression::new(3.0, 0.2)).cost(&[0.2; 8])
         };
         assert_eq!(cost(-0.01).to_bits(), cost(0.0).to_bits());
         assert!(cost(0.0) < 10.0);

@@ -7,6 +7,7 @@
 use super::{
     method::{JudgedBy, SearchKind},
     objective::flat_roles,
+    ranges::Ranges,
     stage_one::{search_bounds, within_table},
     stage_two::{FullView, Renderer},
 };
@@ -23,20 +24,22 @@ use std::ops::ControlFlow;
 /// Most evaluations of CSSIM.
 pub const MAX_EVALUATIONS: usize = 500;
 
-/// When a search on CSSIM ends.
+/// Where a search on CSSIM may go, and when it ends.
 #[derive(Debug, Clone, Copy)]
-pub struct Limits {
+pub struct Limits<'a> {
+    /// The ranges of the parameters.
+    pub ranges: &'a Ranges,
     /// Most evaluations.
     pub evaluations: usize,
     /// Decrease of CSSIM below which two iterations in a row end the search.
     pub tolerance: f64,
 }
 
-impl Limits {
+impl<'a> Limits<'a> {
     /// Limits of polish.
     #[must_use]
-    pub fn of_polish(evaluations: usize) -> Self {
-        Self { evaluations, tolerance: QuasiNewtonOptions::default().function_tolerance }
+    pub fn of_polish(ranges: &'a Ranges, evaluations: usize) -> Self {
+        Self { ranges, evaluations, tolerance: QuasiNewtonOptions::default().function_tolerance }
     }
 }
 
@@ -79,10 +82,10 @@ pub fn polish(
     view: &FullView<'_>,
     judges: Judges<'_>,
     starts: &[Vec<f64>],
-    limits: Limits,
+    limits: Limits<'_>,
     observe: &mut dyn FnMut(&Progress<'_>) -> ControlFlow<()>,
 ) -> Result<Polished, SearchError> {
-    let (bounds, table_is_tighter) = polish_bounds(view)?;
+    let (bounds, table_is_tighter) = polish_bounds(view, limits.ranges)?;
     let picked = |score: &Score| judges.by.pick(score.cssim, score.cssim_object);
     let renderer = Renderer::new(view);
     let objective = |point: &[f64]| {
@@ -146,10 +149,10 @@ fn best_start(
 /// A width in this outermost share of the table's logarithmic span counts as at its edge.
 const EDGE: f64 = 0.02;
 
-/// The model's box with the main lobe's width restricted to the table's span, and whether the span is tighter than the model's lower
+/// The box of the parameters with the main lobe's width restricted to the table's span, and whether the span is tighter than the model's lower
 /// and upper bound.
-fn polish_bounds(view: &FullView<'_>) -> Result<(Bounds, [bool; 2]), SearchError> {
-    let model_bounds = search_bounds(view.model, SearchKind::LeastSquares)?;
+fn polish_bounds(view: &FullView<'_>, ranges: &Ranges) -> Result<(Bounds, [bool; 2]), SearchError> {
+    let model_bounds = search_bounds(view.model, ranges, SearchKind::LeastSquares)?;
     let (bounds, tighter) = within_table(view.model, &model_bounds, view.span())?;
     // Small steps of a reflectance are visible where the reflectance is small.
     let is_width = |entry| view.model.lobes().iter().any(|b| b.width.is_some_and(|width| width.entry == entry));

@@ -5,9 +5,12 @@
 //! couples the channels. Terms of fixed weight move to the right-hand side. A model in which one linear parameter multiplies another
 //! provides coordinates in which it does not (`Model::scan_weights`).
 
-use super::objective::{flat_roles, observed};
+use super::{
+    objective::{flat_roles, observed},
+    ranges::Ranges,
+};
 use crate::{
-    brdf::{BasisLobe, Channels, Model, Role, flat_bounds, flat_len, lobe_terms, term_count},
+    brdf::{BasisLobe, Channels, Model, Role, flat_len, lobe_terms, term_count},
     math::Rgb,
     render::table::{Planes, TransportTable},
     search::{NormalEquations, bvls},
@@ -16,8 +19,16 @@ use std::ops::Range;
 
 /// All points of the scan, in the order of widths, then scanned values. Of several points that give the same material, such as points
 /// that differ only in a lobe of zero weight, only the first is kept.
-pub(super) fn scan(model: &dyn Model, table: &TransportTable, weights: &[f64], photo: &[[f32; 3]]) -> Vec<Vec<f64>> {
-    let grids = grids(model, table);
+pub(super) fn scan(
+    model: &dyn Model,
+    ranges: &Ranges,
+    table: &TransportTable,
+    weights: &[f64],
+    photo: &[[f32; 3]],
+) -> Vec<Vec<f64>> {
+    let (lower, upper) = ranges.bounds(model);
+    let bounds = [&lower[..], &upper[..]];
+    let grids = grids(model, bounds, table);
     let mut terms: Vec<Planes> = (0..term_count(model)).map(|_| table.planes()).collect();
     let mut points: Vec<Vec<f64>> = Vec::new();
     let mut index = vec![0; grids.len()];
@@ -27,7 +38,7 @@ pub(super) fn scan(model: &dyn Model, table: &TransportTable, weights: &[f64], p
             point[*entry] = values[i];
         }
         table.terms(model, &point, false, &mut terms);
-        if solve_linear(model, &terms, weights, photo, &mut point)
+        if solve_linear(model, bounds, &terms, weights, photo, &mut point)
             && !points.iter().any(|known| same(model, known, &point))
         {
             points.push(point);
@@ -59,25 +70,34 @@ fn same(model: &dyn Model, a: &[f64], b: &[f64]) -> bool {
 }
 
 /// Entries of the flat vector that are scanned, with their values.
-fn grids(model: &dyn Model, table: &TransportTable) -> Vec<(usize, Vec<f64>)> {
-    let (lower, upper) = flat_bounds(model.parameters());
+fn grids(model: &dyn Model, [lower, upper]: [&[f64]; 2], table: &TransportTable) -> Vec<(usize, Vec<f64>)> {
+    let within = |entry: usize, values: &mut dyn Iterator<Item = f64>| {
+        let mut values: Vec<f64> = values.map(|x| x.clamp(lower[entry], upper[entry])).collect();
+        values.dedup();
+        (entry, values)
+    };
     let scanned = flat_roles(model).into_iter().enumerate().filter_map(|(entry, role)| match role {
         Role::Linear => None,
-        Role::Scanned(values) => Some((entry, values.to_vec())),
+        Role::Scanned(values) => Some(within(entry, &mut values.iter().copied())),
         Role::Width => {
             let of_entry = |b: &BasisLobe| b.width.filter(|width| width.entry == entry);
             let (lobe, width) = model.lobes().iter().enumerate().find_map(|(l, b)| Some((l, of_entry(b)?)))?;
-            let values = table.lobes[lobe].knots?.widths().into_iter().map(width.inverse);
-            // The outermost knots equal the bounds up to rounding.
-            Some((entry, values.map(|x| x.clamp(lower[entry], upper[entry])).collect()))
+            // The outermost knots equal the model's bounds up to rounding.
+            Some(within(entry, &mut table.lobes[lobe].knots?.widths().into_iter().map(width.inverse)))
         }
     });
     scanned.collect()
 }
 
 /// Fills the linear entries of `point` with the bounded least-squares solution at gamma = 1; false if there is no solution.
-fn solve_linear(model: &dyn Model, terms: &[Planes], weights: &[f64], photo: &[[f32; 3]], point: &mut [f64]) -> bool {
-    let (lower, upper) = flat_bounds(model.parameters());
+fn solve_linear(
+    model: &dyn Model,
+    [lower, upper]: [&[f64]; 2],
+    terms: &[Planes],
+    weights: &[f64],
+    photo: &[[f32; 3]],
+    point: &mut [f64],
+) -> bool {
     let fixed = weights_with(model, point, None);
     for (channels, entries) in systems(model) {
         let columns: Vec<Vec<Rgb>> = entries.iter().map(|&e| weights_with(model, point, Some(e))).collect();
@@ -94,10 +114,11 @@ fn solve_linear(model: &dyn Model, terms: &[Planes], weights: &[f64], photo: &[[
             }
         }
         let bound = |b: &[f64]| entries.iter().map(|&e| b[e]).collect::<Vec<f64>>();
-        let Ok(solution) = bvls::solve(&normal, &bound(&lower), &bound(&upper)) else { return false };
+        let Ok(solution) = bvls::solve(&normal, &bound(lower), &bound(upper)) else { return false };
         entries.iter().zip(&solution.point).for_each(|(&e, &x)| point[e] = x);
     }
     model.parameters_of_scan(point);
+    point.iter_mut().zip(lower.iter().zip(upper)).for_each(|(x, (l, u))| *x = x.clamp(*l, *u));
     true
 }
 

@@ -5,10 +5,11 @@ use super::{
     direct::DirectPixels,
     method::{Compress, Method, SearchKind, Start},
     objective::{Objective, flat_roles},
+    ranges::Ranges,
     scan::scan,
 };
 use crate::{
-    brdf::{self, Model, Role, flat_bounds, flat_len},
+    brdf::{self, Model, Role, flat_len},
     metric::cost::Compression,
     render::{subset::PixelSubset, table::TransportTable},
     search::{
@@ -53,8 +54,12 @@ impl ScannedTable {
     #[must_use]
     pub fn new(method: &Method, table: TransportTable, subset: &PixelSubset, photo: &[[f32; 3]]) -> Self {
         let starts = match method.start {
-            Start::Paper => vec![paper_start(method.model)],
-            Start::Scan => scan(method.model, &table, &subset.weights, photo),
+            Start::Paper => {
+                let (lower, upper) = method.ranges.bounds(method.model);
+                let inside = |(x, (l, u)): (f64, (&f64, &f64))| x.clamp(*l, *u);
+                vec![paper_start(method.model).into_iter().zip(lower.iter().zip(&upper)).map(inside).collect()]
+            }
+            Start::Scan => scan(method.model, &method.ranges, &table, &subset.weights, photo),
         };
         Self { table, starts }
     }
@@ -76,7 +81,7 @@ pub fn search_gamma(
     direct: Option<DirectPixels<'_>>,
 ) -> Result<Candidate, SearchFailure> {
     let fail = |source| SearchFailure::Search { gamma, source };
-    let bounds = search_bounds(method.model, method.search).map_err(fail)?;
+    let bounds = search_bounds(method.model, &method.ranges, method.search).map_err(fail)?;
     let ScannedTable { table, starts } = scanned;
     let (bounds, _) = within_table(method.model, &bounds, table.span()).map_err(fail)?;
     let mut objective = objective_of(method, gamma, table, subset, photo, mean_radiance);
@@ -172,20 +177,23 @@ pub(super) fn within_table(
     if let Some((width, span)) = model.lobes().iter().find_map(|basis| basis.width).zip(span) {
         let (entry, (first, last)) = (width.entry, width.entries(span));
         tighter = [first > lower[entry] * (1.0 + 1e-9), last < upper[entry] * (1.0 - 1e-9)];
+        // A width may be held outside the span.
         if tighter[0] {
             lower[entry] = first;
+            upper[entry] = upper[entry].max(first);
         }
         if tighter[1] {
             upper[entry] = last;
+            lower[entry] = lower[entry].min(last);
         }
     }
     Ok((Bounds::new(lower, upper, bounds.scales().to_vec())?, tighter))
 }
 
-/// The bounds of a model's parameters and the scale in which a search steps. Least squares steps in the logarithm of a width, because the
+/// The bounds of a model's parameters in a fit and the scale in which a search steps. Least squares steps in the logarithm of a width, because the
 /// table's widths are evenly spaced in it. For all other parameters, and in pattern search, the model declares the scale.
-pub(super) fn search_bounds(model: &dyn Model, search: SearchKind) -> Result<Bounds, SearchError> {
-    let (lower, upper) = flat_bounds(model.parameters());
+pub(super) fn search_bounds(model: &dyn Model, ranges: &Ranges, search: SearchKind) -> Result<Bounds, SearchError> {
+    let (lower, upper) = ranges.bounds(model);
     let declared = model.parameters().iter().flat_map(|p| std::iter::repeat_n(p.scale, p.channels.count()));
     let scales = declared.zip(flat_roles(model)).map(|(scale, role)| match (search, role, scale) {
         (SearchKind::LeastSquares, Role::Width, _) | (_, _, brdf::Scale::Logarithmic) => search::Scale::Logarithmic,

@@ -16,7 +16,7 @@
 //!
 //! Not included: errors of the light and of the geometry.
 
-use super::{method::SearchKind, objective::Objective, stage_one::search_bounds};
+use super::{method::SearchKind, objective::Objective, ranges::Ranges, stage_one::search_bounds};
 use crate::{
     brdf::Model,
     search::{NormalEquations, Sandwich, SearchError, least_squares::LeastSquaresProblem},
@@ -31,6 +31,8 @@ pub enum Uncertainty {
     AtBound,
     /// A large part of the parameter's range matches the photo equally well.
     Undetermined,
+    /// The fit holds the parameter.
+    Held,
 }
 
 impl Uncertainty {
@@ -38,7 +40,7 @@ impl Uncertainty {
     fn standard_error(self) -> Option<f64> {
         match self {
             Self::StandardError(error) => Some(error),
-            Self::AtBound | Self::Undetermined => None,
+            Self::AtBound | Self::Undetermined | Self::Held => None,
         }
     }
 }
@@ -59,19 +61,20 @@ const AT_BOUND: f64 = 1e-5;
 /// # Errors
 /// If the model's bounds are not a valid box.
 pub(crate) fn uncertainties(
-    model: &dyn Model,
+    (model, ranges): (&dyn Model, &Ranges),
     objective: &mut Objective<'_>,
     point: &[f64],
 ) -> Result<Vec<Uncertainty>, SearchError> {
-    let bounds = search_bounds(model, SearchKind::LeastSquares)?;
+    let bounds = search_bounds(model, ranges, SearchKind::LeastSquares)?;
     let is_inside = |i: usize| {
         let t = bounds.to_scaled(i, point[i]);
         (AT_BOUND..=1.0 - AT_BOUND).contains(&t)
     };
     let inside: Vec<bool> = (0..point.len()).map(is_inside).collect();
+    let is_held = |i: usize| bounds.lower()[i] == bounds.upper()[i];
     // One set of free parameters for those inside, and one more for each parameter at its bound, with that parameter free as well.
     let mut freed = vec![inside.clone()];
-    for i in (0..point.len()).filter(|&i| !inside[i]) {
+    for i in (0..point.len()).filter(|&i| !inside[i] && !is_held(i)) {
         freed.push((0..point.len()).map(|j| inside[j] || j == i).collect());
     }
     let residuals = residuals(objective, point);
@@ -79,6 +82,9 @@ pub(crate) fn uncertainties(
         let errors = standard_errors(objective, place, &residuals, &freed);
         let mut of_bounds = errors[1..].iter();
         let judge = |i: usize| {
+            if is_held(i) {
+                return Uncertainty::Held;
+            }
             let errors = if inside[i] { Some(&errors[0]) } else { of_bounds.next() };
             let error = errors.map_or(f64::INFINITY, |errors| errors[i]);
             let share = error / bounds.scaled_derivative(i, place[i]);

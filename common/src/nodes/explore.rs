@@ -17,7 +17,7 @@ impl NodeType for Explore {
     }
 
     fn run(&self, parameters: &[u8], inputs: &[Blob], context: &RunContext) -> Result<Vec<u8>, NodeFailure> {
-        let PolishParameters { starts, max_evaluations } = read("parameters of explore", parameters)?;
+        let PolishParameters { ranges, starts, max_evaluations } = read("parameters of explore", parameters)?;
         let scene = Scene::read(inputs, context)?;
         starts.iter().try_for_each(|start| check_parameters("starts", scene.view.model, start))?;
         let total = most_evaluations(starts.len(), max_evaluations as usize) as u64;
@@ -34,7 +34,7 @@ impl NodeType for Explore {
         };
         let (view, limit) = (scene.full(), max_evaluations as usize);
         let searching = scene.view.searching()?;
-        let found = explore(&view, scene.view.judges(&searching), &starts, limit, &mut observe)
+        let found = explore(&view, scene.view.judges(&searching), &starts, (&ranges, limit), &mut observe)
             .map_err(|error| NodeFailure::new(format!("explore: {error}")))?;
         // A cancelled search has no result.
         context.check()?;

@@ -2,7 +2,7 @@
 
 use super::view::Scene;
 use crate::{
-    fit::{Limits, polish},
+    fit::{Limits, Ranges, polish},
     graph::{Blob, NodeFailure, NodeType, RunContext},
     nodes::wire::{PolishedWire, check_parameters, read, write},
 };
@@ -11,6 +11,7 @@ use std::ops::ControlFlow;
 
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(crate) struct PolishParameters {
+    pub(crate) ranges: Ranges,
     /// Possible starts; the search starts from the best of them on this node's table.
     pub(crate) starts: Vec<Vec<f64>>,
     pub(crate) max_evaluations: u32,
@@ -25,7 +26,7 @@ impl NodeType for Polish {
     }
 
     fn run(&self, parameters: &[u8], inputs: &[Blob], context: &RunContext) -> Result<Vec<u8>, NodeFailure> {
-        let PolishParameters { starts, max_evaluations } = read("parameters of polish", parameters)?;
+        let PolishParameters { ranges, starts, max_evaluations } = read("parameters of polish", parameters)?;
         let scene = Scene::read(inputs, context)?;
         starts.iter().try_for_each(|start| check_parameters("starts", scene.view.model, start))?;
         let mut observe = |progress: &crate::search::Progress<'_>| {
@@ -33,7 +34,7 @@ impl NodeType for Polish {
             if context.is_cancelled() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         };
         let searching = scene.view.searching()?;
-        let (view, limits) = (scene.full(), Limits::of_polish(max_evaluations as usize));
+        let (view, limits) = (scene.full(), Limits::of_polish(&ranges, max_evaluations as usize));
         let polished = polish(&view, scene.view.judges(&searching), &starts, limits, &mut observe)
             .map_err(|error| NodeFailure::new(format!("polish: {error}")))?;
         // A cancelled search has no result.

@@ -6,7 +6,7 @@
 use super::view::concatenated;
 use crate::{
     brdf::{self, Model},
-    fit::{Compress, DirectPixels, Method, ScannedTable, SearchKind, Start, search_gamma},
+    fit::{Compress, DirectPixels, Method, Ranges, ScannedTable, SearchKind, Start, search_gamma},
     graph::{Blob, BlobHash, NodeFailure, NodeType, RunContext},
     light::LightDistribution,
     nodes::wire::{CandidateWire, EnvironmentWire, ImageWire, SubsetWire, read, write},
@@ -19,6 +19,7 @@ use std::sync::Arc;
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(crate) struct SearchParameters {
     pub(crate) model: String,
+    ranges: Ranges,
     pub(crate) gamma: f64,
     pub(crate) subset: u32,
     /// Mean luminance of the photo over its usable pixels.
@@ -41,6 +42,7 @@ impl SearchParameters {
         // integrator is in `direct`, the pixels are in the subset.
         let Method {
             model,
+            ranges,
             search,
             start,
             compress,
@@ -55,6 +57,7 @@ impl SearchParameters {
         } = method;
         Self {
             model: model.name().to_owned(),
+            ranges: ranges.clone(),
             gamma,
             subset,
             mean_radiance,
@@ -69,6 +72,7 @@ impl SearchParameters {
     fn method(&self, model: &'static dyn Model) -> Result<Method, NodeFailure> {
         Ok(Method {
             model,
+            ranges: self.ranges.clone(),
             search: if self.pattern { SearchKind::Pattern } else { SearchKind::LeastSquares },
             start: if self.paper_start { Start::Paper } else { Start::Scan },
             compress: self.compress.compress()?,
@@ -181,10 +185,11 @@ impl NodeType for Search {
             return Err(NodeFailure::new(format!("gamma {gamma} and mean radiance {mean} must be positive")));
         }
         let method = parameters.method(model)?;
-        // Searches of other gammas reuse the scan: it depends on the inputs and the start alone.
+        // Searches of other gammas reuse the scan: it depends on the inputs, the start and the ranges alone.
         let hashes = inputs.iter().flat_map(|input| input.hash().0);
         let of_start = [u8::from(parameters.paper_start), u8::from(parameters.direct.is_some())];
-        let key: Vec<u8> = of_start.into_iter().chain(model.name().bytes()).chain(hashes).collect();
+        let ranges = write("ranges", &parameters.ranges)?;
+        let key: Vec<u8> = of_start.into_iter().chain(model.name().bytes()).chain(ranges).chain(hashes).collect();
         let bytes = shards.iter().map(|shard| shard.len()).sum();
         let scanned = context.derived(BlobHash::of(&key), bytes, || {
             let table = concatenated(model, shards, context)?;

@@ -304,9 +304,9 @@ mod tests {
             termination: "because".to_owned(),
         };
         assert!(candidate.clone().candidate(&Ggx).unwrap_err().to_string().contains("do not fit ggx"));
-        let inside = CandidateWire { parameters: vec![0.5; 7], ..candidate };
+        let inside = CandidateWire { parameters: vec![0.5; 8], ..candidate };
         assert!(inside.clone().candidate(&Ggx).unwrap_err().to_string().contains("because"));
-        let outside = CandidateWire { parameters: vec![f64::NAN; 7], ..inside };
+        let outside = CandidateWire { parameters: vec![f64::NAN; 8], ..inside };
         assert!(outside.candidate(&Ggx).unwrap_err().to_string().contains("do not fit ggx"));
     }
 }

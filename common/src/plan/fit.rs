@@ -291,9 +291,9 @@ impl FitPlanner {
             .map(|(candidate, (cssim, cssim_object))| Judged { candidate, cssim, cssim_object })
             .collect();
         let Judged { candidate: winner, cssim, cssim_object } = self.winner_of_stage_two()?.clone();
-        let model = self.scene.method.model;
+        let (model, ranges) = (self.scene.method.model, self.scene.method.ranges.clone());
         self.uncertainty = self
-            .with_objective(&winner, graph, |objective| uncertainties(model, objective, &winner.parameters))?
+            .with_objective(&winner, graph, |objective| uncertainties((model, &ranges), objective, &winner.parameters))?
             .map_err(|error| PlanError::Other(error.into()))?;
         self.tables_of_subsets.forget(winner.subset as usize);
         self.release_subset_tables(graph);

@@ -110,8 +110,9 @@ impl Polishing {
     ) -> Result<Step, PlanError> {
         let Some((view, table)) = &self.coarse else { return self.polish_winner(won, scene, graph) };
         let inputs = [vec![Input::Blob(*view)], table.clone()].concat();
-        let parameters =
-            PolishParameters { starts: starts(scene.method.model, won), max_evaluations: index(MAX_EXPLORATIONS) };
+        let ranges = scene.method.ranges.clone();
+        let starts = starts(scene.method.model, &ranges, won);
+        let parameters = PolishParameters { ranges, starts, max_evaluations: index(MAX_EXPLORATIONS) };
         let node = scene.add_on_view(graph, (nodes::EXPLORE, nodes::EXPLORE), inputs, &parameters)?;
         Ok(Step::Exploring(node))
     }
@@ -129,10 +130,13 @@ impl Polishing {
         // Not released earlier: the plan checks every shard when it arrives.
         let table = self.coarse.take().map_or_else(Vec::new, |(_, table)| table);
         table.iter().filter_map(Input::node).for_each(|shard| graph.release(shard));
-        let most = most_evaluations(starts(model, &won).len(), MAX_EXPLORATIONS);
+        let most = most_evaluations(starts(model, &scene.method.ranges, &won).len(), MAX_EXPLORATIONS);
         let found = verify::polished(model, output, most)?;
         self.explored_evaluations = found.evaluations;
-        let found = found.parameters;
+        let mut found = found.parameters;
+        // A width may be held outside the span of the coarse picture's table.
+        let (lower, upper) = scene.method.ranges.bounds(model);
+        found.iter_mut().zip(lower.iter().zip(&upper)).for_each(|(x, (l, u))| *x = x.clamp(*l, *u));
         let inside =
             |span: Option<(f64, f64)>| span.zip(width(model, &found)).is_none_or(|(s, w)| s.0 <= w && w <= s.1);
         let both = needed_span(model, [&won[..], &found[..]].into_iter());
@@ -157,7 +161,8 @@ impl Polishing {
 
     fn add_polish(&self, scene: &mut SceneTables, graph: &mut GraphEdit<'_>) -> Result<Step, PlanError> {
         let left = MAX_EVALUATIONS.saturating_sub(self.evaluations);
-        let parameters = PolishParameters { starts: self.starts.clone(), max_evaluations: index(left) };
+        let ranges = scene.method.ranges.clone();
+        let parameters = PolishParameters { ranges, starts: self.starts.clone(), max_evaluations: index(left) };
         Ok(Step::Polishing(scene.add_judging(graph, nodes::POLISH, scene.span, &parameters)?))
     }
 

@@ -168,7 +168,7 @@ mod tests {
     #[test]
     fn the_estimated_noise_is_the_error_against_a_finer_rendering() {
         let (geometry, light) = scene(|i| [if i == 37 { 40.0 } else { 0.3 }; 3]);
-        let paint = Material::new(&Ggx, vec![0.3, 0.3, 0.3, 0.5, 0.5, 0.5, 0.2]).unwrap();
+        let paint = Material::new(&Ggx, vec![0.3, 0.3, 0.3, 0.5, 0.5, 0.5, 1.0, 0.2]).unwrap();
         let shot = Shot { geometry: &geometry, light: &light, reflectance: &paint, samples: 64, seed: 0 };
         let (coarse, fine) = (shot.render(|| ()), Shot { samples: 4096, ..shot }.render(|| ()));
         let (mut square, mut count, mut relative) = (0.0, 0.0, Vec::new());
@@ -192,7 +192,7 @@ mod tests {
     #[test]
     fn one_sample_has_no_noise_estimate_and_seeds_differ() {
         let (geometry, light) = scene(|i| [i as f32 + 0.1; 3]);
-        let paint = Material::new(&Ggx, vec![0.3, 0.3, 0.3, 0.5, 0.5, 0.5, 0.2]).unwrap();
+        let paint = Material::new(&Ggx, vec![0.3, 0.3, 0.3, 0.5, 0.5, 0.5, 1.0, 0.2]).unwrap();
         let shot = Shot { geometry: &geometry, light: &light, reflectance: &paint, samples: 1, seed: 0 };
         let single = shot.render(|| ());
         assert_eq!(single.noise, None);

@@ -14,6 +14,8 @@ use std::collections::BTreeSet;
 /// The model of the paper's results.
 const PAPER: &str = "cook-torrance";
 
+const GGX: &str = "ggx";
+
 pub(super) fn section(study: &Study<'_>) -> anyhow::Result<Section> {
     let mut section = Section::new("models", "BRDF models");
     let models: BTreeSet<&str> =
@@ -56,9 +58,6 @@ pub(super) fn section(study: &Study<'_>) -> anyhow::Result<Section> {
     }
     let (verdict, words) = claim(study);
     section.finding(verdict, words);
-    if let Some(words) = grazing(study) {
-        section.finding(Verdict::Measured, words);
-    }
     Ok(section)
 }
 
@@ -92,30 +91,6 @@ fn by_material(study: &Study<'_>, models: &[&str], caption: &str) -> Table {
         table.totals = 1;
     }
     table
-}
-
-/// `ggx` with a free reflectance at grazing incidence.
-const FREE_RIM: &str = "ggx-f90";
-
-const GGX: &str = "ggx";
-
-/// The cost of the bright rim of Schlick's Fresnel term: GGX compared with GGX of free reflectance at grazing incidence, in cells where
-/// the paper's model was fitted too.
-pub(super) fn grazing(study: &Study<'_>) -> Option<String> {
-    let of = study.cells().into_iter().map(|cell| scores(study, cell, &[GGX, FREE_RIM, PAPER]));
-    let complete: Vec<Vec<f64>> = of.filter_map(|scores| scores.into_iter().collect()).collect();
-    let column = |i: usize| mean(&complete.iter().map(|scores| scores[i]).collect::<Vec<_>>());
-    let (bound, free, paper) = (column(0)?, column(1)?, column(2)?);
-    let wins = |rival: usize| complete.iter().filter(|scores| scores[1] < scores[rival]).count();
-    Some(format!(
-        "The Fresnel term of {GGX} rises to 1 at grazing incidence, as that of a smooth interface does; in {FREE_RIM} the value \
-         at grazing incidence is a parameter. The mean CSSIM of {FREE_RIM} is {} against {} of {GGX} (lower in {} cells) and {} of {PAPER} (lower in {}), all with polish.",
-        text::score(Some(free)),
-        text::score(Some(bound)),
-        text::share(wins(0), complete.len()),
-        text::score(Some(paper)),
-        text::share(wins(2), complete.len())
-    ))
 }
 
 fn scores(study: &Study<'_>, cell: (&str, &str), models: &[&str]) -> Vec<Option<f64>> {

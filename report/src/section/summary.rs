@@ -15,7 +15,6 @@ type Claim = (&'static str, (Verdict, String));
 
 pub(super) fn section(study: &Study<'_>) -> anyhow::Result<Section> {
     let mut section = Section::new("summary", "Summary");
-    let rim = models::grazing(study).map(|words| ("The rim of Schlick's Fresnel term", (Verdict::Measured, words)));
     let claims: [Claim; 10] = [
         ("The study's model against the paper's", models::claim(study)),
         ("Ours with polish is as good as brute force", brute(study)),
@@ -33,9 +32,8 @@ pub(super) fn section(study: &Study<'_>) -> anyhow::Result<Section> {
         3,
         ["claim", "verdict", "numbers and rule"],
     );
-    let (first, others) = claims.split_at(1);
-    let tried = |(_, (_, numbers)): &Claim| numbers != text::ABSENT;
-    for (claim, (verdict, numbers)) in first.iter().cloned().chain(rim).chain(others.iter().cloned()).filter(tried) {
+    let tried = |(_, (_, numbers)): &&Claim| numbers != text::ABSENT;
+    for (claim, (verdict, numbers)) in claims.iter().filter(tried).cloned() {
         table.rows.push(vec![Entry::of(claim), Entry::verdict(verdict), Entry::of(numbers)]);
     }
     if table.rows.is_empty() {

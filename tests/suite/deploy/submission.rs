@@ -13,7 +13,7 @@ fn site(sbatch: &str) -> TempDir {
     fs::write(folder.path().join("two.toml"), manifest).unwrap();
     let study = "materials = [\"paint.binary\"]\nprobes = [\"map.exr\"]\n";
     fs::write(folder.path().join("study.toml"), study).unwrap();
-    let paint = Material::new(&Ggx, vec![0.3, 0.12, 0.08, 0.05, 0.05, 0.05, 0.25]).unwrap();
+    let paint = Material::new(&Ggx, vec![0.3, 0.12, 0.08, 0.05, 0.05, 0.05, 1.0, 0.25]).unwrap();
     fs::write(folder.path().join("paint.binary"), merl::file_of(&paint)).unwrap();
     let path = folder.path().join("sbatch");
     fs::write(&path, format!("#!/bin/sh\nPATH=/usr/bin:/bin\n{sbatch}\n")).unwrap();

@@ -14,10 +14,11 @@ fn check_ggx(parameters: &Value) {
     for name in COLOURS {
         let colour = parameters[name].as_array().unwrap();
         assert_eq!(colour.len(), 3);
-        assert!(colour.iter().all(|x| (0.0..=1.0).contains(&number(x))), "{parameters}");
+        assert!(colour.iter().all(|x| (0.0..=2.0).contains(&number(x))), "{parameters}");
     }
+    assert!((0.0..=2.0).contains(&number(&parameters["f90"])), "{parameters}");
     assert!((0.005..=1.0).contains(&number(&parameters["alpha"])), "{parameters}");
-    assert_eq!(parameters.as_object().unwrap().len(), 3);
+    assert_eq!(parameters.as_object().unwrap().len(), 4);
 }
 
 #[test]
@@ -100,7 +101,7 @@ fn candidates_csv_has_the_numbers_of_fit_json() {
     let json = fit_json(&folder.path().join("out"));
     let text = fs::read_to_string(folder.path().join("out/candidates.csv")).unwrap();
     let mut lines = text.lines();
-    let header = "gamma,subset,cost,cssim,cssim_object,evaluations,termination,kd.r,kd.g,kd.b,f0.r,f0.g,f0.b,alpha";
+    let header = "gamma,subset,cost,cssim,cssim_object,evaluations,termination,kd.r,kd.g,kd.b,f0.r,f0.g,f0.b,f90,alpha";
     assert_eq!(lines.next(), Some(header));
     let rows: Vec<Vec<&str>> = lines.map(|line| line.split(',').collect()).collect();
     let candidates = json["candidates"].as_array().unwrap();
@@ -110,7 +111,7 @@ fn candidates_csv_has_the_numbers_of_fit_json() {
         let row = rows.iter().find(|row| is_of(row[0], "gamma") && is_of(row[1], "subset")).unwrap();
         let parameters = &candidate["parameters"];
         for (column, expected) in
-            [(2, &candidate["cost"]), (3, &candidate["cssim"]), (8, &parameters["kd"][1]), (13, &parameters["alpha"])]
+            [(2, &candidate["cost"]), (3, &candidate["cssim"]), (8, &parameters["kd"][1]), (14, &parameters["alpha"])]
         {
             assert_eq!(row[column].parse::<f64>().unwrap(), number(expected), "column {column}");
         }
@@ -161,8 +162,8 @@ fn score_of_the_written_pictures_is_the_reported_score() {
 #[test]
 fn results_fit_in_100_columns_and_notes_stay_whole_in_fit_json() {
     let folder = folder();
-    // The winner of two gammas is the first or the last, which gives a note.
-    let fitted = fit(folder.path(), "out", "--samples 32 --gammas 1:1.1:0.1 --workers 1").done();
+    // The winner of two gammas is the first or the last, which gives a note if there is no polish.
+    let fitted = fit(folder.path(), "out", "--samples 32 --gammas 1:1.1:0.1 --polish off --workers 1").done();
     let notes = fit_json(&folder.path().join("out"))["notes"].as_array().unwrap().clone();
     assert!(notes.iter().any(|note| note.as_str().unwrap().len() > 100), "{notes:?}");
     let status = lookalike(folder.path(), "status out").done();

@@ -132,5 +132,5 @@ fn numbers_in(json: &Value) -> Value {
 }
 
 fn ggx(flat: &[f64]) -> Value {
-    json!({ "kd": flat[..3], "f0": flat[3..6], "alpha": flat[6] })
+    json!({ "kd": flat[..3], "f0": flat[3..6], "f90": flat[6], "alpha": flat[7] })
 }

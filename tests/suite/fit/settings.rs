@@ -145,6 +145,24 @@ fn model_is_the_one_requested() {
 }
 
 #[test]
+fn every_search_obeys_held_parameters_and_narrower_ranges() {
+    for search in ["least-squares --polish on", "pattern"] {
+        let json = quick(&format!("--search {search} --fix f90=1,kd=.25,.1,.05 --bounds alpha=.3:.4"));
+        assert_eq!(json["fixed"], json!({ "f90": 1.0, "kd": [0.25, 0.1, 0.05] }));
+        assert_eq!(json["bounds"], json!({ "alpha": [0.3, 0.4] }));
+        let candidates = json["candidates"].as_array().unwrap().iter();
+        let polished = json.get("polished").filter(|polished| !polished.is_null());
+        for parameters in candidates.chain(polished).map(|result| &result["parameters"]) {
+            assert_eq!((&parameters["f90"], &parameters["kd"]), (&json!(1.0), &json!([0.25, 0.1, 0.05])));
+            assert!((0.3..=0.4).contains(&number(&parameters["alpha"])), "{parameters}");
+        }
+        let state = &json["stage_two"]["uncertainty"]["state"];
+        assert_eq!((&state["f90"], &state["kd"]), (&json!("held"), &json!(["held", "held", "held"])));
+        assert_ne!(state["f0"], json!(["held", "held", "held"]));
+    }
+}
+
+#[test]
 fn progress_goes_to_stderr_in_the_requested_form() {
     let folder = folder();
     let flags = QUICK.replace("--progress none", "");

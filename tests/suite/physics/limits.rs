@@ -25,12 +25,14 @@ const fn count(few: usize, most: usize) -> usize {
 }
 
 fn render(scene: &Scene, pixels: &[Pixel], surface: Surface, accuracy: Accuracy) -> Planes {
-    // Cook-Torrance without specular colour is purely diffuse; GGX always reflects at grazing angles.
     let (model, colour): (&'static dyn Model, &str) =
         if surface.is_some() { (&Ggx, "f0") } else { (&CookTorrance, "kd") };
     let mut parameters = vec![0.0; flat_len(model.parameters())];
     let first = offset_of(model.parameters(), colour).unwrap();
     parameters[first..first + 3].fill(1.0);
+    if let Some(f90) = offset_of(model.parameters(), "f90") {
+        parameters[f90] = 1.0;
+    }
     *parameters.last_mut().unwrap() = surface.unwrap_or(0.1);
     let plan = TransportPlan { model, knots: knots(PER_OCTAVE), accuracy };
     let table = plan.integrate(&scene.geometry, &scene.pyramid, pixels);

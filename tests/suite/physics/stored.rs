@@ -48,7 +48,7 @@ fn stored_references_match_the_integrator() {
         sections.push(section(case.name, &entries));
     }
     let silhouette = Silhouette::new(Silhouette::STORED);
-    let of_material = |(name, parameters): &(&str, [f64; 7])| {
+    let of_material = |(name, parameters): &(&str, [f64; 8])| {
         let reference = silhouette.integrate(parameters);
         ((*name).to_owned(), reference.to_json())
     };

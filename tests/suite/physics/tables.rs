@@ -146,8 +146,8 @@ pub(super) struct Silhouette {
 }
 
 /// Materials at the silhouette, parameters of `ggx`.
-pub(super) const MATERIALS: [(&str, [f64; 7]); 2] =
-    [("plastic", [0.5, 0.3, 0.1, 0.04, 0.04, 0.04, 0.1]), ("metal", [0.0, 0.0, 0.0, 0.9, 0.6, 0.3, 0.03])];
+pub(super) const MATERIALS: [(&str, [f64; 8]); 2] =
+    [("plastic", [0.5, 0.3, 0.1, 0.04, 0.04, 0.04, 1.0, 0.1]), ("metal", [0.0, 0.0, 0.0, 0.9, 0.6, 0.3, 1.0, 0.03])];
 
 impl Silhouette {
     /// Pixels whose reference is stored.
@@ -160,14 +160,14 @@ impl Silhouette {
     }
 
     /// The reference by the direct integrator.
-    pub(super) fn integrate(&self, parameters: &[f64; 7]) -> Reference {
+    pub(super) fn integrate(&self, parameters: &[f64; 8]) -> Reference {
         let material = Material::new(&Ggx, parameters.to_vec()).unwrap();
         let effort = Effort { first: 1 << 15, most: 1 << 15, ..EFFORT };
         Reference::new(&self.scene, &self.pixels, &material, effort, 7)
     }
 
     /// The green channel of some pixels by a table of full images.
-    fn radiance(&self, pixels: &[Pixel], parameters: &[f64; 7]) -> Vec<f64> {
+    fn radiance(&self, pixels: &[Pixel], parameters: &[f64; 8]) -> Vec<f64> {
         let plan = TransportPlan { model: &Ggx, knots: knots(PER_OCTAVE), accuracy: Accuracy::FULL };
         let table = plan.integrate(&self.scene.geometry, &self.scene.pyramid, pixels);
         let mut planes = table.planes();

@@ -36,6 +36,6 @@ impl Target {
     pub(super) fn parameters(&self) -> [(&'static dyn Model, Vec<f64>); 2] {
         let Self { kd, specular, f0, width, .. } = *self;
         let ks = specular.map(|s| s / f0);
-        [(&Ggx, [&kd[..], &specular, &[width]].concat()), (&CookTorrance, [&kd[..], &ks, &[f0, width]].concat())]
+        [(&Ggx, [&kd[..], &specular, &[1.0, width]].concat()), (&CookTorrance, [&kd[..], &ks, &[f0, width]].concat())]
     }
 }

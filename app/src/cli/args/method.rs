@@ -1,10 +1,11 @@
 //! Flags of the method.
 
 use super::{super::preset, choice::choice};
-use crate::settings::{DisplayExposure, ModelName, Preset};
+use crate::settings::{DisplayExposure, ModelBounds, ModelName, ModelParams, ModelParser, Preset};
+use anyhow::Context;
 use clap::{Args, ValueEnum};
 use lookalike::{
-    fit::{Gammas, Integration, JudgedBy, Method, SearchKind},
+    fit::{Gammas, Integration, JudgedBy, Method, Ranges, SearchKind},
     render::subset::{SampleCount, Sampling},
 };
 use std::num::NonZeroU32;
@@ -17,8 +18,14 @@ pub(crate) struct MethodArgs {
     #[arg(long, value_name = "PRESET", value_enum)]
     pub(crate) preset: Option<Preset>,
     /// BRDF model
-    #[arg(long, value_name = "NAME", value_enum, default_value_t)]
+    #[arg(long, value_name = "NAME", value_parser = ModelParser, default_value_t)]
     model: ModelName,
+    /// Hold parameters of the model at these values, such as f90=1 or kd=0,f0=.04; a colour takes one number or three
+    #[arg(long, value_name = "NAME=V[,..]", allow_hyphen_values = true)]
+    fix: Option<ModelParams>,
+    /// Search parameters of the model in a narrower range, such as alpha=.05:.3,kd=0:.5
+    #[arg(long, value_name = "NAME=LO:HI", allow_hyphen_values = true)]
+    bounds: Option<ModelBounds>,
     /// Gammas of the cost to try, one search each: START:STOP:STEP, or one number
     #[arg(long, value_name = "A:B:STEP", default_value_t, allow_negative_numbers = true)]
     gammas: Gammas,
@@ -54,9 +61,19 @@ pub(crate) struct MethodArgs {
 }
 
 impl MethodArgs {
-    pub(crate) fn into_method(self) -> Method {
-        Method {
-            model: self.model.model(),
+    /// # Errors
+    /// If the model has no parameter of a name in `--fix` or `--bounds`, or a value is outside its range.
+    pub(crate) fn into_method(self) -> anyhow::Result<Method> {
+        let (model, mut ranges) = (self.model.model(), Ranges::default());
+        for (name, values) in self.fix.iter().flat_map(ModelParams::entries) {
+            ranges.hold(model, name, values).with_context(|| format!("--fix {name}"))?;
+        }
+        for (name, lower, upper) in self.bounds.iter().flat_map(ModelBounds::entries) {
+            ranges.narrow(model, name, *lower, *upper).with_context(|| format!("--bounds {name}"))?;
+        }
+        Ok(Method {
+            model,
+            ranges,
             gammas: self.gammas.values(),
             samples: self.samples,
             sampling: self.sampling,
@@ -68,7 +85,7 @@ impl MethodArgs {
             polish: matches!(self.polish, Switch::On),
             judge: self.judge,
             seed: self.seed,
-        }
+        })
     }
 }
 

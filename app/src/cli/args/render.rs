@@ -1,7 +1,7 @@
 //! `lookalike render`.
 
 use super::scene::{EnvironmentArgs, ViewArgs};
-use crate::settings::{Material, ModelName, ModelParams, RenderSettings};
+use crate::settings::{Material, ModelName, ModelParams, ModelParser, RenderSettings};
 use anyhow::bail;
 use clap::Args;
 use std::{num::NonZeroUsize, path::PathBuf};
@@ -28,9 +28,10 @@ struct MaterialArgs {
     #[arg(long, value_name = "FILE.binary")]
     brdf: Option<PathBuf>,
     /// BRDF model; needs --params
-    #[arg(long, value_name = "NAME", value_enum)]
+    #[arg(long, value_name = "NAME", value_parser = ModelParser)]
     model: Option<ModelName>,
-    /// Parameters of the model: NAME=VALUE with one number, or three for a colour, such as kd=.5,.4,.3,f0=.04,alpha=.1
+    /// Parameters of the model: NAME=VALUE with one number, or three for a colour, such as kd=.5,.4,.3,f0=.04,alpha=.1; f90 is 1
+    /// if not given
     #[arg(long, value_name = "K=V,...")]
     params: Option<ModelParams>,
 }

@@ -90,7 +90,7 @@ fn a_constant_is_constant_everywhere_above_the_horizon() {
 }
 
 fn ggx(alpha: f64) -> Material {
-    Material::new(&Ggx, vec![0.2, 0.1, 0.05, 0.5, 0.6, 0.7, alpha]).unwrap()
+    Material::new(&Ggx, vec![0.2, 0.1, 0.05, 0.5, 0.6, 0.7, 1.0, alpha]).unwrap()
 }
 
 #[test]

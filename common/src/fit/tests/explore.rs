@@ -13,7 +13,7 @@ use crate::{
 };
 use std::cell::RefCell;
 
-const MATERIAL: [f64; 7] = [0.3, 0.2, 0.1, 0.05, 0.05, 0.05, 0.2];
+const MATERIAL: [f64; 8] = [0.3, 0.2, 0.1, 0.05, 0.05, 0.05, 1.0, 0.2];
 
 fn quick() -> Method {
     Method { gammas: vec![2.0], ..method("ggx") }
@@ -69,7 +69,7 @@ fn polish_returns_to_the_winner_if_the_explored_lobe_ends_worse() {
             Blob::new(write("polish", &PolishedWire::of(polished)).unwrap())
         };
         match spec.kind.as_str() {
-            "explore" => changed(&|found| found.parameters = vec![0.0, 0.0, 0.0, 0.9, 0.9, 0.9, 0.06]),
+            "explore" => changed(&|found| found.parameters = vec![0.0, 0.0, 0.0, 0.9, 0.9, 0.9, 1.0, 0.06]),
             "polish" => {
                 rounds.borrow_mut().push(spec.inputs.clone());
                 if rounds.borrow().len() > 1 {

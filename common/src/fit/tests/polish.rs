@@ -3,7 +3,7 @@
 use super::scene::{Bench, capture, method};
 use crate::{
     brdf::flat_bounds,
-    fit::{FullView, JudgedBy, Judges, Limits, MAX_EVALUATIONS, polish, stage_two::Renderer},
+    fit::{FullView, JudgedBy, Judges, Limits, MAX_EVALUATIONS, Ranges, polish, stage_two::Renderer},
     graph::{Blob, NodeSpec},
     metric::{Judge, JudgeOptions},
     nodes::wire::{PolishedWire, read, write},
@@ -16,7 +16,7 @@ use crate::{
 };
 use std::{cell::Cell, ops::ControlFlow, sync::Arc};
 
-const MATERIAL: [f64; 7] = [0.3, 0.2, 0.1, 0.05, 0.05, 0.05, 0.2];
+const MATERIAL: [f64; 8] = [0.3, 0.2, 0.1, 0.05, 0.05, 0.05, 1.0, 0.2];
 
 #[test]
 fn polish_starts_from_the_best_and_never_ends_worse_on_its_table() {
@@ -36,13 +36,14 @@ fn polish_starts_from_the_best_and_never_ends_worse_on_its_table() {
     let searching = Judge::single(photo, &scored, 1.0, &JudgeOptions::default()).unwrap();
     let judges = Judges { searching: &searching, reporting: &judge, by: JudgedBy::Image };
     let score = |point: &[f64]| judge.score(&view.render(point)).unwrap().cssim;
-    let near = vec![0.28, 0.21, 0.1, 0.06, 0.05, 0.04, 0.19];
-    let far = vec![0.6, 0.1, 0.5, 0.3, 0.3, 0.3, 0.38];
+    let near = vec![0.28, 0.21, 0.1, 0.06, 0.05, 0.04, 1.05, 0.19];
+    let far = vec![0.6, 0.1, 0.5, 0.3, 0.3, 0.3, 0.5, 0.38];
     assert!(score(&near) < score(&far));
     for starts in [vec![near.clone()], vec![far.clone(), near.clone()], vec![near.clone(), far]] {
         for limit in [3, 60] {
             let mut observe = |_: &crate::search::Progress<'_>| ControlFlow::Continue(());
-            let found = polish(&view, judges, &starts, Limits::of_polish(limit), &mut observe).unwrap();
+            let found =
+                polish(&view, judges, &starts, Limits::of_polish(&Ranges::default(), limit), &mut observe).unwrap();
             assert!(found.cssim <= score(&near) && found.evaluations <= limit, "{starts:?} {limit}: {found:?}");
             assert_eq!(found.cssim, score(&found.parameters));
         }

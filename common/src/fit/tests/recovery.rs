@@ -58,7 +58,7 @@ fn a_start_counts_as_one_evaluation() {
     let paper = Method { search: SearchKind::Pattern, start: Start::Paper, ..method(name) };
     let counted = search(&paper, &scene, 1.0).evaluations;
     let mut calls = 0;
-    let bounds = crate::fit::stage_one::search_bounds(paper.model, paper.search).unwrap();
+    let bounds = crate::fit::stage_one::search_bounds(paper.model, &paper.ranges, paper.search).unwrap();
     let mut objective =
         crate::fit::stage_one::objective_of(&paper, 1.0, &scene.table, &scene.subset, &scene.photo, 0.5);
     let cost = |x: &[f64]| {

@@ -25,7 +25,7 @@ fn width_and_fresnel_of_a_material_without_highlights_are_not_determined() {
 
 #[test]
 fn parameters_of_a_glossy_material_are_determined_and_within_their_errors() {
-    let material = [0.3, 0.2, 0.1, 0.05, 0.05, 0.05, 0.2];
+    let material = [0.3, 0.2, 0.1, 0.05, 0.05, 0.05, 1.0, 0.2];
     for noise in [0.0, 0.02] {
         let outcome = outcome("ggx", &material, noise);
         let errors = outcome.uncertainty.iter().map(|u| match u {

@@ -15,8 +15,8 @@ use crate::{
 };
 use std::sync::Arc;
 
-const MATERIAL: [f64; 7] = [0.3, 0.2, 0.1, 0.05, 0.05, 0.05, 0.2];
-const START: [f64; 7] = [0.3; 7];
+const MATERIAL: [f64; 8] = [0.3, 0.2, 0.1, 0.05, 0.05, 0.05, 1.0, 0.2];
+const START: [f64; 8] = [0.3, 0.3, 0.3, 0.04, 0.04, 0.04, 1.0, 0.3];
 
 fn planner(request: SurveyRequest) -> Result<SurveyPlanner, FitError> {
     SurveyPlanner::new(capture("ggx", &MATERIAL, 0.0), Method { ..method("ggx") }, 1.0, request)
