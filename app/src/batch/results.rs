@@ -1,4 +1,4 @@
-//! Writes the results of fits that have ended on other threads, so that the run does not wait for a disk.
+//! Writes the results of fits that have ended on other threads, so that running fits do not wait for a disk.
 
 use super::{backlog::Backlog, board::Board, row::Scores};
 use crate::{

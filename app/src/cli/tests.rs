@@ -92,7 +92,7 @@ fn a_plain_fit_has_the_defaults_of_the_design() {
 #[test]
 fn every_group_of_flags_reaches_the_settings() {
     let flags = "--mask m.png --env-mapping angular --env-rotation -30 --camera perspective:30 --sphere -5,6.5,100 \
-                 --model cook-torrance --gammas 1:2:0.5 --samples full --sampling uniform --subsets 4 --search pattern \
+                 --model cook-torrance --fix ks=.5,f0=.1 --bounds m=.1:.3 --gammas 1:2:0.5 --samples full --sampling uniform --subsets 4 --search pattern \
                  --polish off --judge object --display-exposure from:old.json --seed 7 --max-cssim 0.1 --workers 0 \
                  --listen 10.0.0.1:4100 --advertise node7:4101 --wait-for-workers 90s --grace 1h \
                  --progress json";
@@ -102,6 +102,8 @@ fn every_group_of_flags_reaches_the_settings() {
     assert_eq!(settings.capture.sphere.unwrap().x, -5.0);
     assert_eq!(settings.method.gammas, [1.0, 1.5, 2.0]);
     assert_eq!((settings.method.samples, settings.method.subsets), (SampleCount::Full, 4));
+    let (lower, upper) = settings.method.ranges.bounds(settings.method.model);
+    assert_eq!((&lower[3..], &upper[3..]), (&[0.5, 0.5, 0.5, 0.1, 0.1][..], &[0.5, 0.5, 0.5, 0.1, 0.3][..]));
     assert_eq!((settings.method.search, settings.method.polish), (SearchKind::Pattern, false));
     assert_eq!(settings.display_exposure, DisplayExposure::From("old.json".into()));
     assert_eq!((settings.max_cssim, settings.method.seed), (Some(0.1), 7));

@@ -1,7 +1,7 @@
 //! Notes for the user on a result.
 
 use lookalike::{
-    brdf::{Model, flat_names},
+    brdf::{Model, flat_bounds, flat_names},
     fit::{Method, Ranges, Uncertainty, gamma_range},
     plan::FitOutcome,
 };
@@ -43,20 +43,24 @@ fn at_bounds(
     is_determined: impl Fn(usize) -> bool,
 ) -> Option<String> {
     let (lower, upper) = ranges.bounds(model);
+    let (least, most) = flat_bounds(model.parameters());
     let names = flat_names(model.parameters());
-    // A parameter at its lower bound is a valid result (no diffuse part, a dielectric), except for a width. At its upper bound
-    // it is limited by the model, unless that bound stands for a kind of surface.
+    // A parameter at the lower bound of the model is a valid result (no diffuse part, a dielectric), except for a width. At the upper bound
+    // it is limited by the model, unless that bound stands for a kind of surface. At a bound of `--bounds` it is limited by that.
     let is_width = |i: usize| model.lobes().iter().any(|b| b.width.is_some_and(|width| width.entry == i));
     let is_kind: Vec<bool> =
         model.parameters().iter().flat_map(|p| std::iter::repeat_n(p.upper_is_kind, p.channels.count())).collect();
-    let limited = |&i: &usize| (parameters[i] == upper[i] && !is_kind[i]) || (is_width(i) && parameters[i] == lower[i]);
+    let limited = |&i: &usize| {
+        let is_kind = is_kind[i] && upper[i] == most[i];
+        (parameters[i] == upper[i] && !is_kind) || (parameters[i] == lower[i] && (is_width(i) || lower[i] > least[i]))
+    };
     let limited: Vec<String> = (0..parameters.len())
         .filter(limited)
         .filter(|&i| is_determined(i))
         .map(|i| format!("{} = {}", names[i], parameters[i]))
         .collect();
     let list = limited.join(", ");
-    (!limited.is_empty()).then(|| format!("at the limit of the range: {list}; the photo asks for more"))
+    (!limited.is_empty()).then(|| format!("at the end of the range: {list}; a value beyond it may match better"))
 }
 
 /// The parameters that the photo does not determine: values from much of their range match it equally well.
@@ -126,6 +130,10 @@ mod tests {
         assert_eq!(ggx(1.0, &Ranges::default()), None);
         assert!(ggx(2.0, &Ranges::default()).is_some_and(|note| note.contains("f0.r = 2;")));
         assert!(ggx(0.1, &ranges).is_some_and(|note| note.contains("alpha = 0.2;")));
+        ranges.narrow(&Ggx, "kd", 0.3, 0.5).unwrap();
+        assert!(
+            ggx(0.1, &ranges).is_some_and(|note| note.contains("kd.r = 0.3, kd.g = 0.3, kd.b = 0.3, alpha = 0.2;"))
+        );
         // The order is base colour, subsurface, metallic, specular, roughness, sheen, clear coat, clear-coat gloss.
         let disney = |coat: f64| {
             at_bounds(&Disney, &Ranges::default(), &[0.5, 0.5, 0.5, 1.0, 1.0, 0.5, 0.5, 0.0, coat, 0.5], |_| true)

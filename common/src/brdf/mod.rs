@@ -60,7 +60,8 @@ pub static DEFAULT_MODEL: &dyn Model = &Ggx;
 pub static PAPER_MODEL: &dyn Model = &CookTorrance;
 
 /// Names of earlier versions, and what to use instead.
-const RENAMED: &[(&str, &str)] = &[("ggx-f90", "ggx, which has the parameter f90; --fix f90=1 is the ggx of before")];
+const RENAMED: &[(&str, &str)] =
+    &[("ggx-f90", "ggx, which has the parameter f90: 1 for a smooth surface, and free in a fit")];
 
 /// Looks a model up by name.
 ///

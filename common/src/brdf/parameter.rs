@@ -63,7 +63,7 @@ pub struct Parameter {
     pub start: f64,
     /// How a search treats it.
     pub role: Role,
-    /// Whether the upper bound is a kind of surface, such as a metal or a smooth interface, and not a limit of the model.
+    /// Whether the upper bound is a kind of surface, such as a metal, and not a limit of the model.
     pub upper_is_kind: bool,
     /// The value of a material for which none is given; `None` if it must be given.
     pub usual: Option<f64>,
@@ -172,7 +172,7 @@ pub enum ParameterError {
         found: usize,
     },
     /// Held or narrowed twice.
-    #[error("parameter '{name}' is given twice: --fix and --bounds take each once")]
+    #[error("parameter '{name}' is given twice: name it once, in --fix or in --bounds")]
     Twice {
         /// The parameter.
         name: &'static str,

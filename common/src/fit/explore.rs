@@ -57,7 +57,14 @@ pub(crate) fn starts(model: &dyn Model, ranges: &Ranges, won: &[f64]) -> Vec<Vec
             *x = x.clamp(lower[i] + margin, upper[i] - margin);
         }
     }
-    starts
+    // If the width is held, they may be equal.
+    let mut distinct: Vec<Vec<f64>> = Vec::new();
+    for start in starts {
+        if !distinct.contains(&start) {
+            distinct.push(start);
+        }
+    }
+    distinct
 }
 
 /// Most evaluations in all of an exploration from so many starts.
@@ -150,7 +157,10 @@ mod tests {
         assert!((free[1][7] / 0.03 - 1.0).abs() < 0.02 && (free[2][7] / 0.1 - 1.0).abs() < 0.02);
         assert_eq!(free[3], [0.3; 8]);
         ranges.hold(&Ggx, "f90", &[1.0]).unwrap();
-        assert!(starts(&Ggx, &ranges, &won).iter().all(|start| start[6] == 1.0));
+        ranges.hold(&Ggx, "alpha", &[0.2]).unwrap();
+        let held = starts(&Ggx, &ranges, &won);
+        assert!(held.iter().all(|start| start[6..] == [1.0, 0.2]));
+        assert_eq!(held.len(), 2, "the winner, and the paper's start");
     }
 
     #[test]

@@ -226,7 +226,7 @@ impl Method {
         if self.gammas.is_empty() || !ascending || !positive {
             return Err(MethodError::Gammas { found: self.gammas.clone() });
         }
-        if self.ranges.hold_everything(self.model) {
+        if self.ranges.holds_everything(self.model) {
             return Err(MethodError::NothingFree { model: self.model.name() });
         }
         if self.samples == SampleCount::Draws(0) {

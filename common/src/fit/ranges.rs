@@ -44,11 +44,32 @@ impl Ranges {
     /// As [`Self::hold`], or if `lower` is above `upper`.
     pub fn narrow(&mut self, model: &dyn Model, name: &str, lower: f64, upper: f64) -> Result<(), ParameterError> {
         let (parameter, _) = find(model, name)?;
-        if lower > upper {
-            return Err(ParameterError::EmptyRange { name: parameter.name, lower, upper });
-        }
         let count = parameter.channels.count();
         self.add(parameter, vec![lower; count], vec![upper; count])
+    }
+
+    /// Refuses ranges from a peer that are not those of `model`.
+    ///
+    /// # Errors
+    /// As [`Self::hold`] and [`Self::narrow`].
+    pub(crate) fn check(&self, model: &dyn Model) -> Result<(), ParameterError> {
+        let mut checked = Self::default();
+        for Range { name, lower, upper } in &self.0 {
+            let (parameter, _) = find(model, name)?;
+            let expected = parameter.channels.count();
+            if let Some(found) = [lower.len(), upper.len()].into_iter().find(|found| *found != expected) {
+                return Err(ParameterError::Count { name: parameter.name, expected, found });
+            }
+            checked.add(parameter, lower.clone(), upper.clone())?;
+        }
+        Ok(())
+    }
+
+    /// Whether a flat parameter vector of `model` is within the ranges.
+    #[must_use]
+    pub(crate) fn contain(&self, model: &dyn Model, point: &[f64]) -> bool {
+        let (lower, upper) = self.bounds(model);
+        point.len() == lower.len() && point.iter().zip(lower.iter().zip(&upper)).all(|(x, (l, u))| (l..=u).contains(&x))
     }
 
     fn add(&mut self, parameter: &Parameter, lower: Vec<f64>, upper: Vec<f64>) -> Result<(), ParameterError> {
@@ -59,7 +80,12 @@ impl Ranges {
         if let Some(&found) = lower.iter().chain(&upper).find(|x| !(least..=most).contains(*x)) {
             return Err(ParameterError::OutOfBounds { name, found, lower: least, upper: most });
         }
+        if let Some((&lower, &upper)) = lower.iter().zip(&upper).find(|(lower, upper)| lower > upper) {
+            return Err(ParameterError::EmptyRange { name, lower, upper });
+        }
         self.0.push(Range { name: name.to_owned(), lower, upper });
+        // The order in which they are given makes no difference to a run.
+        self.0.sort_by(|a, b| a.name.cmp(&b.name));
         Ok(())
     }
 
@@ -78,7 +104,7 @@ impl Ranges {
 
     /// Whether every entry of the flat vector is held.
     #[must_use]
-    pub fn hold_everything(&self, model: &dyn Model) -> bool {
+    pub fn holds_everything(&self, model: &dyn Model) -> bool {
         let (lower, upper) = self.bounds(model);
         lower == upper
     }
@@ -129,7 +155,7 @@ mod tests {
         let (lower, upper) = ranges.bounds(&Ggx);
         assert_eq!(lower, [0.1, 0.2, 0.3, 0.02, 0.02, 0.02, 1.0, 0.005]);
         assert_eq!(upper, [0.1, 0.2, 0.3, 0.08, 0.08, 0.08, 1.0, 1.0]);
-        assert!(!ranges.hold_everything(&Ggx));
+        assert!(!ranges.holds_everything(&Ggx));
         assert_eq!(ranges.held(), json!({ "f90": 1.0, "kd": [0.1, 0.2, 0.3] }));
         assert_eq!(ranges.narrowed(), json!({ "f0": [0.02, 0.08] }));
         assert_eq!(Ranges::default().bounds(&Ggx), flat_bounds(Ggx.parameters()));
@@ -141,7 +167,7 @@ mod tests {
         ranges.hold(&Ggx, "f90", &[1.0]).unwrap();
         let mut hold =
             |model: &dyn Model, name: &str, values: &[f64]| ranges.hold(model, name, values).unwrap_err().to_string();
-        assert_eq!(hold(&Ggx, "f90", &[0.5]), "parameter 'f90' is given twice: --fix and --bounds take each once");
+        assert_eq!(hold(&Ggx, "f90", &[0.5]), "parameter 'f90' is given twice: name it once, in --fix or in --bounds");
         assert!(
             hold(&CookTorrance, "f90", &[1.0]).contains("model cook-torrance has no parameter 'f90': it has kd, ks")
         );
@@ -150,5 +176,13 @@ mod tests {
         assert!(hold(&Ggx, "kd", &[0.1, 0.2]).contains("'kd' takes 3 number(s), found 2"));
         let empty = ranges.narrow(&Ggx, "alpha", 0.5, 0.2).unwrap_err().to_string();
         assert_eq!(empty, "parameter 'alpha' has an empty range: 0.5 is above 0.2");
+        // From a peer.
+        let range = |name: &str, lower: &[f64], upper: &[f64]| {
+            Ranges(vec![Range { name: name.to_owned(), lower: lower.to_vec(), upper: upper.to_vec() }]).check(&Ggx)
+        };
+        assert!(range("alpha", &[0.1], &[0.2]).is_ok());
+        assert!(range("alpha", &[0.1; 2], &[0.2; 2]).is_err() && range("kd", &[0.1; 3], &[0.2]).is_err());
+        assert!(range("alpha", &[0.3], &[0.2]).is_err() && range("alpha", &[f64::NAN], &[0.2]).is_err());
+        assert!(range("alpha", &[0.001], &[0.2]).is_err() && range("m", &[0.1], &[0.2]).is_err());
     }
 }

@@ -88,8 +88,12 @@ pub fn search_gamma(
     if let Some(direct) = direct {
         objective = objective.rendered_by(direct);
     }
-    let starts: Vec<multi_start::Start> =
-        starts.iter().map(|point| multi_start::Start { cost: objective.cost(point), point: point.clone() }).collect();
+    let inside = |point: &Vec<f64>| {
+        let mut point = point.clone();
+        bounds.clamp(&mut point);
+        multi_start::Start { cost: objective.cost(&point), point }
+    };
+    let starts: Vec<multi_start::Start> = starts.iter().map(inside).collect();
     let options = MultiStartOptions::default();
     let mut evaluations = starts.len();
     let best = match method.search {
@@ -166,7 +170,7 @@ pub(super) fn paper_start(model: &dyn Model) -> Vec<f64> {
 }
 
 /// Bounds with the main lobe's width restricted to the span of a table, and whether the span is tighter than the lower and the upper bound.
-/// If the table reaches a bound, its outermost knot may differ from the bound by rounding; then the bound is used.
+/// A range outside the span becomes the end of the span that is nearest to it. If the table reaches a bound, its outermost knot may differ from the bound by rounding; then the bound is used.
 pub(super) fn within_table(
     model: &dyn Model,
     bounds: &Bounds,
@@ -177,7 +181,6 @@ pub(super) fn within_table(
     if let Some((width, span)) = model.lobes().iter().find_map(|basis| basis.width).zip(span) {
         let (entry, (first, last)) = (width.entry, width.entries(span));
         tighter = [first > lower[entry] * (1.0 + 1e-9), last < upper[entry] * (1.0 - 1e-9)];
-        // A width may be held outside the span.
         if tighter[0] {
             lower[entry] = first;
             upper[entry] = upper[entry].max(first);

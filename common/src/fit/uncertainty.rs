@@ -48,7 +48,7 @@ impl Uncertainty {
 /// Distance from the minimum at which the test is repeated, in standard errors.
 const REACH: f64 = 2.0;
 
-/// A parameter counts as undetermined if its standard error is above this share of its range (of the logarithmic range for widths): the
+/// A parameter counts as undetermined if its standard error is above this share of its range in the model (of the logarithmic range for widths): the
 /// values within two standard errors are then half of the range.
 pub const LARGEST_SHARE: f64 = 0.125;
 
@@ -66,6 +66,8 @@ pub(crate) fn uncertainties(
     point: &[f64],
 ) -> Result<Vec<Uncertainty>, SearchError> {
     let bounds = search_bounds(model, ranges, SearchKind::LeastSquares)?;
+    // A narrower range of the search makes no value less certain.
+    let of_model = search_bounds(model, &Ranges::default(), SearchKind::LeastSquares)?;
     let is_inside = |i: usize| {
         let t = bounds.to_scaled(i, point[i]);
         (AT_BOUND..=1.0 - AT_BOUND).contains(&t)
@@ -87,7 +89,7 @@ pub(crate) fn uncertainties(
             }
             let errors = if inside[i] { Some(&errors[0]) } else { of_bounds.next() };
             let error = errors.map_or(f64::INFINITY, |errors| errors[i]);
-            let share = error / bounds.scaled_derivative(i, place[i]);
+            let share = error / of_model.scaled_derivative(i, place[i]);
             match share <= LARGEST_SHARE {
                 true if inside[i] => Uncertainty::StandardError(error),
                 true => Uncertainty::AtBound,

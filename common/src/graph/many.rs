@@ -23,7 +23,7 @@ use super::{
 pub struct Part<P> {
     /// Its unique number: nodes of lower numbers run first.
     pub number: u32,
-    /// Its name, which is put in front of the labels of its nodes. Must not contain ": "; at most
+    /// Its name, for the labels of its nodes; at most
     /// [`MAX_PART_NAME_BYTES`](super::MAX_PART_NAME_BYTES).
     pub name: String,
     /// The planner of its nodes.

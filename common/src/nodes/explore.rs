@@ -19,6 +19,7 @@ impl NodeType for Explore {
     fn run(&self, parameters: &[u8], inputs: &[Blob], context: &RunContext) -> Result<Vec<u8>, NodeFailure> {
         let PolishParameters { ranges, starts, max_evaluations } = read("parameters of explore", parameters)?;
         let scene = Scene::read(inputs, context)?;
+        ranges.check(scene.view.model).map_err(|error| NodeFailure::new(error.to_string()))?;
         starts.iter().try_for_each(|start| check_parameters("starts", scene.view.model, start))?;
         let total = most_evaluations(starts.len(), max_evaluations as usize) as u64;
         // Evaluations of the earlier searches, and of the current one so far: each search counts from 1.

@@ -28,6 +28,7 @@ impl NodeType for Polish {
     fn run(&self, parameters: &[u8], inputs: &[Blob], context: &RunContext) -> Result<Vec<u8>, NodeFailure> {
         let PolishParameters { ranges, starts, max_evaluations } = read("parameters of polish", parameters)?;
         let scene = Scene::read(inputs, context)?;
+        ranges.check(scene.view.model).map_err(|error| NodeFailure::new(error.to_string()))?;
         starts.iter().try_for_each(|start| check_parameters("starts", scene.view.model, start))?;
         let mut observe = |progress: &crate::search::Progress<'_>| {
             context.report(progress.evaluations as u64, u64::from(max_evaluations));

@@ -184,6 +184,7 @@ impl NodeType for Search {
             let (gamma, mean) = (parameters.gamma, parameters.mean_radiance);
             return Err(NodeFailure::new(format!("gamma {gamma} and mean radiance {mean} must be positive")));
         }
+        parameters.ranges.check(model).map_err(|error| NodeFailure::new(error.to_string()))?;
         let method = parameters.method(model)?;
         // Searches of other gammas reuse the scan: it depends on the inputs, the start and the ranges alone.
         let hashes = inputs.iter().flat_map(|input| input.hash().0);

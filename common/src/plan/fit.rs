@@ -225,6 +225,7 @@ impl FitPlanner {
         let candidate = read::<CandidateWire>("candidate", output)
             .and_then(|wire| wire.candidate(self.scene.method.model))
             .map_err(|failure| verify::wrong("a candidate", &failure))?;
+        verify::check_ranges(&self.scene.method, &candidate.parameters)?;
         let gammas = &self.scene.method.gammas;
         let asked = (gammas[place % gammas.len()], index(place / gammas.len()));
         if (candidate.gamma, candidate.subset) != asked {

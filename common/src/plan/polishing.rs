@@ -176,6 +176,7 @@ impl Polishing {
     ) -> Result<Step, PlanError> {
         let left = MAX_EVALUATIONS.saturating_sub(self.evaluations);
         let mut polished = verify::polished(scene.method.model, output, left.max(MAX_STARTS))?;
+        verify::check_ranges(&scene.method, &polished.parameters)?;
         self.rounds += 1;
         self.evaluations += polished.evaluations;
         polished.evaluations = self.spent + self.evaluations;

@@ -42,11 +42,22 @@ pub(super) fn stage_one_knots(method: &Method, whole: bool) -> Knots {
     Knots::covering(low, high, PER_OCTAVE)
 }
 
-/// Whether stage one may begin without sharp lobes: the scan looks for the width over the whole table.
+/// Whether stage one may begin without sharp lobes: the scan looks for the width over the whole table, and `--fix` and `--bounds` allow
+/// others.
 pub(super) fn may_begin_blurred(method: &Method) -> bool {
+    let blurred = span_of_lobes(method.model, SHARP);
     method.start == Start::Scan
         && method.integration == Integration::Tables
-        && span_of_lobes(method.model, SHARP) != whole_span(method.model)
+        && blurred != whole_span(method.model)
+        && blurred.zip(widest(method)).is_none_or(|((low, _), widest)| low < widest)
+}
+
+/// The largest width that the ranges of the parameters allow.
+fn widest(method: &Method) -> Option<f64> {
+    let width = method.model.lobes().iter().find_map(|basis| basis.width)?;
+    let (lower, upper) = method.ranges.bounds(method.model);
+    // A width may grow or fall with its parameter.
+    Some(width.at(&lower).max(width.at(&upper)))
 }
 
 /// Whether a table without sharp lobes may be too narrow for a candidate.
@@ -93,6 +104,18 @@ mod tests {
         }
         let paper = Method { start: Start::Paper, ..Method::default() };
         assert!(!may_begin_blurred(&paper));
+    }
+
+    #[test]
+    fn table_has_the_widths_that_are_held() {
+        for (model, name, sharp, wide) in [("ggx", "alpha", 0.01, 0.03), ("blinn-phong", "n", 20_000.0, 100.0)] {
+            let begins_blurred = |value: f64| {
+                let mut method = Method { model: crate::brdf::model(model).unwrap(), ..Method::default() };
+                method.ranges.hold(method.model, name, &[value]).unwrap();
+                may_begin_blurred(&method)
+            };
+            assert!(!begins_blurred(sharp) && begins_blurred(wide), "{model}");
+        }
     }
 
     #[test]

@@ -7,7 +7,7 @@
 use super::encode::other;
 use crate::{
     brdf::Model,
-    fit::{Candidate, Objective, Polished},
+    fit::{Candidate, Method, Objective, Polished},
     graph::{Blob, GraphEdit, Input, NodeId, PlanError},
     nodes::{
         joined,
@@ -108,6 +108,12 @@ pub(super) fn polished(model: &dyn Model, output: &Blob, most: usize) -> Result<
         return Err(wrong(format!("at most {most} evaluations"), &polished.evaluations));
     }
     Ok(polished)
+}
+
+/// Refuses parameters outside the ranges of the fit.
+pub(super) fn check_ranges(method: &Method, parameters: &[f64]) -> Result<(), PlanError> {
+    let is_inside = method.ranges.contain(method.model, parameters);
+    if is_inside { Ok(()) } else { Err(wrong("parameters within their ranges", &format!("{parameters:?}"))) }
 }
 
 /// Refuses a score or a cost that is negative or not finite.

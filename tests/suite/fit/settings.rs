@@ -162,6 +162,20 @@ fn every_search_obeys_held_parameters_and_narrower_ranges() {
     }
 }
 
+/// The first table of stage one and that of the coarse picture have no sharp lobes.
+#[test]
+fn width_of_a_sharp_lobe_can_be_held() {
+    for (flags, alpha) in
+        [("--fix alpha=.01 --polish on", 0.01), ("--bounds alpha=.0101:.0103 --search pattern", 0.0102)]
+    {
+        let json = quick(&format!("--gammas 2 {flags}"));
+        let polished = json.get("polished").filter(|polished| !polished.is_null());
+        for result in json["candidates"].as_array().unwrap().iter().chain(polished) {
+            assert!((number(&result["parameters"]["alpha"]) / alpha - 1.0).abs() < 0.01, "{flags}: {result}");
+        }
+    }
+}
+
 #[test]
 fn progress_goes_to_stderr_in_the_requested_form() {
     let folder = folder();

@@ -21,10 +21,10 @@ pub(crate) struct MethodArgs {
     #[arg(long, value_name = "NAME", value_parser = ModelParser, default_value_t)]
     model: ModelName,
     /// Hold parameters of the model at these values, such as f90=1 or kd=0,f0=.04; a colour takes one number or three
-    #[arg(long, value_name = "NAME=V[,..]", allow_hyphen_values = true)]
+    #[arg(long, value_name = "NAME=V[,..]")]
     fix: Option<ModelParams>,
     /// Search parameters of the model in a narrower range, such as alpha=.05:.3,kd=0:.5
-    #[arg(long, value_name = "NAME=LO:HI", allow_hyphen_values = true)]
+    #[arg(long, value_name = "NAME=LO:HI")]
     bounds: Option<ModelBounds>,
     /// Gammas of the cost to try, one search each: START:STOP:STEP, or one number
     #[arg(long, value_name = "A:B:STEP", default_value_t, allow_negative_numbers = true)]

@@ -94,6 +94,15 @@ fn a_search_result_with_other_parameters_and_the_old_cost_is_refused() {
     assert_eq!(refusal(|_| {}), None);
 }
 
+#[test]
+fn candidate_outside_the_ranges_of_the_fit_is_refused() {
+    let mut method = method("ggx");
+    method.ranges.hold(method.model, "f90", &[1.0]).unwrap();
+    let planner = FitPlanner::new(photo(), method, 1.0).unwrap();
+    let error = Bench::default().run(planner, first, with_candidate(|c| c.parameters[6] = 0.9)).err().unwrap();
+    assert!(error.to_string().contains("parameters within their ranges"), "{error}");
+}
+
 /// The planner's error when the first shard of the subset's table is changed.
 fn refused_shard(change: impl Fn(&mut TransportTable)) -> String {
     let changed = |spec: &NodeSpec, output: Blob| {
