@@ -16,8 +16,7 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent
 PROBES = {"Grace": "grace_cross.hdr", "Uffizi": "uffizi.hdr", "Eucalyptus": "rnl_cross.hdr"}
 # The six materials of the paper's table that the set has, and others of every kind.
 ABC = """aluminium blue-acrylic delrin nickel red-metallic-paint specular-red-phenolic gold-metallic-paint3 green-metallic-paint2 red-plastic
-white-acrylic yellow-matte-plastic silver-metallic-paint black-phenolic ss440 hematite pink-fabric dark-blue-paint gray-plastic alumina-oxide
-""".split()
+white-acrylic yellow-matte-plastic silver-metallic-paint black-phenolic ss440 hematite pink-fabric dark-blue-paint gray-plastic alumina-oxide gold-paint""".split()
 
 
 def run(*command):
