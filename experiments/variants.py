@@ -46,6 +46,9 @@ def main():
         line = f"| {name} |"
         for values, before in zip(of, first):
             changes = [value - old for value, old in zip(values, before)]
+            if any(value != value for value in values):
+                line += " - | - | - |"
+                continue
             line += f" {sum(values) / len(values):.4f} | {max(0, -min(changes)):.4f} | {max(0, *changes):.4f} |"
         print(line)
 

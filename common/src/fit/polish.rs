@@ -56,7 +56,7 @@ pub struct Polished {
     pub evaluations: usize,
     /// Why the search ended.
     pub termination: Termination,
-    /// Whether the width ended at an edge of the table that is not the model's bound: a wider table may give a better match.
+    /// Whether the width ended at an edge of the table that is not the bound of its range: a wider table may give a better match.
     pub at_table_edge: bool,
 }
 
@@ -149,11 +149,11 @@ fn best_start(
 /// A width in this outermost share of the table's logarithmic span counts as at its edge.
 const EDGE: f64 = 0.02;
 
-/// The box of the parameters with the main lobe's width restricted to the table's span, and whether the span is tighter than the model's lower
-/// and upper bound.
+/// The box of the parameters with the main lobe's width restricted to the table's span, and whether the span is tighter than the lower
+/// and the upper bound of its range.
 fn polish_bounds(view: &FullView<'_>, ranges: &Ranges) -> Result<(Bounds, [bool; 2]), SearchError> {
-    let model_bounds = search_bounds(view.model, ranges, SearchKind::LeastSquares)?;
-    let (bounds, tighter) = within_table(view.model, &model_bounds, view.span())?;
+    let whole = search_bounds(view.model, ranges, SearchKind::LeastSquares)?;
+    let (bounds, tighter) = within_table(view.model, &whole, view.span())?;
     // Small steps of a reflectance are visible where the reflectance is small.
     let is_width = |entry| view.model.lobes().iter().any(|b| b.width.is_some_and(|width| width.entry == entry));
     let scale = |(entry, role)| match role {

@@ -136,7 +136,10 @@ impl Polishing {
         let mut found = found.parameters;
         // A width may be held outside the span of the coarse picture's table.
         let (lower, upper) = scene.method.ranges.bounds(model);
-        found.iter_mut().zip(lower.iter().zip(&upper)).for_each(|(x, (l, u))| *x = x.clamp(*l, *u));
+        if let Some(width) = model.lobes().iter().find_map(|basis| basis.width) {
+            found[width.entry] = found[width.entry].clamp(lower[width.entry], upper[width.entry]);
+        }
+        verify::check_ranges(&scene.method, &found)?;
         let inside =
             |span: Option<(f64, f64)>| span.zip(width(model, &found)).is_none_or(|(s, w)| s.0 <= w && w <= s.1);
         let both = needed_span(model, [&won[..], &found[..]].into_iter());

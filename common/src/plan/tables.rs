@@ -45,11 +45,12 @@ pub(super) fn stage_one_knots(method: &Method, whole: bool) -> Knots {
 /// Whether stage one may begin without sharp lobes: the scan looks for the width over the whole table, and `--fix` and `--bounds` allow
 /// others.
 pub(super) fn may_begin_blurred(method: &Method) -> bool {
-    let blurred = span_of_lobes(method.model, SHARP);
+    // A range without wider lobes than these would always ask for the whole table.
+    let useful = span_of_lobes(method.model, NEAR_SHARP).zip(widest(method));
     method.start == Start::Scan
         && method.integration == Integration::Tables
-        && blurred != whole_span(method.model)
-        && blurred.zip(widest(method)).is_none_or(|((low, _), widest)| low < widest)
+        && span_of_lobes(method.model, SHARP) != whole_span(method.model)
+        && useful.is_none_or(|((low, _), widest)| low < widest)
 }
 
 /// The largest width that the ranges of the parameters allow.
@@ -108,7 +109,7 @@ mod tests {
 
     #[test]
     fn table_has_the_widths_that_are_held() {
-        for (model, name, sharp, wide) in [("ggx", "alpha", 0.01, 0.03), ("blinn-phong", "n", 20_000.0, 100.0)] {
+        for (model, name, sharp, wide) in [("ggx", "alpha", 0.025, 0.05), ("blinn-phong", "n", 20_000.0, 100.0)] {
             let begins_blurred = |value: f64| {
                 let mut method = Method { model: crate::brdf::model(model).unwrap(), ..Method::default() };
                 method.ranges.hold(method.model, name, &[value]).unwrap();
