@@ -3,8 +3,8 @@
 
 Usage: photos.py network|abc --data DIR --make-merl make_merl.py --out DIR [--lookalike PROGRAM] [--size 128]
 
-Writes OUT/MATERIAL-LIGHT.exr; existing photos are kept, so give each set and size a folder of its own. The networks' mirror lobes vanish near grazing incidence, those of the ABC fits do not.
-Needs Python 3.10 and, for make_merl.py, numpy.
+Writes OUT/MATERIAL-LIGHT.exr; existing photos are kept, so give each set and size a folder of its own. The networks'
+mirror lobes vanish near grazing incidence, those of the ABC fits do not. Needs Python 3.10 and, for make_merl.py, numpy.
 """
 import argparse
 import pathlib

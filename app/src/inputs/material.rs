@@ -2,7 +2,7 @@
 
 use super::file::{InputFile, read_with};
 use crate::settings::ModelParams;
-use lookalike::brdf::{Channels, Model, ParameterError, merl::MerlTable};
+use lookalike::brdf::{self, Channels, Model, ParameterError, merl::MerlTable};
 use std::path::Path;
 
 /// A measured table with its origin.
@@ -24,33 +24,27 @@ pub fn load_table(path: &Path) -> anyhow::Result<LoadedTable> {
     Ok(LoadedTable { table, source })
 }
 
-/// The flat parameter vector of a model from values by name. Every parameter without a usual value is required; a single value for a colour means
-/// grey.
+/// The flat parameter vector of a model from values by name. Every parameter without a usual value is required; a single value for a
+/// colour means grey.
 ///
 /// # Errors
 /// [`ParameterError::UnknownParameter`], [`ParameterError::Missing`] and [`ParameterError::Count`]; bounds are checked by the material.
 pub fn flat_parameters(model: &'static dyn Model, given: &ModelParams) -> Result<Vec<f64>, ParameterError> {
-    let parameters = model.parameters();
-    let known = |name: &str| parameters.iter().any(|p| p.name == name);
-    if let Some((name, _)) = given.entries().iter().find(|(name, _)| !known(name)) {
-        let known = parameters.iter().map(|p| p.name).collect::<Vec<_>>().join(", ");
-        return Err(ParameterError::UnknownParameter { model: model.name(), name: name.clone(), known });
+    for (name, _) in given.entries() {
+        brdf::parameter(model, name)?;
     }
     let mut flat = Vec::new();
-    for parameter in parameters {
-        let (expected, example) = match parameter.channels {
-            Channels::Scalar => (1, "0.1"),
-            Channels::Rgb => (3, "0.5,0.4,0.3"),
+    for parameter in model.parameters() {
+        let example = match parameter.channels {
+            Channels::Scalar => "0.1",
+            Channels::Rgb => "0.5,0.4,0.3",
         };
-        match (given.entries().iter().find(|(name, _)| name == parameter.name), parameter.usual) {
-            (None, Some(usual)) => flat.extend(std::iter::repeat_n(usual, expected)),
+        let values = match (given.entries().iter().find(|(name, _)| name == parameter.name), parameter.usual) {
+            (Some((_, values)), _) => parameter.entries(values)?,
+            (None, Some(usual)) => parameter.entries(&[usual])?,
             (None, None) => return Err(ParameterError::Missing { model: model.name(), name: parameter.name, example }),
-            (Some((_, values)), _) if values.len() == expected => flat.extend_from_slice(values),
-            (Some((_, values)), _) if values.len() == 1 => flat.extend(std::iter::repeat_n(values[0], expected)),
-            (Some((_, values)), _) => {
-                return Err(ParameterError::Count { name: parameter.name, expected, found: values.len() });
-            }
-        }
+        };
+        flat.extend(values);
     }
     Ok(flat)
 }

@@ -3,6 +3,7 @@
 //! A parameter vector is flat: colours take three consecutive entries (red, green, blue), scalars one, in the order of
 //! [`Model::parameters`](super::Model::parameters).
 
+use super::Model;
 use thiserror::Error;
 
 /// Scalar or colour.
@@ -119,6 +120,34 @@ impl Parameter {
     pub const fn width(name: &'static str, meaning: &'static str) -> Self {
         Self { lower: 0.005, ..Self::scalar(name, meaning, Role::Width) }
     }
+}
+
+impl Parameter {
+    /// Its entries in the flat vector from the values given: one per channel, or one for grey.
+    ///
+    /// # Errors
+    /// [`ParameterError::Count`].
+    pub fn entries(&self, values: &[f64]) -> Result<Vec<f64>, ParameterError> {
+        let expected = self.channels.count();
+        match values {
+            [grey] => Ok(vec![*grey; expected]),
+            _ if values.len() == expected => Ok(values.to_vec()),
+            _ => Err(ParameterError::Count { name: self.name, expected, found: values.len() }),
+        }
+    }
+}
+
+/// A parameter of a model by name, with its first entry in the flat vector.
+///
+/// # Errors
+/// [`ParameterError::UnknownParameter`].
+pub fn parameter(model: &dyn Model, name: &str) -> Result<(&'static Parameter, usize), ParameterError> {
+    let parameters = model.parameters();
+    let found = parameters.iter().find(|p| p.name == name).zip(offset_of(parameters, name));
+    found.ok_or_else(|| {
+        let known = parameters.iter().map(|p| p.name).collect::<Vec<_>>().join(", ");
+        ParameterError::UnknownParameter { model: model.name(), name: name.to_owned(), known }
+    })
 }
 
 /// Invalid parameters of a model.

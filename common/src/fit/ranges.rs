@@ -1,6 +1,6 @@
 //! Parameters that a fit holds, and ranges narrower than those of the model (`--fix`, `--bounds`).
 
-use crate::brdf::{Model, Parameter, ParameterError, flat_bounds, flat_len};
+use crate::brdf::{self, Model, Parameter, ParameterError, flat_bounds};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
 
@@ -28,13 +28,8 @@ impl Ranges {
     /// # Errors
     /// If the model has no such parameter, it is given already, or a value is outside the model's range.
     pub fn hold(&mut self, model: &dyn Model, name: &str, values: &[f64]) -> Result<(), ParameterError> {
-        let (parameter, _) = find(model, name)?;
-        let expected = parameter.channels.count();
-        let values = match values {
-            [grey] => vec![*grey; expected],
-            _ if values.len() == expected => values.to_vec(),
-            _ => return Err(ParameterError::Count { name: parameter.name, expected, found: values.len() }),
-        };
+        let (parameter, _) = brdf::parameter(model, name)?;
+        let values = parameter.entries(values)?;
         self.add(parameter, values.clone(), values)
     }
 
@@ -43,7 +38,7 @@ impl Ranges {
     /// # Errors
     /// As [`Self::hold`], or if `lower` is above `upper`.
     pub fn narrow(&mut self, model: &dyn Model, name: &str, lower: f64, upper: f64) -> Result<(), ParameterError> {
-        let (parameter, _) = find(model, name)?;
+        let (parameter, _) = brdf::parameter(model, name)?;
         let count = parameter.channels.count();
         self.add(parameter, vec![lower; count], vec![upper; count])
     }
@@ -55,7 +50,7 @@ impl Ranges {
     pub(crate) fn check(&self, model: &dyn Model) -> Result<(), ParameterError> {
         let mut checked = Self::default();
         for Range { name, lower, upper } in &self.0 {
-            let (parameter, _) = find(model, name)?;
+            let (parameter, _) = brdf::parameter(model, name)?;
             let expected = parameter.channels.count();
             if let Some(found) = [lower.len(), upper.len()].into_iter().find(|found| *found != expected) {
                 return Err(ParameterError::Count { name: parameter.name, expected, found });
@@ -94,7 +89,7 @@ impl Ranges {
     pub fn bounds(&self, model: &dyn Model) -> (Vec<f64>, Vec<f64>) {
         let (mut lower, mut upper) = flat_bounds(model.parameters());
         for range in &self.0 {
-            if let Ok((_, first)) = find(model, &range.name) {
+            if let Ok((_, first)) = brdf::parameter(model, &range.name) {
                 lower[first..].iter_mut().zip(&range.lower).for_each(|(bound, x)| *bound = *x);
                 upper[first..].iter_mut().zip(&range.upper).for_each(|(bound, x)| *bound = *x);
             }
@@ -129,16 +124,6 @@ impl Ranges {
         let of = self.0.iter().filter(|range| range.is_held() == held);
         Value::Object(of.map(|range| (range.name.clone(), value(range))).collect::<Map<_, _>>())
     }
-}
-
-/// A parameter by name, with its first entry in the flat vector.
-fn find<'a>(model: &'a dyn Model, name: &str) -> Result<(&'a Parameter, usize), ParameterError> {
-    let parameters = model.parameters();
-    let Some(index) = parameters.iter().position(|parameter| parameter.name == name) else {
-        let known = parameters.iter().map(|parameter| parameter.name).collect::<Vec<_>>().join(", ");
-        return Err(ParameterError::UnknownParameter { model: model.name(), name: name.to_owned(), known });
-    };
-    Ok((&parameters[index], flat_len(&parameters[..index])))
 }
 
 #[cfg(test)]

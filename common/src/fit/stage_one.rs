@@ -54,11 +54,7 @@ impl ScannedTable {
     #[must_use]
     pub fn new(method: &Method, table: TransportTable, subset: &PixelSubset, photo: &[[f32; 3]]) -> Self {
         let starts = match method.start {
-            Start::Paper => {
-                let (lower, upper) = method.ranges.bounds(method.model);
-                let inside = |(x, (l, u)): (f64, (&f64, &f64))| x.clamp(*l, *u);
-                vec![paper_start(method.model).into_iter().zip(lower.iter().zip(&upper)).map(inside).collect()]
-            }
+            Start::Paper => vec![paper_start(method.model)],
             Start::Scan => scan(method.model, &method.ranges, &table, &subset.weights, photo),
         };
         Self { table, starts }
@@ -88,6 +84,7 @@ pub fn search_gamma(
     if let Some(direct) = direct {
         objective = objective.rendered_by(direct);
     }
+    // The paper's start may be outside the ranges.
     let inside = |point: &Vec<f64>| {
         let mut point = point.clone();
         bounds.clamp(&mut point);
@@ -170,7 +167,8 @@ pub(super) fn paper_start(model: &dyn Model) -> Vec<f64> {
 }
 
 /// Bounds with the main lobe's width restricted to the span of a table, and whether the span is tighter than the lower and the upper bound.
-/// A range outside the span becomes the end of the span that is nearest to it. If the table reaches a bound, its outermost knot may differ from the bound by rounding; then the bound is used.
+/// A range outside the span becomes the end of the span that is nearest to it. If the table reaches a bound, its outermost knot may differ
+/// from the bound by rounding; then the bound is used.
 pub(super) fn within_table(
     model: &dyn Model,
     bounds: &Bounds,
@@ -193,8 +191,8 @@ pub(super) fn within_table(
     Ok((Bounds::new(lower, upper, bounds.scales().to_vec())?, tighter))
 }
 
-/// The bounds of a model's parameters in a fit and the scale in which a search steps. Least squares steps in the logarithm of a width, because the
-/// table's widths are evenly spaced in it. For all other parameters, and in pattern search, the model declares the scale.
+/// The bounds of a model's parameters in a fit and the scale in which a search steps. Least squares steps in the logarithm of a width,
+/// because the table's widths are evenly spaced in it. For all other parameters, and in pattern search, the model declares the scale.
 pub(super) fn search_bounds(model: &dyn Model, ranges: &Ranges, search: SearchKind) -> Result<Bounds, SearchError> {
     let (lower, upper) = ranges.bounds(model);
     let declared = model.parameters().iter().flat_map(|p| std::iter::repeat_n(p.scale, p.channels.count()));

@@ -56,12 +56,3 @@ impl From<&str> for Label {
         name.to_owned().into()
     }
 }
-
-impl PartialEq<&str> for Label {
-    fn eq(&self, text: &&str) -> bool {
-        match &self.part {
-            None => self.name == *text,
-            Some(part) => text.strip_prefix(&**part).and_then(|rest| rest.strip_prefix(": ")) == Some(&*self.name),
-        }
-    }
-}

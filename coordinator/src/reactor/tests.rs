@@ -279,7 +279,7 @@ fn second_result_is_dropped_when_equal_and_an_error_when_different() {
     assert_eq!(bench.finish(C, 0, 1, 7), ["worker 3 is thanked for 0.1"]);
     assert_eq!(bench.core.summary().duplicate_results, 1);
     let error = bench.try_handle(finished(Site::Worker(C), 0, 1, 8)).unwrap_err();
-    assert!(matches!(&error, Stop::ResultsDiffer { name, .. } if name.label == "n0"), "{error}");
+    assert!(matches!(&error, Stop::ResultsDiffer { name, .. } if name.label.name == "n0"), "{error}");
     assert!(
         error.to_string().contains("from worker 2, output") && error.to_string().contains("from worker 3)"),
         "{error}"

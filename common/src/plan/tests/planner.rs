@@ -42,7 +42,7 @@ fn unchanged(_: &NodeSpec, output: Blob) -> Blob {
 /// Changes the candidate of gamma 2.
 fn with_candidate(change: impl Fn(&mut Candidate)) -> impl Fn(&NodeSpec, Blob) -> Blob {
     move |spec, output| {
-        if spec.label != "search gamma 2" {
+        if spec.label.name != "search gamma 2" {
             return output;
         }
         let model = method("ggx").model;
