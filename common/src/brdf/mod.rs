@@ -44,10 +44,8 @@ pub(crate) use lights::Incident;
 pub use lights::{BLOCK, Lights, Spread};
 pub use linear::{LinearModel, Remark, Weight};
 pub use lobe::{Expected, Lobe, Split, Tail};
-pub use model::{BasisLobe, Model, lobe_terms, term_count};
-pub use parameter::{
-    Channels, Parameter, ParameterError, Role, Scale, flat_bounds, flat_len, flat_names, offset_of, parameter,
-};
+pub use model::{BasisLobe, Model, lobe_terms, parameter, term_count};
+pub use parameter::{Channels, Parameter, ParameterError, Role, Scale, flat_bounds, flat_len, flat_names, offset_of};
 pub use reflectance::{Material, Reflectance};
 pub use ward::Ward;
 pub use width::Width;

@@ -1,6 +1,6 @@
 //! The declaration of a reflectance model.
 
-use super::{Lobe, Parameter, Split, Width};
+use super::{Lobe, Parameter, ParameterError, Split, Width, offset_of};
 use crate::math::Rgb;
 use std::fmt::Debug;
 
@@ -93,4 +93,17 @@ pub fn lobe_terms(lobe: &dyn Lobe) -> usize {
 #[must_use]
 pub fn term_count(model: &dyn Model) -> usize {
     model.lobes().iter().map(|b| lobe_terms(b.lobe)).sum()
+}
+
+/// A parameter of a model by name, with its first entry in the flat vector.
+///
+/// # Errors
+/// [`ParameterError::UnknownParameter`].
+pub fn parameter(model: &dyn Model, name: &str) -> Result<(&'static Parameter, usize), ParameterError> {
+    let parameters = model.parameters();
+    let found = parameters.iter().find(|p| p.name == name).zip(offset_of(parameters, name));
+    found.ok_or_else(|| {
+        let known = parameters.iter().map(|p| p.name).collect::<Vec<_>>().join(", ");
+        ParameterError::UnknownParameter { model: model.name(), name: name.to_owned(), known }
+    })
 }

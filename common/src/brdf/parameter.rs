@@ -3,7 +3,6 @@
 //! A parameter vector is flat: colours take three consecutive entries (red, green, blue), scalars one, in the order of
 //! [`Model::parameters`](super::Model::parameters).
 
-use super::Model;
 use thiserror::Error;
 
 /// Scalar or colour.
@@ -135,19 +134,6 @@ impl Parameter {
             _ => Err(ParameterError::Count { name: self.name, expected, found: values.len() }),
         }
     }
-}
-
-/// A parameter of a model by name, with its first entry in the flat vector.
-///
-/// # Errors
-/// [`ParameterError::UnknownParameter`].
-pub fn parameter(model: &dyn Model, name: &str) -> Result<(&'static Parameter, usize), ParameterError> {
-    let parameters = model.parameters();
-    let found = parameters.iter().find(|p| p.name == name).zip(offset_of(parameters, name));
-    found.ok_or_else(|| {
-        let known = parameters.iter().map(|p| p.name).collect::<Vec<_>>().join(", ");
-        ParameterError::UnknownParameter { model: model.name(), name: name.to_owned(), known }
-    })
 }
 
 /// Invalid parameters of a model.
