@@ -11,6 +11,7 @@
 //! agree with [`super::cid`] to 1e-12). Sums run in a fixed order: the bits do not depend on the number of threads, the
 //! vector instructions or the size of the black border around the object.
 
+use super::blocks::Blocks;
 use super::differences::{Differences, Reference};
 use super::dispatch::Lanes;
 use super::display::{check_coverage, check_covered_finite, check_exposure, expose};
@@ -200,6 +201,15 @@ impl<R: RowMath> Judge<R> {
     /// As [`Judge::score`].
     pub fn error_map(&self, image: &Image) -> Result<ErrorMap, MetricError> {
         Ok(self.maps(image)?.error())
+    }
+
+    /// The windows of an image's [`maps`](Self::maps) in blocks around the object; with `object`, only those centred on the object.
+    #[must_use]
+    pub fn blocks(&self, maps: &Maps, object: bool) -> Blocks {
+        let Region { x0, y0, image_width, .. } = self.region;
+        let (columns, rows) = self.region.windows();
+        let is_centred = |x: usize, y: usize| self.coverage[(y + RADIUS) * image_width + x + RADIUS] > 0.0;
+        Blocks::new(maps, x0..x0 + columns, y0..y0 + rows, |x, y| !object || is_centred(x, y))
     }
 
     /// As [`Reference::compare`].

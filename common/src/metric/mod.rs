@@ -9,6 +9,7 @@
 //! Scores depend much more on resolution, exposure and background than on details of the formulas. Compare only scores
 //! with equal resolution, exposure and background.
 
+mod blocks;
 mod cid;
 mod colour;
 pub mod cost;
@@ -23,6 +24,7 @@ mod icid;
 mod kind;
 mod lab2000hl;
 mod maps;
+mod noise;
 mod planes;
 mod region;
 mod row_math;
@@ -31,6 +33,7 @@ mod spans;
 mod window;
 mod working;
 
+pub use blocks::{Block, Blocks};
 pub use cid::{CidOptions, Scales, cid};
 #[cfg(test)]
 use colour::lab_from_linear;
@@ -43,6 +46,7 @@ pub use icid::{IcidOptions, IcidScore, Intent, icid};
 pub use kind::{Difference, MetricKind};
 pub use lab2000hl::Lab2000hl;
 pub use maps::{ErrorMap, Maps};
+pub use noise::{noise_floor, relative_noise};
 pub use working::SpatialFilter;
 
 #[cfg(test)]
