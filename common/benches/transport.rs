@@ -99,7 +99,7 @@ impl Study {
 
     fn table(&self) -> TransportTable {
         let knots = Knots::covering(0.005, 1.0, PER_OCTAVE);
-        let plan = TransportPlan { model: &Ggx, knots, accuracy: Accuracy::SUBSET };
+        let plan = TransportPlan::of_model(&Ggx, knots, Accuracy::SUBSET);
         plan.integrate(&self.geometry, &self.pyramid, &self.subset.pixels)
     }
 
@@ -172,7 +172,7 @@ fn full_image(criterion: &mut Criterion, study: &Study) {
     let mut pixels: Vec<Pixel> = (0..SIZE * SIZE).map(|k| [k % SIZE, k / SIZE]).collect();
     pixels.retain(|p| coverage[(p[1] * SIZE + p[0]) as usize] > 0.0);
     pixels.sort_by_key(|&pixel| tile_order(pixel));
-    let plan = TransportPlan { model: &Ggx, knots: Knots::covering(0.07, 0.14, 5.0), accuracy: Accuracy::FULL };
+    let plan = TransportPlan::of_model(&Ggx, Knots::covering(0.07, 0.14, 5.0), Accuracy::FULL);
     let integrate = || plan.integrate(&study.geometry, &study.pyramid, &pixels);
     let table = [Arc::new(integrate())];
     let view = FullView {

@@ -16,7 +16,7 @@
 //! | `f0` | specular reflectance at normal incidence, linear Rec. 709 | [0, 1] |
 //! | `n` | exponent of the cosine between normal and half vector | [1, 1e5] |
 
-use super::{Angles, BasisLobe, Expected, LinearModel, Lobe, Parameter, Split, Spread, Weight, power};
+use super::{Angles, BasisLobe, Expected, Factor, LinearModel, Lobe, Parameter, Split, Spread, Weight, power};
 use crate::math::elementary::fifth_power;
 use std::f64::consts::PI;
 
@@ -39,7 +39,7 @@ impl LinearModel for AshikhminShirley {
     ];
     const LOBES: &'static [BasisLobe] =
         &[BasisLobe::fixed(&DiffuseLobe), BasisLobe::with_width(&SpecularLobe, power::width(N))];
-    const WEIGHTS: &'static [Weight] = &[Weight::Remainder(KD, F0), Weight::Colour(F0), Weight::One];
+    const WEIGHTS: &'static [Weight] = &[&[Factor::Colour(KD), Factor::RestOfColour(F0)], &[Factor::Colour(F0)], &[]];
     /// `1 - (1 - n.v/2)^5` at `n.v = 1`.
     const DIFFUSE_ALBEDO: f64 = 1.0 - 1.0 / 32.0;
 }

@@ -15,7 +15,7 @@
 //! | `ks` | specular colour, linear Rec. 709: about the albedo of a sharp lobe | [0, 1] |
 //! | `n` | exponent of the cosine between normal and half vector | [1, 1e5] |
 
-use super::{Angles, BasisLobe, Expected, Lambert, LinearModel, Lobe, Parameter, Split, Spread, Weight, power};
+use super::{Angles, BasisLobe, Expected, Factor, Lambert, LinearModel, Lobe, Parameter, Split, Spread, Weight, power};
 use std::f64::consts::PI;
 
 /// The model `blinn-phong`.
@@ -36,7 +36,7 @@ impl LinearModel for BlinnPhong {
     ];
     const LOBES: &'static [BasisLobe] =
         &[BasisLobe::fixed(&Lambert), BasisLobe::with_width(&BlinnPhongLobe, power::width(N))];
-    const WEIGHTS: &'static [Weight] = &[Weight::Colour(KD), Weight::Colour(KS)];
+    const WEIGHTS: &'static [Weight] = &[&[Factor::Colour(KD)], &[Factor::Colour(KS)]];
 }
 
 /// The lobe `D n.l / (4 max(n.l, n.v))`.

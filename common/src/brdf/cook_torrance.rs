@@ -17,7 +17,7 @@
 //! A photo determines the product `ks f0`, the specular colour at normal incidence, well, and its factors poorly.
 
 use super::{
-    BasisLobe, Lambert, LinearModel, Lobe, Parameter, Role, Split, Weight, Width,
+    BasisLobe, Factor, Lambert, LinearModel, Lobe, Parameter, Role, Split, Weight, Width,
     beckmann::beckmann,
     single::{Formula, Seen, by_formula},
 };
@@ -48,7 +48,8 @@ impl LinearModel for CookTorrance {
     ];
     const LOBES: &'static [BasisLobe] =
         &[BasisLobe::fixed(&Lambert), BasisLobe::with_width(&CookTorranceLobe, Width::itself(M))];
-    const WEIGHTS: &'static [Weight] = &[Weight::Colour(KD), Weight::Scaled(KS, F0), Weight::Colour(KS)];
+    const WEIGHTS: &'static [Weight] =
+        &[&[Factor::Colour(KD)], &[Factor::Colour(KS), Factor::Scalar(F0)], &[Factor::Colour(KS)]];
 }
 
 /// The lobe `D G n.l / (4 n.l n.v)` without Fresnel.

@@ -20,7 +20,7 @@
 //! | `alpha` | microfacet width (an artist's roughness is its square root) | [0.005, 1] |
 
 use super::{
-    BasisLobe, Lambert, LinearModel, Lobe, Parameter, Role, Split, Weight, Width,
+    BasisLobe, Factor, Lambert, LinearModel, Lobe, Parameter, Role, Split, Weight, Width,
     single::{Formula, Seen, by_formula, second_order},
 };
 use crate::math::real::Real;
@@ -65,7 +65,7 @@ impl LinearModel for Ggx {
             ),
         })
     });
-    const WEIGHTS: &'static [Weight] = &[Weight::Colour(KD), Weight::Colour(F0), Weight::Scalar(F90)];
+    const WEIGHTS: &'static [Weight] = &[&[Factor::Colour(KD)], &[Factor::Colour(F0)], &[Factor::Scalar(F90)]];
 }
 
 /// The GGX lobe `D V n.l` without Fresnel.

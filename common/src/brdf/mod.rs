@@ -19,6 +19,7 @@ mod blinn_phong;
 mod cook_torrance;
 mod disney;
 mod ggx;
+mod ggx_haze;
 mod lambert;
 mod lights;
 mod linear;
@@ -38,23 +39,30 @@ pub use blinn_phong::BlinnPhong;
 pub use cook_torrance::CookTorrance;
 pub use disney::Disney;
 pub use ggx::Ggx;
+pub use ggx_haze::GgxHaze;
 pub use lambert::Lambert;
 #[cfg(test)]
 pub(crate) use lights::Incident;
 pub use lights::{BLOCK, Lights, Spread};
-pub use linear::{LinearModel, Remark, Weight};
+pub use linear::{Factor, LinearModel, Remark, Weight};
 pub use lobe::{Expected, Lobe, Split, Tail};
-pub use model::{BasisLobe, Model, lobe_terms, parameter, term_count};
+pub use model::{BasisLobe, Model, lit_lobes, lobe_terms, main_lobe, parameter, term_count};
 pub use parameter::{Channels, Parameter, ParameterError, Role, Scale, flat_bounds, flat_len, flat_names, offset_of};
 pub use reflectance::{Material, Reflectance};
 pub use ward::Ward;
 pub use width::Width;
 
 /// Every model, in the order in which lists show them.
-pub static MODELS: &[&dyn Model] = &[&Ggx, &CookTorrance, &Ward, &BlinnPhong, &AshikhminShirley, &Disney];
+pub static MODELS: &[&dyn Model] = &[&Ggx, &GgxHaze, &CookTorrance, &Ward, &BlinnPhong, &AshikhminShirley, &Disney];
 
 /// The default model.
 pub static DEFAULT_MODEL: &dyn Model = &Ggx;
+
+/// A model with the values of parameters that are held.
+pub type HeldModel = (&'static dyn Model, &'static [(&'static str, f64)]);
+
+/// The models of `--model auto`, from simple to rich.
+pub static AUTO: &[HeldModel] = &[(&Ggx, &[("f90", 1.0)]), (&Ggx, &[]), (&GgxHaze, &[])];
 
 /// The model of the papers' results and of `--preset paper`.
 pub static PAPER_MODEL: &dyn Model = &CookTorrance;
@@ -62,6 +70,12 @@ pub static PAPER_MODEL: &dyn Model = &CookTorrance;
 /// Names of earlier versions, and what to use instead.
 const RENAMED: &[(&str, &str)] =
     &[("ggx-f90", "ggx, which has the parameter f90: 1 for a smooth surface, and free in a fit")];
+
+/// A basis lobe's function by its name, the same for every model that has it.
+#[must_use]
+pub fn lobe(name: &str) -> Option<&'static dyn Lobe> {
+    MODELS.iter().flat_map(|model| model.lobes()).map(|basis| basis.lobe).find(|lobe| lobe.name() == name)
+}
 
 /// Looks a model up by name.
 ///

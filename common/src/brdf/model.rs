@@ -48,7 +48,7 @@ pub trait Model: Debug + Sync {
     fn parameters(&self) -> &'static [Parameter];
 
     /// Basis lobes in the order of the terms. The first lobe with a width is the main one: a table may cover a part of
-    /// its widths.
+    /// its widths. A lobe may be there twice, with two widths.
     fn lobes(&self) -> &'static [BasisLobe];
 
     /// Weight of every term at a flat parameter vector; `weights.len()` is [`term_count`].
@@ -80,6 +80,12 @@ pub trait Model: Debug + Sync {
     }
 }
 
+/// The basis lobe of a model's main lobe, the first that has a width, with its width.
+#[must_use]
+pub fn main_lobe(model: &dyn Model) -> Option<(BasisLobe, Width)> {
+    model.lobes().iter().find_map(|basis| Some((*basis, basis.width?)))
+}
+
 /// Terms of one lobe.
 #[must_use]
 pub fn lobe_terms(lobe: &dyn Lobe) -> usize {
@@ -93,6 +99,20 @@ pub fn lobe_terms(lobe: &dyn Lobe) -> usize {
 #[must_use]
 pub fn term_count(model: &dyn Model) -> usize {
     model.lobes().iter().map(|b| lobe_terms(b.lobe)).sum()
+}
+
+/// For every basis lobe of a model whether a flat parameter vector gives it light: the width of a dark lobe means nothing.
+#[must_use]
+pub fn lit_lobes(model: &dyn Model, parameters: &[f64]) -> Vec<bool> {
+    let mut weights = vec![Rgb::ZERO; term_count(model)];
+    model.weights(parameters, &mut weights);
+    let mut rest = &weights[..];
+    let is_lit = |basis: &BasisLobe| {
+        let (of_lobe, others) = rest.split_at(lobe_terms(basis.lobe));
+        rest = others;
+        of_lobe.iter().any(|weight| *weight != Rgb::ZERO)
+    };
+    model.lobes().iter().map(is_lit).collect()
 }
 
 /// A parameter of a model by name, with its first entry in the flat vector.

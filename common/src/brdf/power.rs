@@ -19,7 +19,7 @@ pub(super) const EXPONENT: Parameter = Parameter {
 
 /// The width of an exponent in the flat parameter vector: `alpha = sqrt(2 / (n + 2))`, for which the peak has the curvature of GGX.
 pub(super) const fn width(entry: usize) -> Width {
-    Width { entry, of: |n| (2.0 / (n + 2.0)).sqrt(), inverse: exponent, derivative }
+    Width { entry, of: |n| (2.0 / (n + 2.0)).sqrt(), inverse: exponent, derivative, widened_by: None }
 }
 
 fn derivative(n: f64) -> f64 {

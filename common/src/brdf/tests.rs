@@ -326,14 +326,27 @@ fn every_simd_level_accumulates_the_same_bits() {
     }
 }
 
-/// Every lobe with a width has its own grid, and so needs its own entry.
+/// A table has one grid per lobe, found by the lobe's name; of two widths of one lobe, the second is a widened first.
 #[test]
-fn no_two_lobes_of_a_model_share_a_width() {
+fn lobes_of_one_name_are_one_function_and_widths_are_their_own() {
+    let mut known: Vec<(&str, String)> = Vec::new();
     for model in MODELS {
-        let widths: Vec<usize> = model.lobes().iter().filter_map(|b| Some(b.width?.entry)).collect();
-        let distinct: BTreeSet<&usize> = widths.iter().collect();
-        assert_eq!(widths.len(), distinct.len(), "{}", model.name());
+        for basis in model.lobes() {
+            let (name, function) = (basis.lobe.name(), format!("{:?}", basis.lobe));
+            assert_eq!(format!("{:?}", lobe(name).unwrap()), function);
+            known.push((name, function));
+        }
+        let own = |b: &BasisLobe| b.width.filter(|width| width.widened_by.is_none()).map(|width| width.entry);
+        let entries: Vec<usize> = model.lobes().iter().filter_map(own).collect();
+        let distinct: BTreeSet<&usize> = entries.iter().collect();
+        assert_eq!(entries.len(), distinct.len(), "{}", model.name());
+        for basis in model.lobes().iter().filter(|b| b.width.is_some_and(|width| width.widened_by.is_some())) {
+            let (main, width) = main_lobe(*model).unwrap();
+            assert!(basis.lobe.name() == main.lobe.name() && basis.width.unwrap().entry == width.entry);
+        }
     }
+    assert!(known.iter().all(|(a, f)| known.iter().all(|(b, g)| a != b || f == g)), "{known:?}");
+    assert!(lobe("phong").is_none());
 }
 
 #[test]

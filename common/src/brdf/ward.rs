@@ -13,7 +13,7 @@
 //! | `alpha` | root mean square slope of the surface (Beckmann's width) | [0.005, 1] |
 
 use super::{
-    Angles, BasisLobe, Lambert, LinearModel, Lobe, Parameter, Split, Spread, Weight, Width, beckmann::beckmann,
+    Angles, BasisLobe, Factor, Lambert, LinearModel, Lobe, Parameter, Split, Spread, Weight, Width, beckmann::beckmann,
     single::Seen,
 };
 
@@ -36,7 +36,7 @@ impl LinearModel for Ward {
     ];
     const LOBES: &'static [BasisLobe] =
         &[BasisLobe::fixed(&Lambert), BasisLobe::with_width(&WardLobe, Width::itself(ALPHA))];
-    const WEIGHTS: &'static [Weight] = &[Weight::Colour(KD), Weight::Colour(KS)];
+    const WEIGHTS: &'static [Weight] = &[&[Factor::Colour(KD)], &[Factor::Colour(KS)]];
 }
 
 /// The lobe `D n.l / (4 (v.h)^2)`.

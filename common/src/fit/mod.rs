@@ -9,11 +9,13 @@
 
 mod best;
 mod brute_force;
-mod candidate;
+pub(crate) mod candidate;
+mod choice;
 mod direct;
 pub(crate) mod explore;
 mod gammas;
 mod method;
+mod methods;
 mod objective;
 pub(crate) mod polish;
 mod ranges;
@@ -21,22 +23,27 @@ mod scan;
 pub(crate) mod stage_one;
 mod stage_two;
 pub(crate) mod uncertainty;
+mod verdict;
 
 pub use best::BestScore;
 pub use brute_force::brute_force;
 pub use candidate::{Candidate, SAME, distinct, needed_span};
+pub use choice::{AS_GOOD, Tried};
+pub(crate) use choice::{COST_OF_NOISE, Match, chosen, compare, is_hopeless};
 pub use direct::DirectPixels;
 pub use gammas::{Gammas, GammasError};
 pub use method::{
     Compress, Integration, JudgedBy, MOST_SEARCHES, Method, MethodError, SearchKind, Setting, Start,
     UnknownIntegration, gamma_range,
 };
+pub use methods::Methods;
 pub use objective::Objective;
 pub use polish::{Judges, Limits, MAX_EVALUATIONS, Polished, polish};
 pub use ranges::Ranges;
 pub use stage_one::{ScannedTable, SearchFailure, search_gamma};
 pub use stage_two::{FullView, Judged, judge_candidates, winner};
 pub use uncertainty::{LARGEST_SHARE, Uncertainty};
+pub use verdict::{CLOSE, INDISTINGUISHABLE, VISIBLE, Verdict};
 
 #[cfg(test)]
 pub(crate) mod tests;

@@ -131,7 +131,7 @@ pub(super) fn observed(value: f32) -> f64 {
     f64::from(value).max(0.0)
 }
 
-/// For every term of a lobe that has a width: the entry that determines the width, the term, the width, and its derivative with respect
+/// For every term of a lobe that has a width: an entry that determines the width, the term, the width, and its derivative with respect
 /// to the entry.
 fn width_entries(model: &dyn Model, point: &[f64]) -> Vec<(usize, usize, f64, f64)> {
     let mut list = Vec::new();
@@ -139,8 +139,9 @@ fn width_entries(model: &dyn Model, point: &[f64]) -> Vec<(usize, usize, f64, f6
     for basis in model.lobes() {
         let terms = crate::brdf::lobe_terms(basis.lobe);
         if let Some(width) = basis.width {
-            let derivative = (width.derivative)(point[width.entry]);
-            list.extend((first..first + terms).map(|t| (width.entry, t, width.at(point), derivative)));
+            width.derivatives(point, |entry, derivative| {
+                list.extend((first..first + terms).map(|t| (entry, t, width.at(point), derivative)));
+            });
         }
         first += terms;
     }
@@ -160,7 +161,7 @@ mod tests {
         brdf::{MODELS, flat_bounds, lobe_terms},
         math::sampling::{key, uniform},
         render::{
-            knots::{self, Knots},
+            spans::{LobeKnots, Spans},
             table::LobeTable,
         },
         search::derivative::check_gradient,
@@ -168,9 +169,8 @@ mod tests {
 
     /// A table of smooth random integrals.
     fn table(model: &dyn Model, pixels: usize) -> TransportTable {
-        let knots = Knots::covering(0.005, 1.0, 6.0);
-        let lobes = model.lobes().iter().zip(knots::of_lobes(model, knots)).enumerate().map(|(l, (basis, knots))| {
-            let terms = lobe_terms(basis.lobe);
+        let lobes = Spans::whole(model).knots(6.0).into_iter().enumerate().map(|(l, LobeKnots { lobe, knots })| {
+            let terms = lobe_terms(lobe);
             let slices = knots.map_or(1, |k| k.count());
             let mut values = Vec::new();
             for slice in 0..slices {
@@ -179,7 +179,7 @@ mod tests {
                     values.push(crate::math::to_f32(0.5 + phase + 0.3 * (slice as f64 * 0.1 + 6.0 * phase).sin()));
                 }
             }
-            LobeTable { knots, terms, values }
+            LobeTable { lobe: lobe.name().to_owned(), knots, terms, values }
         });
         TransportTable { pixels, lobes: lobes.collect() }
     }

@@ -12,7 +12,8 @@ use super::{
     stage_two::{FullView, Renderer},
 };
 use crate::{
-    brdf::Role,
+    brdf::{Role, Width, lit_lobes, main_lobe},
+    math::elementary::ln,
     metric::{Judge, Score},
     search::{
         Bounds, Progress, Scale, SearchError, Termination,
@@ -112,18 +113,35 @@ pub fn polish(
             (point, score) = (start, of_start);
         }
     }
-    let at_table_edge = view.model.lobes().iter().find_map(|b| b.width).is_some_and(|width| {
+    let at_table_edge = main_lobe(view.model).is_some_and(|(_, width)| {
         let (x, step) = (bounds.to_scaled(width.entry, point[width.entry]), EDGE);
         (table_is_tighter[0] && x < step) || (table_is_tighter[1] && x > 1.0 - step)
     });
+    let tail_at_edge = end_at_the_edge(view, &mut point);
     Ok(Polished {
         parameters: point,
         cssim: score.cssim,
         cssim_object: score.cssim_object,
         evaluations: compared + minimum.evaluations,
         termination: minimum.termination,
-        at_table_edge,
+        at_table_edge: at_table_edge || tail_at_edge,
     })
+}
+
+/// The table has no wider lobe than its last one, so that all wider ones look like that: moves the entries that widen a lobe to where it
+/// becomes the last one, which looks the same. Returns whether a lobe is at that edge of the table and could be wider.
+fn end_at_the_edge(view: &FullView<'_>, point: &mut [f64]) -> bool {
+    let Some((_, last)) = view.span() else { return false };
+    let mut is_at_edge = false;
+    for (basis, is_lit) in view.model.lobes().iter().zip(lit_lobes(view.model, point)) {
+        let Some((width, t)) = basis.width.and_then(|width| Some((width, width.widened_by?))) else { continue };
+        let is_whole = last >= width.span(view.model.parameters()).1 * (1.0 - 1e-9);
+        is_at_edge |= is_lit && !is_whole && width.at(point) > last * (1.0 - EDGE);
+        if !is_whole && width.at(point) > last {
+            point[t] = (1.0 - ln(last) / ln((width.of)(point[width.entry]))).max(0.0);
+        }
+    }
+    is_at_edge
 }
 
 /// The start of lowest score (the first of equal ones), and the number of evaluations: 0 for a single start.
@@ -155,7 +173,8 @@ fn polish_bounds(view: &FullView<'_>, ranges: &Ranges) -> Result<(Bounds, [bool;
     let whole = search_bounds(view.model, ranges, SearchKind::LeastSquares)?;
     let (bounds, tighter) = within_table(view.model, &whole, view.span())?;
     // Small steps of a reflectance are visible where the reflectance is small.
-    let is_width = |entry| view.model.lobes().iter().any(|b| b.width.is_some_and(|width| width.entry == entry));
+    let is_of = |width: &Width, entry| width.entry == entry || width.widened_by == Some(entry);
+    let is_width = |entry| view.model.lobes().iter().any(|b| b.width.is_some_and(|width| is_of(&width, entry)));
     let scale = |(entry, role)| match role {
         Role::Width => Scale::Logarithmic,
         _ if is_width(entry) => Scale::Linear,

@@ -60,6 +60,11 @@ impl Ranges {
         Ok(())
     }
 
+    /// Whether a parameter of this name has a range.
+    pub(crate) fn name(&self, name: &str) -> bool {
+        self.0.iter().any(|range| range.name == name)
+    }
+
     /// Whether a flat parameter vector of `model` is within the ranges.
     #[must_use]
     pub(crate) fn contain(&self, model: &dyn Model, point: &[f64]) -> bool {
@@ -69,7 +74,7 @@ impl Ranges {
 
     fn add(&mut self, parameter: &Parameter, lower: Vec<f64>, upper: Vec<f64>) -> Result<(), ParameterError> {
         let &Parameter { name, lower: least, upper: most, .. } = parameter;
-        if self.0.iter().any(|range| range.name == name) {
+        if self.name(name) {
             return Err(ParameterError::Twice { name });
         }
         if let Some(&found) = lower.iter().chain(&upper).find(|x| !(least..=most).contains(*x)) {
@@ -95,6 +100,13 @@ impl Ranges {
             }
         }
         (lower, upper)
+    }
+
+    /// Whether the range of an entry of the flat vector of `model` is not that of the model.
+    pub(crate) fn restrict(&self, model: &dyn Model, entry: usize) -> bool {
+        let (lower, upper) = self.bounds(model);
+        let (least, most) = flat_bounds(model.parameters());
+        lower[entry] != least[entry] || upper[entry] != most[entry]
     }
 
     /// Whether every entry of the flat vector is held.

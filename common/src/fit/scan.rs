@@ -10,7 +10,7 @@ use super::{
     ranges::Ranges,
 };
 use crate::{
-    brdf::{BasisLobe, Channels, Model, Role, flat_len, lobe_terms, term_count},
+    brdf::{Channels, Model, Role, flat_len, lobe_terms, main_lobe, term_count},
     math::Rgb,
     render::table::{Planes, TransportTable},
     search::{NormalEquations, bvls},
@@ -80,10 +80,9 @@ fn grids(model: &dyn Model, [lower, upper]: [&[f64]; 2], table: &TransportTable)
         Role::Linear => None,
         Role::Scanned(values) => Some(within(entry, &mut values.iter().copied())),
         Role::Width => {
-            let of_entry = |b: &BasisLobe| b.width.filter(|width| width.entry == entry);
-            let (lobe, width) = model.lobes().iter().enumerate().find_map(|(l, b)| Some((l, of_entry(b)?)))?;
+            let (basis, width) = main_lobe(model)?;
             // The outermost knots equal the model's bounds up to rounding.
-            Some(within(entry, &mut table.lobes[lobe].knots?.widths().into_iter().map(width.inverse)))
+            Some(within(entry, &mut table.lobe(basis.lobe)?.knots?.widths().into_iter().map(width.inverse)))
         }
     });
     scanned.collect()

@@ -9,7 +9,7 @@ use super::{
     scan::scan,
 };
 use crate::{
-    brdf::{self, Model, Role, flat_len},
+    brdf::{self, Model, Role, flat_len, main_lobe},
     metric::cost::Compression,
     render::{subset::PixelSubset, table::TransportTable},
     search::{
@@ -79,7 +79,7 @@ pub fn search_gamma(
     let fail = |source| SearchFailure::Search { gamma, source };
     let bounds = search_bounds(method.model, &method.ranges, method.search).map_err(fail)?;
     let ScannedTable { table, starts } = scanned;
-    let (bounds, _) = within_table(method.model, &bounds, table.span()).map_err(fail)?;
+    let (bounds, _) = within_table(method.model, &bounds, table.span(method.model)).map_err(fail)?;
     let mut objective = objective_of(method, gamma, table, subset, photo, mean_radiance);
     if let Some(direct) = direct {
         objective = objective.rendered_by(direct);
@@ -176,7 +176,7 @@ pub(super) fn within_table(
 ) -> Result<(Bounds, [bool; 2]), SearchError> {
     let (mut lower, mut upper) = (bounds.lower().to_vec(), bounds.upper().to_vec());
     let mut tighter = [false, false];
-    if let Some((width, span)) = model.lobes().iter().find_map(|basis| basis.width).zip(span) {
+    if let Some(((_, width), span)) = main_lobe(model).zip(span) {
         let (entry, (first, last)) = (width.entry, width.entries(span));
         tighter = [first > lower[entry] * (1.0 + 1e-9), last < upper[entry] * (1.0 - 1e-9)];
         if tighter[0] {

@@ -66,9 +66,9 @@ impl FullView<'_> {
         image
     }
 
-    /// Smallest and largest width of the table.
+    /// Smallest and largest width of the model's main lobe in the table.
     pub(crate) fn span(&self) -> Option<(f64, f64)> {
-        self.table.first()?.span()
+        self.table.first()?.span(self.model)
     }
 }
 

@@ -14,6 +14,7 @@ use serde::{Deserialize, Serialize};
 
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(crate) struct AppraiseParameters {
+    pub(crate) model: String,
     pub(crate) points: Vec<Vec<f64>>,
     pub(crate) gammas: Vec<f64>,
     /// Mean luminance of the photo over its usable pixels.
@@ -38,8 +39,8 @@ impl NodeType for Appraise {
         if !positive(&parameters.mean_radiance) || !parameters.gammas.iter().all(positive) {
             return Err(NodeFailure::new("gammas and mean radiance must be positive"));
         }
-        let scene = Scene::read(inputs, context)?;
-        parameters.points.iter().try_for_each(|point| check_parameters("points", scene.view.model, point))?;
+        let scene = Scene::read(&parameters.model, inputs, context)?;
+        parameters.points.iter().try_for_each(|point| check_parameters("points", scene.model, point))?;
         let full = scene.full();
         let planes = |image: &crate::image::Image| -> [Vec<f64>; 3] {
             let inside = image.pixels().iter().zip(full.coverage).filter(|(_, coverage)| **coverage >= 1.0);

@@ -5,10 +5,10 @@
 
 use super::{
     search::{DirectScene, DirectWire},
-    view::{Scene, View},
+    view::{Scene, View, model_of},
 };
 use crate::{
-    brdf::Material,
+    brdf::{Material, Model},
     fit::brute_force,
     graph::{Blob, NodeFailure, NodeType, RunContext},
     image::Image,
@@ -22,6 +22,7 @@ use std::ops::ControlFlow;
 
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(crate) struct BruteForceParameters {
+    pub(crate) model: String,
     pub(crate) start: Vec<f64>,
     /// Most evaluations; 0 for the limit of the search.
     pub(crate) max_evaluations: u32,
@@ -40,7 +41,7 @@ impl NodeType for BruteForce {
         let parameters: BruteForceParameters = read("parameters of brute-force", parameters)?;
         let outcome = match &parameters.direct {
             None => {
-                let scene = Scene::read(inputs, context)?;
+                let scene = Scene::read(&parameters.model, inputs, context)?;
                 let full = scene.full();
                 search(&parameters, &scene.view, context, &|point| Some(full.render(point)))?
             }
@@ -49,11 +50,12 @@ impl NodeType for BruteForce {
                     return Err(NodeFailure::new("brute-force takes a view and an environment, found no input"));
                 };
                 let view = context.decoded(view, View::decode)?;
+                let model = model_of(&parameters.model)?;
                 let scene = DirectScene::read(direct, of_scene, context)?;
                 if (scene.geometry.width(), scene.geometry.height()) != (view.width, view.height) {
                     return Err(NodeFailure::new("the direct integrator's scene has another size than the view"));
                 }
-                let outcome = search(&parameters, &view, context, &|point| direct_image(&view, &scene, point));
+                let outcome = search(&parameters, &view, context, &|point| direct_image(model, (&view, &scene), point));
                 view.judge.free_buffers();
                 outcome?
             }
@@ -78,7 +80,7 @@ fn search(
     };
     let score = |point: &[f64]| view.judge.score(&render(point)?).ok();
     let value = |point: &[f64]| score(point).map_or(f64::NAN, |s| view.by.pick(s.cssim, s.cssim_object));
-    let minimum = brute_force(view.model, value, &parameters.start, limit, &mut observe)
+    let minimum = brute_force(model_of(&parameters.model)?, value, &parameters.start, limit, &mut observe)
         .map_err(|error| NodeFailure::new(format!("brute force: {error}")))?;
     let score =
         score(&minimum.point).ok_or_else(|| NodeFailure::new("brute force ended at a point that cannot be scored"))?;
@@ -86,8 +88,8 @@ fn search(
 }
 
 /// The image of a flat parameter vector over black by the direct integrator; `None` for parameters outside the model.
-fn direct_image(view: &View, scene: &DirectScene, parameters: &[f64]) -> Option<Image> {
-    let material = Material::new(view.model, parameters.to_vec()).ok()?;
+fn direct_image(model: &'static dyn Model, (view, scene): (&View, &DirectScene), parameters: &[f64]) -> Option<Image> {
+    let material = Material::new(model, parameters.to_vec()).ok()?;
     let DirectScene { geometry, light, samples, seed } = scene;
     let integrator = Integrator { geometry, light, samples: *samples, seed: *seed };
     let radiance: Vec<_> = view.pixels.par_iter().map(|pixel| integrator.pixel(*pixel, &material)).collect();

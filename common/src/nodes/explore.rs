@@ -4,9 +4,18 @@ use super::{PolishParameters, view::Scene};
 use crate::{
     fit::explore::{explore, most_evaluations},
     graph::{Blob, NodeFailure, NodeType, RunContext},
+    metric::Block,
     nodes::wire::{PolishedWire, check_parameters, read, write},
 };
+use serde::{Deserialize, Serialize};
 use std::ops::ControlFlow;
+
+#[derive(Debug, Serialize, Deserialize)]
+pub(crate) struct ExploredWire {
+    pub(crate) found: PolishedWire,
+    /// The windows of its picture that count for the score, as the parts of [`Blocks`](crate::metric::Blocks).
+    pub(crate) blocks: Vec<Block>,
+}
 
 #[derive(Debug)]
 pub(super) struct Explore;
@@ -17,10 +26,10 @@ impl NodeType for Explore {
     }
 
     fn run(&self, parameters: &[u8], inputs: &[Blob], context: &RunContext) -> Result<Vec<u8>, NodeFailure> {
-        let PolishParameters { ranges, starts, max_evaluations } = read("parameters of explore", parameters)?;
-        let scene = Scene::read(inputs, context)?;
-        ranges.check(scene.view.model).map_err(|error| NodeFailure::new(error.to_string()))?;
-        starts.iter().try_for_each(|start| check_parameters("starts", scene.view.model, start))?;
+        let PolishParameters { model, ranges, starts, max_evaluations } = read("parameters of explore", parameters)?;
+        let scene = Scene::read(&model, inputs, context)?;
+        ranges.check(scene.model).map_err(|error| NodeFailure::new(error.to_string()))?;
+        starts.iter().try_for_each(|start| check_parameters("starts", scene.model, start))?;
         let total = most_evaluations(starts.len(), max_evaluations as usize) as u64;
         // Evaluations of the earlier searches, and of the current one so far: each search counts from 1.
         let (mut before, mut last) = (0, 0);
@@ -39,6 +48,7 @@ impl NodeType for Explore {
             .map_err(|error| NodeFailure::new(format!("explore: {error}")))?;
         // A cancelled search has no result.
         context.check()?;
-        write("explore", &PolishedWire::of(found))
+        let blocks = scene.blocks(&found.parameters)?.to_parts().to_vec();
+        write("explore", &ExploredWire { found: PolishedWire::of(found), blocks })
     }
 }

@@ -10,6 +10,8 @@ pub const TRANSPORT_FULL: &str = "transport-full";
 pub const SEARCH: &str = "search";
 /// Judges the candidates.
 pub const SELECT: &str = "select";
+/// As [`SELECT`], on the coarse picture, before the choice among several models.
+pub const SCOUT: &str = "scout";
 /// Searches the coarse picture before polish.
 pub const EXPLORE: &str = "explore";
 /// Lowers the score of the winner.

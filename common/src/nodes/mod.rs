@@ -21,8 +21,10 @@ use crate::graph::Registry;
 
 pub(crate) use appraise::{AppraiseParameters, AppraisedWire};
 pub(crate) use brute_force::BruteForceParameters;
+pub(crate) use explore::ExploredWire;
 pub use kinds::{
-    APPRAISE, BRUTE_FORCE, EXPLORE, POLISH, RENDER, REPORT, SEARCH, SELECT, TRANSPORT, TRANSPORT_COARSE, TRANSPORT_FULL,
+    APPRAISE, BRUTE_FORCE, EXPLORE, POLISH, RENDER, REPORT, SCOUT, SEARCH, SELECT, TRANSPORT, TRANSPORT_COARSE,
+    TRANSPORT_FULL,
 };
 pub(crate) use polish::PolishParameters;
 pub(crate) use render::{RenderParameters, RenderedWire};
@@ -40,7 +42,8 @@ pub fn registry() -> Registry {
         .with(transport::Transport { kind: TRANSPORT_COARSE })
         .with(transport::Transport { kind: TRANSPORT_FULL })
         .with(search::Search)
-        .with(select::Select)
+        .with(select::Select { kind: SELECT })
+        .with(select::Select { kind: SCOUT })
         .with(explore::Explore)
         .with(polish::Polish)
         .with(report::Report)

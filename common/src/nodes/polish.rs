@@ -11,6 +11,7 @@ use std::ops::ControlFlow;
 
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(crate) struct PolishParameters {
+    pub(crate) model: String,
     pub(crate) ranges: Ranges,
     /// Possible starts; the search starts from the best of them on this node's table.
     pub(crate) starts: Vec<Vec<f64>>,
@@ -26,10 +27,10 @@ impl NodeType for Polish {
     }
 
     fn run(&self, parameters: &[u8], inputs: &[Blob], context: &RunContext) -> Result<Vec<u8>, NodeFailure> {
-        let PolishParameters { ranges, starts, max_evaluations } = read("parameters of polish", parameters)?;
-        let scene = Scene::read(inputs, context)?;
-        ranges.check(scene.view.model).map_err(|error| NodeFailure::new(error.to_string()))?;
-        starts.iter().try_for_each(|start| check_parameters("starts", scene.view.model, start))?;
+        let PolishParameters { model, ranges, starts, max_evaluations } = read("parameters of polish", parameters)?;
+        let scene = Scene::read(&model, inputs, context)?;
+        ranges.check(scene.model).map_err(|error| NodeFailure::new(error.to_string()))?;
+        starts.iter().try_for_each(|start| check_parameters("starts", scene.model, start))?;
         let mut observe = |progress: &crate::search::Progress<'_>| {
             context.report(progress.evaluations as u64, u64::from(max_evaluations));
             if context.is_cancelled() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }

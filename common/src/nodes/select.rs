@@ -1,4 +1,4 @@
-//! `select`: stage two, the scores of all candidates.
+//! `select`: stage two, the scores of all candidates. `scout`: the same on the coarse picture.
 
 use super::view::Scene;
 use crate::{
@@ -11,22 +11,25 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(crate) struct SelectParameters {
+    pub(crate) model: String,
     pub(crate) candidates: Vec<CandidateWire>,
 }
 
+/// The node type, under one of its kinds.
 #[derive(Debug)]
-pub(super) struct Select;
+pub(super) struct Select {
+    pub(super) kind: &'static str,
+}
 
 impl NodeType for Select {
     fn kind(&self) -> &'static str {
-        super::SELECT
+        self.kind
     }
 
     fn run(&self, parameters: &[u8], inputs: &[Blob], context: &RunContext) -> Result<Vec<u8>, NodeFailure> {
         let parameters: SelectParameters = read("parameters of select", parameters)?;
-        let scene = Scene::read(inputs, context)?;
-        let model = scene.view.model;
-        let candidates = parameters.candidates.into_iter().map(|wire| wire.candidate(model));
+        let scene = Scene::read(&parameters.model, inputs, context)?;
+        let candidates = parameters.candidates.into_iter().map(|wire| wire.candidate(scene.model));
         let candidates = candidates.collect::<Result<Vec<_>, _>>()?;
         let done = AtomicU64::new(0);
         let each = || context.report(1 + done.fetch_add(1, Ordering::Relaxed), candidates.len() as u64);

@@ -3,9 +3,8 @@
 //! Inputs: the environment; the list of pixels (an encoded `Vec<Pixel>`); the normal map if the surface has one.
 
 use crate::{
-    brdf,
     graph::{Blob, NodeFailure, NodeType, RunContext},
-    nodes::wire::{EnvironmentWire, ImageWire, KnotsWire, TableWire, read, write},
+    nodes::wire::{EnvironmentWire, ImageWire, LobeWire, TableWire, read, write},
     render::{
         pyramid::LightPyramid,
         transport::{Accuracy, Pixel, TransportPlan},
@@ -16,9 +15,8 @@ use serde::{Deserialize, Serialize};
 
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(crate) struct TransportParameters {
-    pub(crate) model: String,
     pub(crate) geometry: GeometrySpec,
-    pub(crate) knots: KnotsWire,
+    pub(crate) lobes: Vec<LobeWire>,
     pub(crate) tolerance: f64,
     pub(crate) footprint: f64,
     /// Index of the first pixel in the list, and number of pixels.
@@ -52,7 +50,6 @@ impl NodeType for Transport {
             .transpose()?;
         let geometry = Geometry::from_spec(&parameters.geometry, normals.as_deref())
             .map_err(|error| NodeFailure::new(error.to_string()))?;
-        let model = brdf::model(&parameters.model).map_err(|error| NodeFailure::new(error.to_string()))?;
         let (first, count) = (parameters.range.0 as usize, parameters.range.1 as usize);
         let range = first..first.saturating_add(count);
         let shard = pixels.get(range.clone()).ok_or_else(|| {
@@ -63,7 +60,8 @@ impl NodeType for Transport {
             return Err(NodeFailure::new(format!("pixel {pixel:?} lies outside the image")));
         }
         let accuracy = Accuracy { tolerance: parameters.tolerance, footprint: parameters.footprint };
-        let plan = TransportPlan { model, knots: parameters.knots.knots()?, accuracy };
+        let lobes = parameters.lobes.into_iter().map(LobeWire::lobe).collect::<Result<Vec<_>, _>>()?;
+        let plan = TransportPlan { lobes, accuracy };
         write("transport table", &TableWire::of(plan.integrate(&geometry, &pyramid, shard)))
     }
 }

@@ -4,11 +4,11 @@
 //! Their inputs: the view; the shards of the table, in order.
 
 use crate::{
-    brdf::{self, Model, lobe_terms},
+    brdf::{self, Model},
     fit::{FullView, JudgedBy, Judges},
     graph::{Blob, NodeFailure, RunContext},
     image::Image,
-    metric::{Judge, JudgeOptions, MetricError},
+    metric::{Blocks, Judge, JudgeOptions, MetricError, Score, noise_floor},
     nodes::wire::{ImageWire, TableWire, read},
     render::{table::TransportTable, transport::Pixel},
 };
@@ -18,7 +18,6 @@ use std::sync::Arc;
 /// The photo and how it is scored.
 #[derive(Debug, Serialize, Deserialize)]
 pub(crate) struct ViewWire {
-    pub(crate) model: String,
     pub(crate) photo: ImageWire,
     /// One value in [0, 1] per pixel. Renderings are multiplied by it, and pixels with coverage 0 are not scored. The photo is not
     /// multiplied: it is over black, so its pixels contain the coverage already.
@@ -34,7 +33,6 @@ pub(crate) struct ViewWire {
 /// A decoded view with its prepared judge.
 #[derive(Debug)]
 pub(super) struct View {
-    pub(super) model: &'static dyn Model,
     pub(super) judge: Judge,
     /// Exposure and scored pixels of the judges.
     exposure: f64,
@@ -48,34 +46,42 @@ pub(super) struct View {
     pub(super) height: usize,
 }
 
-/// A view with the transport table of its pixels.
+/// A view with the transport table of its pixels, for one model.
 #[derive(Debug)]
 pub(super) struct Scene {
+    pub(super) model: &'static dyn Model,
     pub(super) view: Arc<View>,
     table: Vec<Arc<TransportTable>>,
 }
 
 impl Scene {
-    pub(super) fn read(inputs: &[Blob], context: &RunContext) -> Result<Self, NodeFailure> {
+    pub(super) fn read(model: &str, inputs: &[Blob], context: &RunContext) -> Result<Self, NodeFailure> {
+        let model = model_of(model)?;
         let Some((view, shards)) = inputs.split_first() else {
             return Err(NodeFailure::new("expected a view and a transport table, found no input"));
         };
         let view = context.decoded(view, View::decode)?;
         let table = decoded(shards, context)?;
-        if !table.iter().all(|shard| is_of(view.model, shard) && shard.has_the_grids_of(&table[0])) {
-            return Err(of_different_tables(view.model));
+        if !table.iter().all(|shard| shard.is_of(model) && shard.has_the_grids_of(&table[0])) {
+            return Err(of_different_tables(model));
         }
         let (expected, found) = (view.pixels.len(), table.iter().map(|shard| shard.pixels).sum::<usize>());
         if expected != found {
             return Err(NodeFailure::new(format!("expected a table of {expected} pixels, found {found}")));
         }
-        Ok(Self { view, table })
+        Ok(Self { model, view, table })
     }
 
     pub(super) fn full(&self) -> FullView<'_> {
-        let View { model, pixels, coverage, stride, width, height, .. } = &*self.view;
+        let View { pixels, coverage, stride, width, height, .. } = &*self.view;
         let (stride, width, height) = (*stride, *width, *height);
-        FullView { model: *model, table: &self.table, pixels, coverage, stride, width, height }
+        FullView { model: self.model, table: &self.table, pixels, coverage, stride, width, height }
+    }
+
+    /// The windows that count for the score of the picture of a parameter vector.
+    pub(super) fn blocks(&self, parameters: &[f64]) -> Result<Blocks, NodeFailure> {
+        let maps = self.view.judge.maps(&self.full().render(parameters)).map_err(cannot_be_judged)?;
+        Ok(self.view.judge.blocks(&maps, self.view.by == JudgedBy::Object))
     }
 }
 
@@ -92,6 +98,11 @@ impl View {
         Judge::single(&self.photo, &self.scored, self.exposure, &JudgeOptions::default()).map_err(cannot_be_judged)
     }
 
+    /// What noise costs a match.
+    pub(super) fn noise_floor(&self, matched: &Image, noise: f64) -> Result<Score, MetricError> {
+        noise_floor(matched, &self.scored, self.exposure, noise)
+    }
+
     /// Both judges, and which score counts.
     pub(super) fn judges<'a>(&'a self, searching: &'a Judge<f32>) -> Judges<'a> {
         Judges { searching, reporting: &self.judge, by: self.by }
@@ -100,7 +111,6 @@ impl View {
     pub(super) fn decode(bytes: &[u8]) -> Result<Self, NodeFailure> {
         let wire: ViewWire = read("view", bytes)?;
         let photo: Image = wire.photo.image()?;
-        let model = brdf::model(&wire.model).map_err(|error| NodeFailure::new(error.to_string()))?;
         let scored: Vec<f32> = wire.coverage.iter().map(|&c| if c > 0.0 { 1.0 } else { 0.0 }).collect();
         let judge = Judge::new(&photo, &scored, wire.exposure, &JudgeOptions::default()).map_err(cannot_be_judged)?;
         let (width, height) = (photo.width(), photo.height());
@@ -111,7 +121,7 @@ impl View {
         }
         let by = if wire.judge_object { JudgedBy::Object } else { JudgedBy::Image };
         let ViewWire { exposure, pixels, coverage, .. } = wire;
-        Ok(Self { model, judge, exposure, scored, by, photo, pixels, coverage, stride, width, height })
+        Ok(Self { judge, exposure, scored, by, photo, pixels, coverage, stride, width, height })
     }
 }
 
@@ -119,7 +129,12 @@ fn cannot_be_judged(error: MetricError) -> NodeFailure {
     NodeFailure::new(format!("the photo cannot be judged: {error}"))
 }
 
-/// Joins consecutive shards into one table, which must be for the lobes of `model`.
+/// A model by its name.
+pub(super) fn model_of(name: &str) -> Result<&'static dyn Model, NodeFailure> {
+    brdf::model(name).map_err(|error| NodeFailure::new(error.to_string()))
+}
+
+/// Joins consecutive shards into one table, which must have the lobes of `model`.
 pub(super) fn concatenated(
     model: &dyn Model,
     shards: &[Blob],
@@ -137,14 +152,7 @@ fn decoded(shards: &[Blob], context: &RunContext) -> Result<Vec<Arc<TransportTab
 
 /// As [`concatenated`], for shards that are already decoded.
 pub(crate) fn joined(model: &dyn Model, shards: &[&TransportTable]) -> Result<TransportTable, NodeFailure> {
-    TransportTable::concatenate(shards).filter(|table| is_of(model, table)).ok_or_else(|| of_different_tables(model))
-}
-
-/// Whether a table has the lobes of `model`.
-fn is_of(model: &dyn Model, table: &TransportTable) -> bool {
-    let mut lobes = table.lobes.iter().zip(model.lobes());
-    table.lobes.len() == model.lobes().len()
-        && lobes.all(|(t, basis)| t.terms == lobe_terms(basis.lobe) && t.knots.is_some() == basis.width.is_some())
+    TransportTable::concatenate(shards).filter(|table| table.is_of(model)).ok_or_else(|| of_different_tables(model))
 }
 
 fn of_different_tables(model: &dyn Model) -> NodeFailure {

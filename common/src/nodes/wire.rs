@@ -1,7 +1,7 @@
 //! Wire forms of the method's inputs and outputs: plain data, which is checked when it is decoded into the library's types.
 
 use crate::{
-    brdf::{Model, flat_bounds},
+    brdf::{self, Lobe, Model, flat_bounds},
     fit::{Candidate, Judged, Polished, SearchFailure},
     graph::NodeFailure,
     image::Image,
@@ -10,6 +10,7 @@ use crate::{
     protocol::{decode, encode},
     render::{
         knots::Knots,
+        spans::LobeKnots,
         subset::PixelSubset,
         table::{LobeTable, TransportTable},
         transport::Pixel,
@@ -109,15 +110,32 @@ impl KnotsWire {
     }
 }
 
+/// A lobe of a table, by its name, with its grid of widths.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(crate) struct LobeWire(String, Option<KnotsWire>);
+
+impl LobeWire {
+    pub(crate) fn of(LobeKnots { lobe, knots }: &LobeKnots) -> Self {
+        Self(lobe.name().to_owned(), knots.as_ref().map(KnotsWire::of))
+    }
+
+    pub(crate) fn lobe(self) -> Result<LobeKnots, NodeFailure> {
+        let has_widths = |lobe: &&dyn Lobe| lobe.equivalent_alpha(1.0).is_some() == self.1.is_some();
+        let lobe = brdf::lobe(&self.0).filter(has_widths).ok_or_else(|| refused("lobe", &self.0))?;
+        Ok(LobeKnots { lobe, knots: self.1.map(KnotsWire::knots).transpose()? })
+    }
+}
+
 /// A transport table.
 #[derive(Debug, Serialize, Deserialize)]
 pub(crate) struct TableWire {
     pixels: u32,
-    lobes: Vec<LobeWire>,
+    lobes: Vec<LobeTableWire>,
 }
 
 #[derive(Debug, Serialize, Deserialize)]
-struct LobeWire {
+struct LobeTableWire {
+    lobe: String,
     knots: Option<KnotsWire>,
     terms: u32,
     values: Vec<f32>,
@@ -125,7 +143,8 @@ struct LobeWire {
 
 impl TableWire {
     pub(crate) fn of(table: TransportTable) -> Self {
-        let lobes = table.lobes.into_iter().map(|lobe| LobeWire {
+        let lobes = table.lobes.into_iter().map(|lobe| LobeTableWire {
+            lobe: lobe.lobe,
             knots: lobe.knots.as_ref().map(KnotsWire::of),
             terms: index(lobe.terms),
             values: lobe.values,
@@ -135,9 +154,9 @@ impl TableWire {
 
     pub(crate) fn table(self) -> Result<TransportTable, NodeFailure> {
         let pixels = self.pixels as usize;
-        let lobe = |lobe: LobeWire| {
+        let lobe = |lobe: LobeTableWire| {
             let knots = lobe.knots.map(KnotsWire::knots).transpose()?;
-            let table = LobeTable { knots, terms: lobe.terms as usize, values: lobe.values };
+            let table = LobeTable { lobe: lobe.lobe, knots, terms: lobe.terms as usize, values: lobe.values };
             let expected = table.slices().checked_mul(3 * table.terms).and_then(|n| n.checked_mul(pixels));
             if expected != Some(table.values.len()) {
                 let found = table.values.len();
@@ -278,8 +297,13 @@ mod tests {
         let table = TransportTable {
             pixels: 2,
             lobes: vec![
-                LobeTable { knots: None, terms: 1, values: vec![0.5; 6] },
-                LobeTable { knots: Some(knots), terms: 2, values: vec![0.25; knots.count() * 12] },
+                LobeTable { lobe: "lambert".to_owned(), knots: None, terms: 1, values: vec![0.5; 6] },
+                LobeTable {
+                    lobe: "ggx".to_owned(),
+                    knots: Some(knots),
+                    terms: 2,
+                    values: vec![0.25; knots.count() * 12],
+                },
             ],
         };
         let bytes = write("table", &TableWire::of(table.clone())).unwrap();

@@ -1,6 +1,8 @@
 //! The nodes of a fit, a photo and a survey, and the further nodes that their outputs lead to (design section 7).
 
 mod appraisal;
+mod coarse;
+mod contender;
 mod direct;
 mod encode;
 mod fit;

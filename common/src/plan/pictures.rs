@@ -1,9 +1,10 @@
 //! The pictures at the end of a fit: the nodes that make them, and the checks of their outputs.
 
-use super::verify::wrong;
+use super::verify::{check_score, wrong};
 use crate::{
     graph::{Blob, NodeId, PlanError},
     image::Image,
+    metric::Blocks,
     nodes::{
         ReportWire,
         wire::{ImageWire, read},
@@ -19,8 +20,16 @@ pub(super) struct Pictures {
     come: BTreeMap<NodeId, Made>,
 }
 
-/// All pictures in order, and the error of the last one per window.
-pub(super) type Made = (Vec<Image>, Vec<f64>);
+/// All pictures in order, and the errors of the last one.
+#[derive(Debug)]
+pub(super) struct Made {
+    pub(super) images: Vec<Image>,
+    /// Per window.
+    pub(super) error: Vec<f64>,
+    pub(super) blocks: Blocks,
+    /// What noise like that of the photo costs, over the image and over the object; `None` if the noise is unknown.
+    pub(super) noise_floor: Option<(f64, f64)>,
+}
 
 impl Pictures {
     /// Registers a node that makes `count` pictures.
@@ -46,13 +55,15 @@ impl Pictures {
         if self.come.len() < self.asked.len() {
             return Ok(None);
         }
-        let (mut images, mut error) = (Vec::new(), Vec::new());
+        let mut all: Option<Made> = None;
         for (node, _) in &self.asked {
-            let Some(made) = self.come.remove(node) else { continue };
-            images.extend(made.0);
-            error = made.1;
+            let Some(mut made) = self.come.remove(node) else { continue };
+            if let Some(before) = all {
+                made.images.splice(0..0, before.images);
+            }
+            all = Some(made);
         }
-        Ok(Some((images, error)))
+        Ok(all)
     }
 }
 
@@ -76,9 +87,16 @@ fn checked(output: &Blob, expected: usize, (width, height): (usize, usize)) -> R
     if report.error.len() != windows {
         return Err(wrong(format!("the error of {windows} windows"), &report.error.len()));
     }
-    match report.error.iter().find(|error| !error.is_finite()) {
-        Some(error) => Err(wrong("a finite error", error)),
-        None => Ok((images, report.error)),
+    if let Some(error) = report.error.iter().find(|error| !error.is_finite()) {
+        return Err(wrong("a finite error", error));
+    }
+    if let Some((image, object)) = report.noise_floor {
+        check_score(image).and_then(|()| check_score(object))?;
+    }
+    let (found, noise_floor) = (report.blocks.len(), report.noise_floor);
+    match Blocks::from_parts(report.blocks) {
+        Some(blocks) => Ok(Made { images, error: report.error, blocks, noise_floor }),
+        None => Err(wrong("the windows in blocks", &found)),
     }
 }
 

@@ -4,7 +4,7 @@ use super::{
     encode::{add, encode, encode_light, index},
     limits::{FitError, check_sizes},
     pixels::{Grid, covered_pixels, intensities},
-    tables::{FULL_PER_OCTAVE, FULL_SHARD, Span, stage_one_knots},
+    tables::{FULL_PER_OCTAVE, FULL_SHARD},
     verify::{self, Shard},
 };
 use crate::{
@@ -13,10 +13,10 @@ use crate::{
     light::LightDistribution,
     nodes::{
         self, TransportParameters, ViewWire,
-        wire::{ImageWire, KnotsWire},
+        wire::{ImageWire, LobeWire},
     },
     render::{
-        knots::Knots,
+        spans::{LobeKnots, Spans},
         transport::{Accuracy, Pixel},
     },
     scene::Capture,
@@ -28,6 +28,7 @@ use std::{collections::BTreeMap, sync::Arc};
 #[derive(Debug)]
 pub(super) struct SceneTables {
     pub(super) capture: Arc<Capture>,
+    /// The settings that all models of a fit have in common.
     pub(super) method: Method,
     /// Exposure of the display transform before CSSIM.
     exposure: f64,
@@ -45,10 +46,8 @@ pub(super) struct SceneTables {
     view: Option<BlobHash>,
     /// Shards of tables whose output has not arrived.
     shards: BTreeMap<NodeId, Shard>,
-    /// Widths that the table of the next judging node spans; `None` for a model without widths.
-    pub(super) span: Span,
-    /// Full-resolution tables by their span: each is integrated once.
-    tables: Vec<(Span, Vec<Input>)>,
+    /// Full-resolution tables by what they span: each is integrated once.
+    tables: Vec<(Spans, Vec<Input>)>,
 }
 
 impl SceneTables {
@@ -77,7 +76,6 @@ impl SceneTables {
             distribution: None,
             view: None,
             shards: BTreeMap::new(),
-            span: None,
             tables: Vec::new(),
         })
     }
@@ -105,7 +103,7 @@ impl SceneTables {
         graph: &mut GraphEdit<'_>,
         (kind, what): (&str, &str),
         pixels: (BlobHash, usize, usize),
-        knots: Knots,
+        lobes: Vec<LobeKnots>,
         accuracy: Accuracy,
     ) -> Result<Vec<Input>, PlanError> {
         let (list, count, shard) = pixels;
@@ -116,9 +114,8 @@ impl SceneTables {
         for first in (0..count).step_by(shard) {
             let range = (index(first), index(shard.min(count - first)));
             let parameters = TransportParameters {
-                model: self.method.model.name().to_owned(),
                 geometry,
-                knots: KnotsWire::of(&knots),
+                lobes: lobes.iter().map(LobeWire::of).collect(),
                 tolerance: accuracy.tolerance,
                 footprint: accuracy.footprint,
                 range,
@@ -132,49 +129,51 @@ impl SceneTables {
                 priority: 0,
             };
             let node = graph.add_node(spec)?;
-            self.shards.insert(node, Shard { pixels: range.1 as usize, knots });
+            self.shards.insert(node, Shard { pixels: range.1 as usize, lobes: lobes.clone() });
             shards.push(Input::OutputOf(node));
         }
         Ok(shards)
     }
 
-    /// The shards of the full-resolution table over a span.
-    pub(super) fn full_table(&mut self, graph: &mut GraphEdit<'_>, span: Span) -> Result<Vec<Input>, PlanError> {
-        if let Some((_, shards)) = self.tables.iter().find(|(known, _)| *known == span) {
+    /// The shards of the full-resolution table over these widths.
+    pub(super) fn full_table(&mut self, graph: &mut GraphEdit<'_>, spans: &Spans) -> Result<Vec<Input>, PlanError> {
+        if let Some((_, shards)) = self.tables.iter().find(|(known, _)| known == spans) {
             return Ok(shards.clone());
         }
         let list = add(graph, "list of pixels", &self.pixels)?;
-        let knots = match span {
-            Some((lower, upper)) => Knots::covering(lower, upper, FULL_PER_OCTAVE),
-            None => stage_one_knots(&self.method, true),
-        };
         let pixels = (list, self.pixels.len(), FULL_SHARD);
         let what = if self.tables.is_empty() { "in full" } else { "in full again" };
-        let shards = self.add_transport(graph, (nodes::TRANSPORT_FULL, what), pixels, knots, Accuracy::FULL)?;
-        self.tables.push((span, shards.clone()));
+        let shards = self.add_transport(
+            graph,
+            (nodes::TRANSPORT_FULL, what),
+            pixels,
+            spans.knots(FULL_PER_OCTAVE),
+            Accuracy::FULL,
+        )?;
+        self.tables.push((spans.clone(), shards.clone()));
         Ok(shards)
     }
 
-    /// Adds a node of `kind` that reads the full-resolution table over a span.
+    /// Adds a node of `kind` that reads the full-resolution table over these widths.
     pub(super) fn add_judging<T: Serialize>(
         &mut self,
         graph: &mut GraphEdit<'_>,
-        kind: &str,
-        span: Span,
+        (kind, label): (&str, &str),
+        spans: &Spans,
         parameters: &T,
     ) -> Result<NodeId, PlanError> {
-        let inputs = self.inputs_on_full_table(graph, span)?;
-        self.add_on_view(graph, (kind, kind), inputs, parameters)
+        let inputs = self.inputs_on_full_table(graph, spans)?;
+        self.add_on_view(graph, (kind, label), inputs, parameters)
     }
 
-    /// The view and the full-resolution table over a span.
+    /// The view and the full-resolution table over these widths.
     pub(super) fn inputs_on_full_table(
         &mut self,
         graph: &mut GraphEdit<'_>,
-        span: Span,
+        spans: &Spans,
     ) -> Result<Vec<Input>, PlanError> {
         let mut inputs = vec![self.full_view(graph)?];
-        inputs.extend(self.full_table(graph, span)?);
+        inputs.extend(self.full_table(graph, spans)?);
         Ok(inputs)
     }
 
@@ -210,7 +209,6 @@ impl SceneTables {
     pub(super) fn view_wire(&self, grid: Grid, pixels: Vec<Pixel>) -> ViewWire {
         let photo = self.capture.photo();
         ViewWire {
-            model: self.method.model.name().to_owned(),
             photo: ImageWire::of(&grid.image(photo)),
             coverage: grid.values(&self.capture.scoring_coverage(), photo.width()),
             exposure: self.exposure,
@@ -223,7 +221,7 @@ impl SceneTables {
     /// Checks the output of a node if it is a shard of a table; returns whether it is.
     pub(super) fn check_if_shard(&mut self, node: NodeId, output: &Blob) -> Result<bool, PlanError> {
         let Some(shard) = self.shards.remove(&node) else { return Ok(false) };
-        verify::check_shard(self.method.model, shard, output)?;
+        verify::check_shard(&shard, output)?;
         Ok(true)
     }
 
@@ -232,15 +230,14 @@ impl SceneTables {
         self.shards.is_empty()
     }
 
-    /// The span of the first full-resolution table, on which the candidates were judged.
-    pub(super) fn judged_span(&self) -> Span {
-        self.tables.first().map_or(self.span, |(span, _)| *span)
-    }
-
-    /// Releases the full-resolution tables, except the first `kept`.
-    pub(super) fn release_tables_after(&mut self, kept: usize, graph: &mut GraphEdit<'_>) {
-        let tables = self.tables.split_off(kept);
-        let shards = tables.iter().flat_map(|(_, shards)| shards);
-        shards.filter_map(Input::node).for_each(|shard| graph.release(shard));
+    /// Releases the full-resolution tables that are not among these.
+    pub(super) fn release_tables_but(&mut self, kept: &[&Spans], graph: &mut GraphEdit<'_>) {
+        self.tables.retain(|(spans, shards)| {
+            let is_kept = kept.contains(&spans);
+            if !is_kept {
+                shards.iter().filter_map(Input::node).for_each(|shard| graph.release(shard));
+            }
+            is_kept
+        });
     }
 }

@@ -7,10 +7,16 @@ use crate::graph::NodeId;
 pub(super) enum Step {
     /// Stage one: some search is open.
     Searching,
+    /// The candidates are judged on the coarse picture, to start from the best there.
+    Scouting(NodeId),
     /// Stage two judges the candidates.
     Selecting(NodeId),
     /// Stage three searches on the coarse picture.
     Exploring(NodeId),
+    /// The model waits for the lobe that another one finds on the coarse picture.
+    Following,
+    /// The model waits for the others on the coarse picture.
+    Waiting,
     /// Stage three searches at full resolution.
     Polishing(NodeId),
     /// The pictures are being made.

@@ -11,7 +11,6 @@ use super::{
     limits::{self, FitError},
     pictures::Pictures,
     scene_tables::SceneTables,
-    tables::whole_span,
     verify,
     work::Work,
 };
@@ -21,6 +20,7 @@ use crate::{
     graph::{Blob, GraphEdit, Input, NodeId, Placement, PlanError, Planner},
     image::Image,
     nodes::{self, AppraiseParameters, BruteForceParameters, DirectWire, ReportParameters},
+    render::spans::Spans,
     scene::Capture,
 };
 use std::{collections::BTreeMap, sync::Arc};
@@ -57,6 +57,8 @@ pub struct SurveyOutcome {
 #[derive(Debug)]
 pub struct SurveyPlanner {
     scene: SceneTables,
+    /// What its table spans.
+    spans: Spans,
     request: SurveyRequest,
     searches: BTreeMap<NodeId, usize>,
     minima: BTreeMap<usize, Polished>,
@@ -75,10 +77,12 @@ impl SurveyPlanner {
     pub fn new(capture: Arc<Capture>, method: Method, exposure: f64, request: SurveyRequest) -> Result<Self, FitError> {
         let method = Method { integration: Integration::Tables, ..method };
         limits::check_points(method.model, request.starts.iter().chain(&request.points))?;
+        let spans = Spans::whole(method.model);
         let mut scene = SceneTables::new(capture, method, exposure)?;
         scene.stage_two = Placement::Worker;
         Ok(Self {
             scene,
+            spans,
             request,
             searches: BTreeMap::new(),
             minima: BTreeMap::new(),
@@ -108,18 +112,22 @@ impl SurveyPlanner {
         self.searches.get(&node).map_or_else(|| Work::of_survey(kind), |start| Work::Search(*start))
     }
 
+    fn model(&self) -> String {
+        self.scene.method.model.name().to_owned()
+    }
+
     fn add_brute_force(&mut self, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
         for (s, start) in self.request.starts.clone().into_iter().enumerate() {
             let max_evaluations = self.request.max_evaluations.unwrap_or(0);
             let (direct, inputs) = match self.request.direct {
-                None => (None, self.scene.inputs_on_full_table(graph, self.scene.span)?),
+                None => (None, self.scene.inputs_on_full_table(graph, &self.spans)?),
                 Some(samples) => {
                     let (direct, inputs) = self.direct_scene(samples, graph)?;
                     (Some(direct), inputs)
                 }
             };
             let label = format!("{} from start {s}", nodes::BRUTE_FORCE);
-            let parameters = BruteForceParameters { start, max_evaluations, direct };
+            let parameters = BruteForceParameters { model: self.model(), start, max_evaluations, direct };
             let node = self.scene.add_on_view(graph, (nodes::BRUTE_FORCE, &label), inputs, &parameters)?;
             self.searches.insert(node, s);
         }
@@ -147,7 +155,8 @@ impl SurveyPlanner {
             return self.end(Vec::new());
         }
         let count = parameters.len();
-        let node = self.scene.add_judging(graph, nodes::REPORT, self.scene.span, &ReportParameters { parameters })?;
+        let parameters = ReportParameters { model: self.model(), parameters, noise: None };
+        let node = self.scene.add_judging(graph, (nodes::REPORT, nodes::REPORT), &self.spans, &parameters)?;
         self.pictures.ask(node, count);
         Ok(())
     }
@@ -162,16 +171,17 @@ impl SurveyPlanner {
 impl Planner for SurveyPlanner {
     fn start(&mut self, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
         self.scene.keep_light(graph)?;
-        self.scene.span = whole_span(self.scene.method.model);
         if self.request.direct.is_none() {
-            self.scene.full_table(graph, self.scene.span)?;
+            self.scene.full_table(graph, &self.spans)?;
         }
         self.add_brute_force(graph)?;
         if !self.request.points.is_empty() {
             let SurveyRequest { points, gammas, .. } = &self.request;
             let (points, gammas) = (points.clone(), gammas.clone());
-            let parameters = AppraiseParameters { points, gammas, mean_radiance: self.scene.mean_radiance };
-            self.appraise = Some(self.scene.add_judging(graph, nodes::APPRAISE, self.scene.span, &parameters)?);
+            let parameters =
+                AppraiseParameters { model: self.model(), points, gammas, mean_radiance: self.scene.mean_radiance };
+            let kind = (nodes::APPRAISE, nodes::APPRAISE);
+            self.appraise = Some(self.scene.add_judging(graph, kind, &self.spans, &parameters)?);
         }
         Ok(())
     }
@@ -196,7 +206,7 @@ impl Planner for SurveyPlanner {
         if self.pictures.is_of(node) {
             let photo = self.scene.capture.photo();
             let made = self.pictures.made(node, output, (photo.width(), photo.height()))?;
-            return made.map_or(Ok(()), |(images, _)| self.end(images));
+            return made.map_or(Ok(()), |made| self.end(made.images));
         }
         Ok(())
     }

@@ -1,14 +1,10 @@
 //! Transport tables of a fit: the size of their shards, and the widths that they span.
 
 use crate::{
-    brdf::{Model, lobe_terms, term_count},
+    brdf::{Model, lit_lobes, main_lobe},
     fit::{Integration, Method, Start, explore::span_of_lobes},
-    math::Rgb,
-    render::knots::{Knots, PER_OCTAVE},
+    render::spans::Spans,
 };
-
-/// Smallest and largest width of a table.
-pub(super) type Span = Option<(f64, f64)>;
 
 /// Pixels per shard of a subset's table: small enough to spread over several workers.
 pub(super) const SUBSET_SHARD: usize = 32;
@@ -35,11 +31,14 @@ const SHARP: f64 = 0.02;
 /// A candidate whose lobe is narrower than this asks for a table over the whole range.
 const NEAR_SHARP: f64 = 1.5 * SHARP;
 
-/// The grid of widths of stage one: the model's whole range, or the part of it without sharp lobes.
-pub(super) fn stage_one_knots(method: &Method, whole: bool) -> Knots {
-    let blurred = span_of_lobes(method.model, SHARP).filter(|_| !whole);
-    let (low, high) = blurred.or(whole_span(method.model)).unwrap_or((0.5, 1.0));
-    Knots::covering(low, high, PER_OCTAVE)
+/// The widths of stage one: the model's whole range, or the part of it without sharp lobes.
+pub(super) fn stage_one_spans(model: &dyn Model, whole: bool) -> Spans {
+    Spans::of_model(model, span_of_lobes(model, SHARP).filter(|_| !whole))
+}
+
+/// What the tables of several models span together.
+pub(super) fn joined(spans: impl Iterator<Item = Spans>) -> Spans {
+    spans.reduce(|joined, spans| joined.joined(&spans)).unwrap_or_default()
 }
 
 /// Whether stage one may begin without sharp lobes: the scan looks for the width over the whole table, and `--fix` and `--bounds` allow
@@ -49,35 +48,24 @@ pub(super) fn may_begin_blurred(method: &Method) -> bool {
     let useful = span_of_lobes(method.model, NEAR_SHARP).zip(widest(method));
     method.start == Start::Scan
         && method.integration == Integration::Tables
-        && span_of_lobes(method.model, SHARP) != whole_span(method.model)
+        && stage_one_spans(method.model, false) != Spans::whole(method.model)
         && useful.is_none_or(|((low, _), widest)| low < widest)
 }
 
 /// The largest width that the ranges of the parameters allow.
 fn widest(method: &Method) -> Option<f64> {
-    let width = method.model.lobes().iter().find_map(|basis| basis.width)?;
     let (lower, upper) = method.ranges.bounds(method.model);
-    // A width may grow or fall with its parameter.
-    Some(width.at(&lower).max(width.at(&upper)))
+    main_lobe(method.model).map(|(_, width)| width.span_of(&lower, &upper).1)
 }
 
 /// Whether a table without sharp lobes may be too narrow for a candidate.
 pub(super) fn is_nearly_sharp(model: &dyn Model, parameters: &[f64]) -> bool {
-    let Some(place) = model.lobes().iter().position(|basis| basis.width.is_some()) else { return false };
-    let (before, main) = (&model.lobes()[..place], &model.lobes()[place]);
-    let mut weights = vec![Rgb::ZERO; term_count(model)];
-    model.weights(parameters, &mut weights);
-    let first: usize = before.iter().map(|basis| lobe_terms(basis.lobe)).sum();
-    // The width of a dark lobe means nothing.
-    let is_lit = weights[first..first + lobe_terms(main.lobe)].iter().any(|weight| *weight != Rgb::ZERO);
-    let alpha = main.width_at(parameters).and_then(|width| main.lobe.equivalent_alpha(width));
-    is_lit && alpha.is_some_and(|alpha| alpha < NEAR_SHARP)
-}
-
-/// The model's whole range of widths; `None` for a model without widths.
-pub(super) fn whole_span(model: &dyn Model) -> Span {
-    let width = model.lobes().iter().find_map(|b| b.width)?;
-    Some(width.span(model.parameters()))
+    let Some((main, _)) = main_lobe(model) else { return false };
+    let lobes = model.lobes().iter().zip(lit_lobes(model, parameters));
+    lobes.filter(|(basis, is_lit)| *is_lit && basis.lobe.name() == main.lobe.name()).any(|(basis, _)| {
+        let alpha = basis.width_at(parameters).and_then(|width| basis.lobe.equivalent_alpha(width));
+        alpha.is_some_and(|alpha| alpha < NEAR_SHARP)
+    })
 }
 
 #[cfg(test)]
@@ -90,16 +78,17 @@ mod tests {
         for model in MODELS {
             let method = Method { model: *model, ..Method::default() };
             assert!(may_begin_blurred(&method), "{}", model.name());
-            let [whole, blurred] = [true, false].map(|whole| stage_one_knots(&method, whole));
-            assert!(blurred.count() < whole.count(), "{}", model.name());
-            let width = model.lobes().iter().find_map(|basis| basis.width).unwrap();
-            let (_, upper) = flat_bounds(model.parameters());
+            let [whole, blurred] = [true, false].map(|whole| stage_one_spans(*model, whole).main(*model).unwrap());
+            assert!(blurred.0 > whole.0 && blurred.1 <= whole.1, "{}", model.name());
+            let (_, width) = main_lobe(*model).unwrap();
+            let (lower, upper) = flat_bounds(model.parameters());
+            let middle: Vec<f64> = lower.iter().zip(&upper).map(|(l, u)| 0.5 * (l + u)).collect();
             let with_width = |x: f64| {
-                let mut parameters = upper.clone();
+                let mut parameters = middle.clone();
                 parameters[width.entry] = (width.inverse)(x);
                 parameters
             };
-            let (low, high) = blurred.span();
+            let (low, high) = blurred;
             assert!(is_nearly_sharp(*model, &with_width(low)), "{}", model.name());
             assert!(!is_nearly_sharp(*model, &with_width(0.9 * high)), "{}", model.name());
         }

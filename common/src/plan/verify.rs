@@ -6,80 +6,86 @@
 
 use super::encode::other;
 use crate::{
-    brdf::Model,
+    brdf::{Model, lobe_terms},
     fit::{Candidate, Method, Objective, Polished},
-    graph::{Blob, GraphEdit, Input, NodeId, PlanError},
+    graph::{Blob, GraphEdit, Input, NodeFailure, NodeId, PlanError},
+    metric::Blocks,
     nodes::{
-        joined,
+        ExploredWire, joined,
         wire::{PolishedWire, ScoresWire, TableWire, read},
     },
-    render::{
-        knots::{self, Knots},
-        table::TransportTable,
-    },
+    render::{spans::LobeKnots, table::TransportTable},
 };
 use std::{
     collections::{BTreeMap, btree_map::Entry},
     fmt::Display,
 };
 
-/// The decoded tables of pixel subsets, by the number of the subset.
+/// Which table of a pixel subset: the number of the subset, and whether it has the sharp lobes.
+pub(super) type SubsetTable = (usize, bool);
+
+/// The decoded tables of pixel subsets.
 #[derive(Debug, Default)]
-pub(super) struct SubsetTables(BTreeMap<usize, TransportTable>);
+pub(super) struct SubsetTables(BTreeMap<SubsetTable, TransportTable>);
 
 impl SubsetTables {
-    /// The table of subset `s`. Its shards are those inputs of the node `search` that are outputs of other nodes.
+    /// A table from its shards.
     pub(super) fn get(
         &mut self,
-        s: usize,
+        which: SubsetTable,
+        shards: &[Input],
         model: &dyn Model,
-        search: NodeId,
         graph: &GraphEdit<'_>,
     ) -> Result<&TransportTable, PlanError> {
-        Ok(match self.0.entry(s) {
+        Ok(match self.0.entry(which) {
             Entry::Occupied(known) => known.into_mut(),
-            Entry::Vacant(unknown) => unknown.insert(table_of(model, search, graph)?),
+            Entry::Vacant(unknown) => unknown.insert(table_of(model, shards, graph)?),
         })
     }
 
-    /// Drops the table of subset `s`.
-    pub(super) fn forget(&mut self, s: usize) {
-        self.0.remove(&s);
+    /// Drops a table.
+    pub(super) fn forget(&mut self, which: SubsetTable) {
+        self.0.remove(&which);
     }
 }
 
-fn table_of(model: &dyn Model, search: NodeId, graph: &GraphEdit<'_>) -> Result<TransportTable, PlanError> {
-    let inputs = &graph.spec(search).ok_or_else(missing)?.inputs;
+fn table_of(model: &dyn Model, shards: &[Input], graph: &GraphEdit<'_>) -> Result<TransportTable, PlanError> {
     let shard = |shard: NodeId| {
         let blob = graph.output(shard);
         read::<TableWire>("transport table", blob.ok_or_else(missing)?).and_then(TableWire::table).map_err(other)
     };
-    let shards = inputs.iter().filter_map(Input::node).map(shard).collect::<Result<Vec<_>, _>>()?;
+    let shards = shards.iter().filter_map(Input::node).map(shard).collect::<Result<Vec<_>, _>>()?;
     joined(model, &shards.iter().collect::<Vec<_>>()).map_err(other)
 }
 
 /// A shard of a transport table, as it was requested.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub(super) struct Shard {
     /// Number of pixels.
     pub(super) pixels: usize,
-    /// The grid of widths of the main lobe.
-    pub(super) knots: Knots,
+    /// The lobes with their widths.
+    pub(super) lobes: Vec<LobeKnots>,
 }
 
 /// Refuses a shard of a transport table that is not the one that was requested.
-pub(super) fn check_shard(model: &dyn Model, asked: Shard, output: &Blob) -> Result<(), PlanError> {
-    let of_model = || format!("a transport table of {}", model.name());
+pub(super) fn check_shard(asked: &Shard, output: &Blob) -> Result<(), PlanError> {
     let table = read::<TableWire>("transport table", output)
         .and_then(TableWire::table)
-        .and_then(|table| joined(model, &[&table]))
-        .map_err(|failure| wrong(of_model(), &failure))?;
+        .map_err(|failure| wrong("a transport table", &failure))?;
     if table.pixels != asked.pixels {
         return Err(wrong(format!("{} pixels", asked.pixels), &table.pixels));
     }
-    for (lobe, expected) in table.lobes.iter().zip(knots::of_lobes(model, asked.knots)) {
-        if lobe.knots != expected {
-            return Err(wrong(format!("widths on {expected:?}"), &format!("{:?}", lobe.knots)));
+    let names = |lobes: &mut dyn Iterator<Item = (&str, usize)>| {
+        lobes.map(|(name, terms)| format!("{name} ({terms})")).collect::<Vec<_>>().join(", ")
+    };
+    let expected = names(&mut asked.lobes.iter().map(|asked| (asked.lobe.name(), lobe_terms(asked.lobe))));
+    let found = names(&mut table.lobes.iter().map(|lobe| (&*lobe.lobe, lobe.terms)));
+    if expected != found {
+        return Err(wrong(format!("a transport table of the lobes (and terms) {expected}"), &found));
+    }
+    for (lobe, asked) in table.lobes.iter().zip(&asked.lobes) {
+        if lobe.knots != asked.knots {
+            return Err(wrong(format!("widths on {:?}", asked.knots), &format!("{:?}", lobe.knots)));
         }
     }
     match table.lobes.iter().flat_map(|lobe| &lobe.values).find(|value| !value.is_finite()) {
@@ -100,7 +106,11 @@ pub(super) fn scores(output: &Blob, count: usize) -> Result<Vec<(f64, f64)>, Pla
 
 /// The outcome of a search on the score with at most `most` evaluations.
 pub(super) fn polished(model: &dyn Model, output: &Blob, most: usize) -> Result<Polished, PlanError> {
-    let polished = read::<PolishedWire>("polish", output).and_then(|wire| wire.polished(model));
+    checked(model, read("polish", output), most)
+}
+
+fn checked(model: &dyn Model, wire: Result<PolishedWire, NodeFailure>, most: usize) -> Result<Polished, PlanError> {
+    let polished = wire.and_then(|wire| wire.polished(model));
     let polished = polished.map_err(|failure| wrong("parameters with their scores", &failure))?;
     check_score(polished.cssim)?;
     check_score(polished.cssim_object)?;
@@ -108,6 +118,28 @@ pub(super) fn polished(model: &dyn Model, output: &Blob, most: usize) -> Result<
         return Err(wrong(format!("at most {most} evaluations"), &polished.evaluations));
     }
     Ok(polished)
+}
+
+/// The outcome of an exploration with at most `most` evaluations, and the windows of its picture.
+pub(super) fn explored(method: &Method, output: &Blob, most: usize) -> Result<(Polished, Blocks), PlanError> {
+    let ExploredWire { found, blocks } = read("explore", output).map_err(|failure| wrong("a lobe", &failure))?;
+    let count = blocks.len();
+    let blocks = Blocks::from_parts(blocks).ok_or_else(|| wrong("the windows in blocks", &count))?;
+    let found = checked(method.model, Ok(found), most)?;
+    check_blocks(&blocks, method.judge.pick(found.cssim, found.cssim_object))?;
+    Ok((found, blocks))
+}
+
+/// Refuses windows that do not have the score of their picture.
+pub(super) fn check_blocks(blocks: &Blocks, score: f64) -> Result<(), PlanError> {
+    // The sums are taken in another order.
+    const EQUAL: f64 = 1e-6;
+    let of_blocks = blocks.cssim();
+    if (of_blocks - score).abs() <= EQUAL {
+        Ok(())
+    } else {
+        Err(wrong(format!("windows of score {score}"), &of_blocks))
+    }
 }
 
 /// Refuses parameters outside the ranges of the fit.

@@ -26,7 +26,7 @@ impl Work {
             nodes::TRANSPORT => Self::Table,
             nodes::TRANSPORT_FULL if is_judged => Self::StageThree,
             nodes::TRANSPORT_FULL | nodes::SELECT => Self::StageTwo,
-            nodes::TRANSPORT_COARSE | nodes::EXPLORE | nodes::POLISH => Self::StageThree,
+            nodes::TRANSPORT_COARSE | nodes::SCOUT | nodes::EXPLORE | nodes::POLISH => Self::StageThree,
             nodes::REPORT => Self::Pictures,
             _ => Self::Other,
         }

@@ -2,12 +2,9 @@
 //!
 //! Knots are equally spaced in the logarithm of the width; between them, see [`hermite`].
 
-use crate::{
-    brdf::{Model, Width},
-    math::{
-        elementary::{exp, ln},
-        hermite::{self, STENCIL, Stencil},
-    },
+use crate::math::{
+    elementary::{exp, ln},
+    hermite::{self, STENCIL, Stencil},
 };
 
 /// Knots per factor of two of width in tables of stage one.
@@ -90,25 +87,6 @@ impl Knots {
     }
 }
 
-/// The grid of every lobe of a model; `None` for a lobe of fixed shape.
-///
-/// The main lobe, the first one that has a width, has the grid `main`, which may cover only the needed widths. Every other lobe has a
-/// grid over its whole range of widths; the range of a coat is small.
-#[must_use]
-pub fn of_lobes(model: &dyn Model, main: Knots) -> Vec<Option<Knots>> {
-    let mut main = Some(main);
-    let whole = |width: Width| {
-        let (lower, upper) = width.span(model.parameters());
-        Knots::covering(lower, upper, OTHERS_PER_OCTAVE)
-    };
-    let widths = model.lobes().iter().map(|basis| basis.width);
-    widths.map(|width| width.map(|width| main.take().unwrap_or_else(|| whole(width)))).collect()
-}
-
-/// Knots per factor of two for all lobes but the main one: the largest relative error of a coat's distribution is 7e-4 (tested below),
-/// and the coat's weight is at most a quarter.
-const OTHERS_PER_OCTAVE: f64 = 3.0;
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -152,6 +130,7 @@ mod tests {
 
     #[test]
     fn a_coat_is_interpolated_on_few_knots() {
+        use crate::render::spans::OTHERS_PER_OCTAVE;
         let knots = Knots::covering(0.005, 0.1, OTHERS_PER_OCTAVE);
         // Its values where the half vector is the normal, and at growing angles from it.
         for t2 in [0.0, 1e-6, 1e-4, 2.5e-3, 0.1] {

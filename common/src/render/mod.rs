@@ -16,6 +16,7 @@ pub mod knots;
 mod moments;
 pub mod point;
 pub mod pyramid;
+pub mod spans;
 pub mod subset;
 pub mod table;
 pub mod transport;

@@ -5,13 +5,15 @@
 
 use super::knots::Knots;
 use crate::{
-    brdf::{Model, lobe_terms, term_count},
+    brdf::{BasisLobe, Lobe, Model, lobe_terms, main_lobe, term_count},
     math::{Rgb, simd, to_f32},
 };
 
 /// Basis integrals of one lobe.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LobeTable {
+    /// Name of the lobe.
+    pub lobe: String,
     /// Grid of widths; `None` for a lobe of fixed shape.
     pub knots: Option<Knots>,
     /// Number of terms into which the lobe splits.
@@ -28,12 +30,12 @@ impl LobeTable {
     }
 }
 
-/// Basis integrals of every lobe of a model for a list of pixels.
+/// Basis integrals of some lobes, each with another name, for a list of pixels.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TransportTable {
     /// Number of pixels.
     pub pixels: usize,
-    /// One table per lobe of the model, in its order.
+    /// One table per lobe.
     pub lobes: Vec<LobeTable>,
 }
 
@@ -59,7 +61,7 @@ impl TransportTable {
                     values.extend_from_slice(&shard.lobes[l].values[plane * shard.pixels..][..shard.pixels]);
                 }
             }
-            LobeTable { knots: lobe.knots, terms: lobe.terms, values }
+            LobeTable { lobe: lobe.lobe.clone(), knots: lobe.knots, terms: lobe.terms, values }
         });
         Some(Self { pixels, lobes: lobes.collect() })
     }
@@ -67,7 +69,7 @@ impl TransportTable {
     /// Whether both have the same lobes with the same widths, as the shards of one table do.
     #[must_use]
     pub fn has_the_grids_of(&self, other: &Self) -> bool {
-        let same = |(a, b): (&LobeTable, &LobeTable)| a.knots == b.knots && a.terms == b.terms;
+        let same = |(a, b): (&LobeTable, &LobeTable)| a.lobe == b.lobe && a.knots == b.knots && a.terms == b.terms;
         self.lobes.len() == other.lobes.len() && self.lobes.iter().zip(&other.lobes).all(same)
     }
 
@@ -77,18 +79,39 @@ impl TransportTable {
         std::array::from_fn(|_| vec![0.0; self.pixels])
     }
 
-    /// Smallest and largest width of the model's main lobe, the first that has one.
+    /// The integrals of a lobe.
     #[must_use]
-    pub fn span(&self) -> Option<(f64, f64)> {
-        self.lobes.iter().find_map(|l| l.knots.map(|k| k.span()))
+    pub fn lobe(&self, lobe: &dyn Lobe) -> Option<&LobeTable> {
+        self.lobes.iter().find(|table| table.lobe == lobe.name())
     }
 
-    /// Radiance of every pixel at a flat parameter vector of `model`, the model the table was made for.
+    /// Whether it has the integrals of all lobes of a model.
+    #[must_use]
+    pub fn is_of(&self, model: &dyn Model) -> bool {
+        model.lobes().iter().all(|basis| {
+            let fits = |t: &LobeTable| t.terms == lobe_terms(basis.lobe) && t.knots.is_some() == basis.width.is_some();
+            self.lobe(basis.lobe).is_some_and(fits)
+        })
+    }
+
+    /// The basis lobes of a model with their integrals, those of a model that [it is of](Self::is_of).
+    fn of_model<'a>(&'a self, model: &'a dyn Model) -> impl Iterator<Item = (&'a BasisLobe, &'a LobeTable)> {
+        model.lobes().iter().filter_map(|basis| Some((basis, self.lobe(basis.lobe)?)))
+    }
+
+    /// Smallest and largest width of the main lobe of a model.
+    #[must_use]
+    pub fn span(&self, model: &dyn Model) -> Option<(f64, f64)> {
+        let (basis, _) = main_lobe(model)?;
+        self.lobe(basis.lobe)?.knots.map(|knots| knots.span())
+    }
+
+    /// Radiance of every pixel at a flat parameter vector of a model that the table [is of](Self::is_of).
     pub fn radiance(&self, model: &dyn Model, parameters: &[f64], out: &mut Planes) {
         let mut weights = vec![Rgb::ZERO; term_count(model)];
         model.weights(parameters, &mut weights);
         let (mut layers, mut first_term) = (Vec::new(), 0);
-        for (basis, table) in model.lobes().iter().zip(&self.lobes) {
+        for (basis, table) in self.of_model(model) {
             let (first, coefficients) = slice_weights(table, basis.width_at(parameters));
             for (k, &coefficient) in coefficients.iter().enumerate() {
                 for t in 0..table.terms {
@@ -114,7 +137,7 @@ impl TransportTable {
     pub fn terms_single(&self, model: &dyn Model, parameters: &[f64]) -> Vec<f32> {
         let mut out = vec![0.0; term_count(model) * 3 * self.pixels];
         let mut planes = out.chunks_exact_mut((3 * self.pixels).max(1));
-        for (basis, table) in model.lobes().iter().zip(&self.lobes) {
+        for (basis, table) in self.of_model(model) {
             let (first, coefficients) = slice_weights(table, basis.width_at(parameters));
             for (t, plane) in planes.by_ref().take(table.terms).enumerate() {
                 let slice =
@@ -144,7 +167,7 @@ impl TransportTable {
     /// the logarithm of the width (zero for lobes of fixed shape).
     pub fn terms(&self, model: &dyn Model, parameters: &[f64], slope: bool, out: &mut [Planes]) {
         let mut first_term = 0;
-        for (basis, table) in model.lobes().iter().zip(&self.lobes) {
+        for (basis, table) in self.of_model(model) {
             let width = basis.width_at(parameters);
             let (first, coefficients) = if slope { slice_slopes(table, width) } else { slice_weights(table, width) };
             for t in 0..table.terms {

@@ -14,25 +14,24 @@ use self::{
 use super::{
     cut::Band,
     footprint::Part,
-    knots::{self, Knots},
+    knots::Knots,
     pyramid::LightPyramid,
+    spans::{LobeKnots, Spans},
     table::{LobeTable, TransportTable},
 };
 use crate::{
-    brdf::{Lobe, Model, lobe_terms},
+    brdf::{Lobe, Model, lobe_terms, main_lobe},
     math::{cell, elementary::ln, to_f32},
     scene::Geometry,
 };
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// The contents of a table: the lobes of `model`, at the widths of `knots`.
-#[derive(Debug, Clone, Copy)]
+/// The contents of a table.
+#[derive(Debug, Clone)]
 pub struct TransportPlan {
-    /// The model whose lobes are integrated.
-    pub model: &'static dyn Model,
-    /// The grid of widths of the model's main lobe, its first that has one; others have [grids of their own](knots::of_lobes).
-    pub knots: Knots,
+    /// Its lobes, with their widths.
+    pub lobes: Vec<LobeKnots>,
     /// How finely the integrals are computed.
     pub accuracy: Accuracy,
 }
@@ -41,14 +40,22 @@ pub struct TransportPlan {
 const BAND_RATIO: f64 = 2.0;
 
 impl TransportPlan {
+    /// The lobes of a model: the main lobe with this grid of widths, the others with all their widths.
+    #[must_use]
+    pub fn of_model(model: &dyn Model, main: Knots, accuracy: Accuracy) -> Self {
+        let mut lobes = Spans::of_model(model, Some(main.span())).knots(1.0);
+        let of_main = main_lobe(model).map(|(basis, _)| basis.lobe.name());
+        lobes.iter_mut().filter(|l| Some(l.lobe.name()) == of_main).for_each(|l| l.knots = Some(main));
+        Self { lobes, accuracy }
+    }
+
     /// Integrates the table of a list of pixels. A pixel without surface gets zeros.
     ///
     /// Consecutive pixels of one tile share cuts where possible, so a list in [`tile_order`] is fastest.
     #[must_use]
     pub fn integrate(&self, geometry: &Geometry, pyramid: &LightPyramid, pixels: &[Pixel]) -> TransportTable {
         let view = View { accuracy: self.accuracy, geometry, pyramid, pixels };
-        let knots = knots::of_lobes(self.model, self.knots);
-        let lobes = self.model.lobes().iter().zip(knots).map(|(basis, knots)| view.lobe(basis.lobe, knots));
+        let lobes = self.lobes.iter().map(|LobeKnots { lobe, knots }| view.lobe(*lobe, *knots));
         TransportTable { pixels: pixels.len(), lobes: lobes.collect() }
     }
 }
@@ -69,7 +76,7 @@ impl View<'_> {
                 }
             }
         }
-        LobeTable { knots, terms, values }
+        LobeTable { lobe: lobe.name().to_owned(), knots, terms, values }
     }
 
     /// The integrals of every pixel: interpolated on the coarsest grid of normals that is fine enough there, else computed at the pixel.

@@ -21,7 +21,7 @@ const GLOSS_RANGE: f64 = 0.099;
 
 /// `alpha = roughness^2`.
 pub(super) const fn roughness(entry: usize) -> Width {
-    Width { entry, of: |r| r * r, inverse: f64::sqrt, derivative: |r| 2.0 * r }
+    Width { entry, of: |r| r * r, inverse: f64::sqrt, derivative: |r| 2.0 * r, widened_by: None }
 }
 
 /// `a = 0.1 - 0.099 gloss`.
@@ -31,6 +31,7 @@ pub(super) const fn gloss(entry: usize) -> Width {
         of: |g| SATIN - GLOSS_RANGE * g,
         inverse: |a| (SATIN - a) / GLOSS_RANGE,
         derivative: |_| -GLOSS_RANGE,
+        widened_by: None,
     }
 }
 

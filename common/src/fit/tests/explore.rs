@@ -7,7 +7,10 @@ use crate::{
         explore::{MAX_EXPLORATIONS, most_evaluations},
     },
     graph::{Blob, NodeSpec},
-    nodes::wire::{PolishedWire, read, write},
+    nodes::{
+        ExploredWire,
+        wire::{PolishedWire, read, write},
+    },
     plan::{FitOutcome, FitPlanner},
     scene::Circle,
 };
@@ -69,7 +72,13 @@ fn polish_returns_to_the_winner_if_the_explored_lobe_ends_worse() {
             Blob::new(write("polish", &PolishedWire::of(polished)).unwrap())
         };
         match spec.kind.as_str() {
-            "explore" => changed(&|found| found.parameters = vec![0.0, 0.0, 0.0, 0.9, 0.9, 0.9, 1.0, 0.06]),
+            "explore" => {
+                let ExploredWire { found, blocks } = read("explore", &output).unwrap();
+                let mut found = found.polished(model).unwrap();
+                found.parameters = vec![0.0, 0.0, 0.0, 0.9, 0.9, 0.9, 1.0, 0.06];
+                let found = PolishedWire::of(found);
+                Blob::new(write("explore", &ExploredWire { found, blocks }).unwrap())
+            }
             "polish" => {
                 rounds.borrow_mut().push(spec.inputs.clone());
                 if rounds.borrow().len() > 1 {

@@ -26,7 +26,7 @@ fn polish_starts_from_the_best_and_never_ends_worse_on_its_table() {
     let places = (0..width * height).filter(|&i| coverage[i] > 0.0).map(|i| [i % width, i / width]);
     let pixels: Vec<Pixel> = places.map(|place| place.map(|x| u32::try_from(x).unwrap())).collect();
     let model = method("ggx").model;
-    let plan = TransportPlan { model, knots: Knots::covering(0.1, 0.4, 5.0), accuracy: Accuracy::FULL };
+    let plan = TransportPlan::of_model(model, Knots::covering(0.1, 0.4, 5.0), Accuracy::FULL);
     let pyramid = LightPyramid::new((**capture.environment()).clone());
     let table = [Arc::new(plan.integrate(capture.geometry(), &pyramid, &pixels))];
     let view = FullView { model, table: &table, pixels: &pixels, coverage: &coverage, stride: 1, width, height };
@@ -62,7 +62,7 @@ fn images_of_a_sequence_are_those_of_single_renderings() {
     // One width, and two.
     for name in ["ggx", "disney"] {
         let model = crate::brdf::model(name).unwrap();
-        let plan = TransportPlan { model, knots: Knots::covering(0.1, 0.4, 5.0), accuracy: Accuracy::COARSE };
+        let plan = TransportPlan::of_model(model, Knots::covering(0.1, 0.4, 5.0), Accuracy::COARSE);
         let shards = pixels.chunks(pixels.len() / 2 + 1);
         let table: Vec<_> = shards.map(|shard| Arc::new(plan.integrate(capture.geometry(), &pyramid, shard))).collect();
         let view = FullView { model, table: &table, pixels: &pixels, coverage: &coverage, stride: 1, width, height };

@@ -2,7 +2,7 @@
 
 use crate::{
     brdf::{Model, model},
-    fit::{FullView, Method},
+    fit::{FullView, Method, Ranges, candidate::widths},
     graph::{
         Blob, BlobHash, Change, DecodedCache, FailureReason, Graph, GraphEdit, NodeId, NodeSpec, PlanError, Planner,
         RunContext,
@@ -43,7 +43,7 @@ pub(crate) fn capture(name: &str, parameters: &[f64], noise: f64) -> Arc<Capture
 }
 
 /// As [`capture`], of a photo of other columns and rows with the sphere in this circle.
-pub(super) fn capture_of(
+pub(crate) fn capture_of(
     name: &str,
     parameters: &[f64],
     noise: f64,
@@ -55,11 +55,11 @@ pub(super) fn capture_of(
     let places = (0..columns * rows).map(|i| [i % columns, i / columns]);
     let coverage: Vec<f32> = places.clone().map(|[c, r]| geometry.coverage(c, r)).collect();
     let pixels: Vec<Pixel> = places.map(|place| place.map(|x| u32::try_from(x).unwrap())).collect();
-    let width = model.lobes().iter().find_map(|basis| basis.width_at(parameters)).unwrap();
-    let knots = Knots::covering(width / 1.3, width * 1.3, PER_OCTAVE);
+    let (low, high) = widths(model, &Ranges::default(), std::iter::once(parameters)).unwrap();
+    let knots = Knots::covering(low / 1.3, high * 1.3, PER_OCTAVE);
     // Finer than any table of a fit.
     let accuracy = Accuracy { tolerance: 5e-4, footprint: 1.0 };
-    let plan = TransportPlan { model, knots, accuracy };
+    let plan = TransportPlan::of_model(model, knots, accuracy);
     let table = plan.integrate(&geometry, &LightPyramid::new(room()), &pixels);
     let (width, height) = (columns, rows);
     let view =
@@ -93,7 +93,7 @@ impl StageOne {
         let width = model.lobes().iter().find_map(|basis| basis.width).unwrap();
         let (lower, upper) = width.span(model.parameters());
         let knots = Knots::covering(lower, upper, PER_OCTAVE);
-        let plan = TransportPlan { model, knots, accuracy: Accuracy::FULL };
+        let plan = TransportPlan::of_model(model, knots, Accuracy::FULL);
         let table = plan.integrate(&geometry, &LightPyramid::new(room()), &pixels);
         let subset = PixelSubset { weights: vec![1.0; pixels.len()], pixels };
         Self { table, subset, photo: Vec::new() }.photographed(model, parameters)
