@@ -6,7 +6,7 @@ use lookalike_tests::process::{Process, stderr};
 use std::{fs, net::TcpListener, path::Path, process::Command};
 use tempfile::TempDir;
 
-const FIT: &str = "fit photo.exr --env map.exr --out run --gammas 1:2:1 --samples 32 --polish off";
+const FIT: &str = "fit photo.exr --env map.exr --out run --model ggx --gammas 1:2:1 --samples 32 --polish off";
 
 /// A folder with a photo of a sphere on black, and a map.
 fn scene() -> TempDir {

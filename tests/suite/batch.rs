@@ -20,7 +20,7 @@ use tempfile::TempDir;
 const SIZE: usize = 24;
 
 /// Settings of a cheap fit.
-const QUICK: &str = "samples = 16\ngammas = '1:2:0.5'\npolish = false\n";
+const QUICK: &str = "model = 'ggx'\nsamples = 16\ngammas = '1:2:0.5'\npolish = false\n";
 
 /// A folder with two photos of one scene (`photo.exr`, and `red.exr`, the same through a red glass), one that is too small to be
 /// judged (`tiny.exr`: its fit fails in the run), the light `map.exr` and a manifest.

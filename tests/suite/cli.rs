@@ -1,6 +1,6 @@
 //! The command line as scripts use it: the real program, exact exit codes, and the contents of stdout and stderr.
 
-use lookalike::{brdf::DEFAULT_MODEL, choice::Choice as _, metric::MetricKind};
+use lookalike::{choice::Choice as _, metric::MetricKind};
 use std::{
     fs,
     path::Path,
@@ -65,7 +65,7 @@ fn without_arguments_the_short_help_is_an_error() {
 fn every_default_of_a_fit_is_in_its_help() {
     let help = lookalike("fit -h").stdout.split_whitespace().collect::<Vec<_>>().join(" ");
     for default in [
-        &format!("[default: {}]", DEFAULT_MODEL.name()),
+        "[default: auto]",
         "[default: 1:3:0.1]",
         "[default: 256]",
         "[default: importance]",
@@ -92,7 +92,10 @@ fn bad_usage_is_code_two_and_lists_what_is_possible() {
         ("fitt".to_owned(), &["unrecognized subcommand 'fitt'", "'fit'"][..]),
         ("fit ball.exr".into(), &["required arguments", "--env <MAP>", "--out <DIR>"]),
         (format!("{fit} --sampel 3"), &["unexpected argument '--sampel'", "'--samples'"]),
-        (format!("{fit} --model phong"), &["'phong'", "--model", "possible values: ggx, cook-torrance"]),
+        (
+            format!("{fit} --model phong"),
+            &["'phong'", "--model", "possible values: auto, ggx, ggx-haze, cook-torrance"],
+        ),
         (format!("{fit} --model ggx-f90"), &["the model 'ggx-f90' is now ggx, which has the parameter f90"]),
         (format!("{fit} --fix f9=1"), &["--fix f9", "it has kd, f0, f90, alpha"]),
         (format!("{fit} --bounds alpha=.1"), &["--bounds", "expected NAME=LOWER:UPPER"]),

@@ -15,7 +15,7 @@ fn every_command_refuses_to_replace_a_file_and_leaves_it_unchanged() {
         ("candidates.csv", format!("fit photo.exr --env map.exr {QUICK}")),
         ("reference.png", format!("fit photo.exr --env map.exr {QUICK} --resume")),
         ("summary.csv", "batch batch.toml --progress none".to_owned()),
-        ("photo-map-ggx/match.png", "batch batch.toml --progress none --resume".to_owned()),
+        ("photo-map-auto/match.png", "batch batch.toml --progress none --resume".to_owned()),
         ("strip.png", "demo --progress none".to_owned()),
     ] {
         let file = at("out").join(name);

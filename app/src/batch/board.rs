@@ -73,7 +73,7 @@ impl Board {
                 name: fit.name.clone(),
                 photo: fit.capture.photo.to_string_lossy().into_owned(),
                 env: fit.capture.environment.path.to_string_lossy().into_owned(),
-                model: fit.method.model,
+                models: fit.methods.clone(),
                 state: scores.map_or(State::Waiting, State::Done),
                 seconds,
             }

@@ -98,7 +98,7 @@ pub(crate) fn run(settings: BatchSettings) -> anyhow::Result<ExitCode> {
         out_name: &out_name,
         identity,
         resume: settings.old_files == OldFiles::Resume,
-        seed: fits.first().map_or(0, |fit| fit.method.seed),
+        seed: fits.first().map_or(0, |fit| fit.methods.common().seed),
         metrics: metrics.as_ref(),
         score: None,
         parts: ledger,

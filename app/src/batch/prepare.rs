@@ -7,7 +7,7 @@ use crate::{
     settings::{BatchFit, StageTwo},
 };
 use anyhow::Context;
-use lookalike::{fit::Method, graph::Placement, plan::FitPlanner, scene::Capture};
+use lookalike::{fit::Methods, graph::Placement, plan::FitPlanner, scene::Capture};
 use serde_json::Value;
 use std::{sync::Arc, time::Instant};
 
@@ -15,7 +15,7 @@ use std::{sync::Arc, time::Instant};
 #[derive(Debug)]
 pub(super) struct Prepared {
     pub(super) capture: Arc<Capture>,
-    pub(super) method: Method,
+    pub(super) methods: Methods,
     pub(super) exposure: f64,
     /// The `inputs` of `fit.json`.
     pub(super) inputs: Value,
@@ -39,24 +39,24 @@ impl Prepared {
         let capture = Arc::new(loaded.capture);
         let coverage = capture.scoring_coverage();
         let exposure = resolve_display_exposure(&fit.display_exposure, capture.photo(), &coverage)?;
-        let method = fit.method.clone();
+        let methods = fit.methods.clone();
         let placement = match stage_two {
             StageTwo::Coordinator => Placement::Coordinator,
             StageTwo::Workers => Placement::Worker,
         };
-        let planner = FitPlanner::new(Arc::clone(&capture), method.clone(), exposure);
+        let planner = FitPlanner::new(Arc::clone(&capture), methods.clone(), exposure);
         let mut planner = planner.context("the photo cannot be fitted")?.judging_on(placement);
         if let Some(encoded) = encoded {
             planner = planner.with_encoded_light(encoded);
         }
         let (warnings, seconds) = (loaded.warnings, began.elapsed().as_secs_f64());
-        Ok(Self { capture, method, exposure, inputs, planner, warnings, seconds })
+        Ok(Self { capture, methods, exposure, inputs, planner, warnings, seconds })
     }
 
     /// The inputs and settings that may not change when the batch is resumed, by name.
     pub(super) fn identity(&self) -> anyhow::Result<Vec<(&'static str, String)>> {
-        let (inputs, capture, method, exposure) = (&self.inputs, &*self.capture, &self.method, self.exposure);
-        FitIdentity { inputs, capture, method, exposure, also_render: &[] }.parts()
+        let (inputs, capture, methods, exposure) = (&self.inputs, &*self.capture, &self.methods, self.exposure);
+        FitIdentity { inputs, capture, methods, exposure, also_render: &[] }.parts()
     }
 
     /// Pixels of the photo.

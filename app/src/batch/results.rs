@@ -6,7 +6,7 @@ use crate::{
     outputs::{FIT_FILES, FitRecord, OutFolder, Timing},
 };
 use anyhow::Context;
-use lookalike::{fit::Method, plan::FitOutcome, scene::Capture};
+use lookalike::{fit::Methods, plan::FitOutcome, scene::Capture};
 use serde_json::Value;
 use std::sync::{
     Arc, Mutex, PoisonError,
@@ -18,7 +18,7 @@ use tokio::sync::Notify;
 #[derive(Debug)]
 pub(super) struct Inputs {
     pub(super) capture: Arc<Capture>,
-    pub(super) method: Method,
+    pub(super) methods: Methods,
     pub(super) exposure: f64,
     /// The `inputs` of `fit.json`.
     pub(super) inputs: Value,
@@ -102,9 +102,10 @@ impl Writers {
 fn write(out: &OutFolder, out_name: String, fitted: &Fitted) -> anyhow::Result<Scores> {
     let Fitted { inputs, outcome, timing, .. } = fitted;
     let folder = out.sub(&fitted.name)?;
-    let notes = notes(&inputs.method, outcome);
+    let method = inputs.methods.get(outcome.chosen);
+    let notes = notes(method, outcome);
     let record = FitRecord {
-        method: &inputs.method,
+        methods: &inputs.methods,
         capture: &inputs.capture,
         inputs: &inputs.inputs,
         outcome,
@@ -113,7 +114,7 @@ fn write(out: &OutFolder, out_name: String, fitted: &Fitted) -> anyhow::Result<S
     };
     write_results(&folder, &record, &Timing { out: out_name, ..timing.clone() })?;
     let (cssim, cssim_object) = final_scores(outcome);
-    let best = final_score(&inputs.method, outcome);
+    let best = final_score(method.judge, outcome);
     let files = FIT_FILES.iter().map(|name| {
         let hash = folder.hash(name)?.with_context(|| format!("{} is gone already", folder.file(name).display()))?;
         Ok(((*name).to_owned(), hash))
@@ -122,7 +123,8 @@ fn write(out: &OutFolder, out_name: String, fitted: &Fitted) -> anyhow::Result<S
     Ok(Scores {
         cssim,
         cssim_object,
-        judge: inputs.method.judge,
+        judge: method.judge,
+        model: method.model,
         gamma: outcome.judged[outcome.winner].candidate.gamma,
         parameters: final_parameters(outcome).to_vec(),
         is_polished: outcome.polished.is_some(),

@@ -7,7 +7,7 @@ use crate::{
     run::{journal_failed, missing},
     settings::BatchFit,
 };
-use lookalike::brdf::{Channels, Model};
+use lookalike::brdf::{self, Channels, Model};
 use lookalike_coordinator::journal::{self, JOURNAL_FILE, RunIdentity};
 use serde_json::Value;
 use std::fs;
@@ -72,13 +72,16 @@ fn complete_fit(out: &OutFolder, fit: &BatchFit, files: &[(String, String)]) -> 
     let (stage_two, polished) = (&json["stage_two"], &json["polished"]);
     let last = if polished.is_null() { stage_two } else { polished };
     let (cssim, cssim_object) = (last["cssim"].as_f64()?, last["cssim_object"].as_f64()?);
-    let judged = fit.method.judge.pick(cssim, cssim_object);
+    let judge = fit.methods.common().judge;
+    let judged = judge.pick(cssim, cssim_object);
+    let model = brdf::model(json["model"].as_str()?).ok()?;
     let scores = Scores {
         cssim,
         cssim_object,
-        judge: fit.method.judge,
+        judge,
+        model,
         gamma: stage_two["gamma"].as_f64()?,
-        parameters: flat(fit.method.model, &last["parameters"])?,
+        parameters: flat(model, &last["parameters"])?,
         is_polished: !polished.is_null(),
         is_missed: fit.max_cssim.is_some_and(|limit| judged > limit),
         files: files.to_vec(),
@@ -109,7 +112,7 @@ mod tests {
 
     #[test]
     fn parameters_come_back_from_their_names() {
-        let model = lookalike::brdf::model("cook-torrance").unwrap();
+        let model = brdf::model("cook-torrance").unwrap();
         let vector: Vec<f64> = (1..=8).map(f64::from).collect();
         let mut json = parameters_json(model, &vector);
         assert_eq!(flat(model, &json), Some(vector));

@@ -1,6 +1,9 @@
 //! A fit of a batch: its state and its scores.
 
-use lookalike::{brdf::Model, fit::JudgedBy};
+use lookalike::{
+    brdf::Model,
+    fit::{JudgedBy, Methods},
+};
 use lookalike_coordinator::journal::{PartRow, PartStatus};
 
 /// A fit, as the summaries show it.
@@ -9,7 +12,8 @@ pub(super) struct Row {
     pub(super) name: String,
     pub(super) photo: String,
     pub(super) env: String,
-    pub(super) model: &'static dyn Model,
+    /// The models that it compares.
+    pub(super) models: Methods,
     pub(super) state: State,
     /// From its start to its end; `None` before its end.
     pub(super) seconds: Option<f64>,
@@ -45,6 +49,14 @@ impl State {
 }
 
 impl Row {
+    /// The model that was chosen; before that, what the fit chooses from.
+    pub(super) fn model(&self) -> String {
+        match &self.state {
+            State::Done(scores) => scores.model.name().to_owned(),
+            _ => self.models.name(),
+        }
+    }
+
     /// Its row in the journal.
     pub(super) fn journal_row(&self, number: u32) -> PartRow {
         let (scores, error) = match &self.state {
@@ -73,6 +85,8 @@ pub(super) struct Scores {
     pub(super) cssim_object: f64,
     /// Which of them the fit was judged by.
     pub(super) judge: JudgedBy,
+    /// The model that was chosen.
+    pub(super) model: &'static dyn Model,
     /// The gamma of the winner of stage two.
     pub(super) gamma: f64,
     /// The final flat parameter vector.

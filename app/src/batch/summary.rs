@@ -76,7 +76,7 @@ impl Summary {
             };
             let error = if let State::Failed(error) = &row.state { error.as_str() } else { "" };
             let seconds = row.seconds.map(|seconds| milliseconds(seconds).to_string()).unwrap_or_default();
-            let texts = [&row.name, &row.photo, &row.env, row.model.name(), row.state.name()].map(quoted);
+            let texts = [&row.name, &row.photo, &row.env, &*row.model(), row.state.name()].map(quoted);
             let cells = texts.into_iter().chain(numbers).chain([seconds, quoted(error)]);
             let cells = cells.chain(parameters.iter().map(|name| parameter(row, name)));
             text.push_str(&cells.collect::<Vec<_>>().join(","));
@@ -88,7 +88,8 @@ impl Summary {
     /// The parameters of all models, each once.
     fn parameters(&self) -> Vec<String> {
         let mut all: Vec<String> = Vec::new();
-        for name in self.rows.iter().flat_map(|row| flat_names(row.model.parameters())) {
+        let models = self.rows.iter().flat_map(|row| row.models.iter());
+        for name in models.flat_map(|method| flat_names(method.model.parameters())) {
             if !all.contains(&name) {
                 all.push(name);
             }
@@ -130,7 +131,7 @@ impl Summary {
 
 fn of_row(row: &Row) -> Value {
     let mut object = json!({
-        "name": row.name, "photo": row.photo, "env": row.env, "model": row.model.name(), "state": row.state.name(),
+        "name": row.name, "photo": row.photo, "env": row.env, "model": row.model(), "state": row.state.name(),
         "seconds": row.seconds.map(milliseconds),
     });
     let (scores, error) = match &row.state {
@@ -141,7 +142,7 @@ fn of_row(row: &Row) -> Value {
     object["cssim"] = json!(scores.map(|scores| scores.cssim));
     object["cssim_object"] = json!(scores.map(|scores| scores.cssim_object));
     object["gamma"] = json!(scores.map(|scores| scores.gamma));
-    object["parameters"] = json!(scores.map(|scores| parameters_json(row.model, &scores.parameters)));
+    object["parameters"] = json!(scores.map(|scores| parameters_json(scores.model, &scores.parameters)));
     object["polished"] = json!(scores.map(|scores| scores.is_polished));
     object["error"] = json!(error);
     object
@@ -150,7 +151,7 @@ fn of_row(row: &Row) -> Value {
 /// A parameter of a fit by its flat name; empty if its model has no such parameter.
 fn parameter(row: &Row, name: &str) -> String {
     let State::Done(scores) = &row.state else { return String::new() };
-    let place = flat_names(row.model.parameters()).iter().position(|known| known == name);
+    let place = flat_names(scores.model.parameters()).iter().position(|known| known == name);
     place.and_then(|place| scores.parameters.get(place)).map(f64::to_string).unwrap_or_default()
 }
 
@@ -166,24 +167,39 @@ fn quoted(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::{super::row::Scores, *};
-    use lookalike::{brdf, fit::JudgedBy};
+    use lookalike::{
+        brdf,
+        fit::{JudgedBy, Method},
+    };
 
     fn row(name: &str, model: &str, state: State) -> Row {
         let (photo, env) = ("a, b.exr".to_owned(), "m.hdr".to_owned());
-        Row { name: name.to_owned(), photo, env, model: brdf::model(model).unwrap(), state, seconds: Some(1.23456) }
+        let models = Method { model: brdf::model(model).unwrap(), ..Method::default() }.into();
+        Row { name: name.to_owned(), photo, env, models, state, seconds: Some(1.23456) }
     }
 
-    fn scores(parameters: Vec<f64>, is_missed: bool) -> State {
+    fn scores(model: &str, parameters: Vec<f64>, is_missed: bool) -> State {
+        let model = brdf::model(model).unwrap();
         let (cssim, cssim_object, gamma) = (0.25, 0.125, 1.5);
         let judge = JudgedBy::Object;
         let files = Vec::new();
-        State::Done(Scores { cssim, cssim_object, judge, gamma, parameters, is_polished: true, is_missed, files })
+        State::Done(Scores {
+            cssim,
+            cssim_object,
+            judge,
+            model,
+            gamma,
+            parameters,
+            is_polished: true,
+            is_missed,
+            files,
+        })
     }
 
     fn summary() -> Summary {
         let rows = vec![
-            row("one", "ggx", scores((1..=8).map(f64::from).collect(), false)),
-            row("two", "cook-torrance", scores((1..=8).map(f64::from).collect(), true)),
+            row("one", "ggx", scores("ggx", (1..=8).map(f64::from).collect(), false)),
+            row("two", "cook-torrance", scores("cook-torrance", (1..=8).map(f64::from).collect(), true)),
             row("three", "ggx", State::Failed("it said \"no\"".to_owned())),
         ];
         let count = PartCount { total: 3, running: 0, done: 2, missed: 1, failed: 1 };

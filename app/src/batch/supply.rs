@@ -90,9 +90,9 @@ impl Supply {
             }
         };
         let pixels = prepared.pixels();
-        let Prepared { capture, method, exposure, inputs, planner, seconds, .. } = prepared;
+        let Prepared { capture, methods, exposure, inputs, planner, seconds, .. } = prepared;
         self.options.board.started(number, planner.best(), seconds);
-        let inputs = Inputs { capture, method, exposure, inputs, max_cssim: fit.max_cssim };
+        let inputs = Inputs { capture, methods, exposure, inputs, max_cssim: fit.max_cssim };
         self.active.insert(number, Active { inputs, pixels });
         Ok(Some(Part { number, name: fit.name.clone(), planner, stays: false }))
     }

@@ -4,8 +4,7 @@ use super::{args::Command, parse};
 use crate::settings::{CompareSettings, DisplayExposure, FitSettings, Workers};
 use clap::CommandFactory;
 use lookalike::{
-    brdf::DEFAULT_MODEL,
-    fit::{Compress, Gammas, Method, SearchKind, Start},
+    fit::{Compress, Gammas, Methods, SearchKind, Start},
     metric::MetricKind,
     render::subset::SampleCount,
     scene::Camera,
@@ -75,12 +74,10 @@ fn a_plain_fit_has_the_defaults_of_the_design() {
     assert_eq!((settings.capture.environment.mapping, settings.capture.environment.rotation_deg), (None, 0.0));
     assert_eq!(settings.capture.view.camera, Camera::Orthographic);
     assert_eq!(settings.display_exposure, DisplayExposure::Auto);
-    let method = settings.method;
-    assert_eq!(format!("{method:?}"), format!("{:?}", Method::default()), "command line and library have one default");
-    assert_eq!(
-        (method.model.name(), method.gammas, method.samples),
-        (DEFAULT_MODEL.name(), Gammas::DEFAULT.values(), SampleCount::Draws(256))
-    );
+    let (methods, default) = (settings.methods, Methods::default());
+    assert_eq!(format!("{methods:?}"), format!("{default:?}"), "command line and library have one default");
+    let method = methods.common().clone();
+    assert_eq!((method.gammas, method.samples), (Gammas::DEFAULT.values(), SampleCount::Draws(256)));
     assert_eq!((method.search, method.polish, method.seed), (SearchKind::LeastSquares, true, 0));
     assert_eq!((method.start, method.compress), (Start::Scan, Compress::Tangent));
     assert_eq!(settings.cluster.workers, Workers::PerCore);
@@ -100,13 +97,14 @@ fn every_group_of_flags_reaches_the_settings() {
     assert_eq!(settings.capture.mask, Some("m.png".into()));
     assert_eq!(settings.capture.environment.rotation_deg, -30.0);
     assert_eq!(settings.capture.sphere.unwrap().x, -5.0);
-    assert_eq!(settings.method.gammas, [1.0, 1.5, 2.0]);
-    assert_eq!((settings.method.samples, settings.method.subsets), (SampleCount::Full, 4));
-    let (lower, upper) = settings.method.ranges.bounds(settings.method.model);
+    assert_eq!(settings.methods.common().gammas, [1.0, 1.5, 2.0]);
+    assert_eq!((settings.methods.common().samples, settings.methods.common().subsets), (SampleCount::Full, 4));
+    let method = settings.methods.common();
+    let (lower, upper) = method.ranges.bounds(method.model);
     assert_eq!((&lower[3..], &upper[3..]), (&[0.5, 0.5, 0.5, 0.1, 0.1][..], &[0.5, 0.5, 0.5, 0.1, 0.3][..]));
-    assert_eq!((settings.method.search, settings.method.polish), (SearchKind::Pattern, false));
+    assert_eq!((settings.methods.common().search, settings.methods.common().polish), (SearchKind::Pattern, false));
     assert_eq!(settings.display_exposure, DisplayExposure::From("old.json".into()));
-    assert_eq!((settings.max_cssim, settings.method.seed), (Some(0.1), 7));
+    assert_eq!((settings.max_cssim, settings.methods.common().seed), (Some(0.1), 7));
     assert_eq!(settings.cluster.workers, Workers::Count(0));
     assert_eq!(settings.cluster.advertise.unwrap().to_string(), "node7:4101");
     assert_eq!(settings.cluster.policy.grace, Duration::from_secs(3600));
@@ -114,6 +112,22 @@ fn every_group_of_flags_reaches_the_settings() {
     // The access file says under which name workers reach the coordinator, so no other name is needed.
     let flags = ["--listen", "0.0.0.0:4100", "--access", "cluster.json"];
     assert_eq!(fit(&[&PLAIN[..], &flags].concat()).unwrap().cluster.access, Some("cluster.json".into()));
+}
+
+#[test]
+fn models_are_those_of_auto_or_those_named() {
+    let models = |flags: &[&str]| {
+        let methods = fit(&[&PLAIN[..], flags].concat()).unwrap().methods;
+        methods.iter().map(|method| methods.label(method)).collect::<Vec<_>>()
+    };
+    assert_eq!(models(&[]), ["ggx, f90 = 1", "ggx", "ggx-haze"]);
+    assert_eq!(models(&["--model", "ggx"]), ["ggx"]);
+    assert_eq!(models(&["--model", "ward,ggx", "--fix", "kd=0"]), ["ward", "ggx"]);
+    assert_eq!(models(&["--model=auto", "--fix", "f90=.9"]), ["ggx", "ggx-haze"]);
+    let refused = |flags: &[&str]| message(fit(&[&PLAIN[..], flags].concat()));
+    assert!(refused(&["--model", "auto,ward"]).contains("auto stands alone"));
+    assert!(refused(&["--model", "ggx,phong"]).contains("invalid value 'phong'"));
+    assert!(refused(&["--model", "ward,ggx", "--fix", "f90=1"]).contains("model ward has no parameter 'f90'"));
 }
 
 #[test]
@@ -130,15 +144,15 @@ fn settings_file_equals_flags() {
     assert_eq!(settings.capture.environment.rotation_deg, -30.0);
     assert_eq!(settings.capture.sphere.unwrap().to_string(), "128,127.5,100");
     assert_eq!(settings.display_exposure, DisplayExposure::From(file.folder.join("old.json")));
-    assert_eq!((settings.method.polish, settings.max_cssim), (false, Some(0.1)));
-    assert_eq!(settings.method.gammas, [2.2]);
+    assert_eq!((settings.methods.common().polish, settings.max_cssim), (false, Some(0.1)));
+    assert_eq!(settings.methods.common().gammas, [2.2]);
 }
 
 #[test]
 fn flags_and_positional_arguments_win_over_the_file() {
     let file = Settings::new("wins", "photo = 'ball.exr'\nenv = 'garden.hdr'\nout = 'run'\nseed = 1\n");
     let settings = fit(&["fit", "--seed", "3", &file.file(), "other.exr", "--env=attic.hdr"]).unwrap();
-    assert_eq!((settings.capture.photo, settings.method.seed), ("other.exr".into(), 3));
+    assert_eq!((settings.capture.photo, settings.methods.common().seed), ("other.exr".into(), 3));
     assert_eq!((settings.capture.environment.path, settings.out), ("attic.hdr".into(), file.folder.join("run")));
 }
 
@@ -186,19 +200,20 @@ fn settings_files_are_read_once_and_must_exist() {
 
 #[test]
 fn the_paper_is_a_bundle_that_explicit_flags_override() {
-    let settings = fit(&[&PLAIN[..], &["--preset", "paper"]].concat()).unwrap().method;
+    let settings = fit(&[&PLAIN[..], &["--preset", "paper"]].concat()).unwrap().methods.common().clone();
     assert_eq!((settings.model.name(), settings.samples), ("cook-torrance", SampleCount::default()));
     assert_eq!((settings.search, settings.polish), (SearchKind::Pattern, false));
     assert_eq!(settings.gammas.len(), 21);
     assert_eq!((settings.start, settings.compress), (Start::Paper, Compress::Clamp));
 
-    let settings = fit(&[&PLAIN[..], &["--model", "ggx", "--preset", "paper", "--polish=on"]].concat()).unwrap().method;
+    let settings = fit(&[&PLAIN[..], &["--model", "ggx", "--preset", "paper", "--polish=on"]].concat()).unwrap();
+    let settings = settings.methods.common().clone();
     assert_eq!((settings.model.name(), settings.polish), ("ggx", true));
     assert_eq!((settings.search, settings.start), (SearchKind::Pattern, Start::Paper));
 
     let file =
         Settings::new("preset", "photo = 'b.exr'\nenv = 'g.hdr'\nout = 'r'\npreset = 'paper'\nsamples = 'full'\n");
-    let settings = fit(&["fit", &file.file(), "--polish", "on"]).unwrap().method;
+    let settings = fit(&["fit", &file.file(), "--polish", "on"]).unwrap().methods.common().clone();
     assert_eq!((settings.model.name(), settings.samples, settings.polish), ("cook-torrance", SampleCount::Full, true));
 }
 

@@ -9,7 +9,7 @@ use crate::{
 };
 use anyhow::Context;
 use lookalike::{
-    fit::Method,
+    fit::Methods,
     image::{Image, content_hash, openexr, png},
     light::Environment,
     metric::auto_exposure,
@@ -48,7 +48,7 @@ pub(crate) fn run(settings: DemoSettings) -> anyhow::Result<ExitCode> {
     let out_name = settings.out.display().to_string();
     let job = FitJob {
         capture: Arc::clone(&capture),
-        method: Method::default(),
+        methods: Methods::default(),
         exposure,
         inputs,
         cluster: ClusterSettings { workers: settings.workers, log: settings.log, ..ClusterSettings::default() },

@@ -23,7 +23,7 @@ pub(crate) fn run(settings: FitSettings) -> anyhow::Result<ExitCode> {
     let job = FitJob {
         inputs: loaded.to_json(),
         capture: Arc::new(loaded.capture),
-        method: settings.method,
+        methods: settings.methods,
         exposure,
         cluster: settings.cluster,
         progress: settings.progress,

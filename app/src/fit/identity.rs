@@ -1,7 +1,7 @@
 //! The identity of a fit: the inputs and settings that may not change when its run is resumed.
 
 use anyhow::Context;
-use lookalike::{fit::Method, scene::Capture};
+use lookalike::{fit::Methods, scene::Capture};
 use lookalike_coordinator::journal::RunIdentity;
 use serde_json::Value;
 
@@ -11,7 +11,7 @@ pub(crate) struct FitIdentity<'a> {
     /// The `inputs` of `fit.json`.
     pub(crate) inputs: &'a Value,
     pub(crate) capture: &'a Capture,
-    pub(crate) method: &'a Method,
+    pub(crate) methods: &'a Methods,
     /// The exposure that is applied before the metric.
     pub(crate) exposure: f64,
     /// Additional gammas whose candidates are rendered.
@@ -45,7 +45,7 @@ impl FitIdentity<'_> {
             ("the place of the object (--sphere, --camera)", geometry),
             ("--display-exposure", self.exposure.to_string()),
         ]);
-        parts.extend(self.method.settings().into_iter().map(|setting| (setting.flag, setting.text)));
+        parts.extend(self.methods.settings().into_iter().map(|setting| (setting.flag, setting.text)));
         parts.push(("the gammas that are shown", format!("{:?}", self.also_render)));
         Ok(parts)
     }

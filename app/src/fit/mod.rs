@@ -17,7 +17,7 @@ use crate::{
 };
 use anyhow::Context;
 use lookalike::{
-    fit::Method,
+    fit::Methods,
     plan::{FitOutcome, FitPlanner},
     scene::Capture,
 };
@@ -29,7 +29,7 @@ use std::{process::ExitCode, sync::Arc};
 #[derive(Debug)]
 pub(crate) struct FitJob {
     pub(crate) capture: Arc<Capture>,
-    pub(crate) method: Method,
+    pub(crate) methods: Methods,
     /// The exposure that is applied before the metric.
     pub(crate) exposure: f64,
     /// The `inputs` of `fit.json`.
@@ -59,25 +59,22 @@ pub(crate) struct Finished {
 
 /// Runs a fit and writes its results; `None` if an earlier run has finished it.
 pub(crate) fn run(job: FitJob) -> anyhow::Result<Option<Finished>> {
-    let method = job.method.clone();
-    let planner = FitPlanner::new(Arc::clone(&job.capture), method.clone(), job.exposure)
+    let planner = FitPlanner::new(Arc::clone(&job.capture), job.methods.clone(), job.exposure)
         .context("the photo cannot be fitted")?
         .also_render(&job.also_render);
     let metrics = listen(job.metrics)?;
     let mut display = display(job.progress, Shape::OneFit, access_file(&job.cluster, &job.out));
-    let done = run_shown(&job, &method, planner, metrics.as_ref(), &mut *display);
+    let done = run_shown(&job, planner, metrics.as_ref(), &mut *display);
     let problem = done.as_ref().err().map(|error| format!("{error:#}"));
     display.finish(problem.as_deref().map_or(Ending::Finished, Ending::Failed));
     let Some(Done { outcome, pictures, timing, notes }) = done? else { return Ok(None) };
-    let record = record(&job, &method, &outcome, &notes);
+    let record = record(&job, &outcome, &notes);
     print_summary(&record, &timing, &job.out_name).context("cannot write to stdout")?;
-    let best = final_score(&method, &outcome);
+    let judge = job.methods.common().judge;
+    let best = final_score(judge, &outcome);
     let missed = job.max_cssim.is_some_and(|limit| best > limit);
     if let (true, Some(limit)) = (missed, job.max_cssim) {
-        print_line(&format!(
-            "the match has a score of {best:.4} (--judge {}), more than --max-cssim {limit}",
-            method.judge
-        ));
+        print_line(&format!("the match has a score of {best:.4} (--judge {}), more than --max-cssim {limit}", judge));
     }
     let code = if missed { Exit::MissedMaxCssim } else { Exit::Done };
     Ok(Some(Finished { outcome, pictures, code: code.into() }))
@@ -94,7 +91,6 @@ struct Done {
 /// Runs the fit while its display is shown, and writes its files.
 fn run_shown(
     job: &FitJob,
-    method: &Method,
     planner: FitPlanner,
     metrics: Option<&Metrics>,
     display: &mut dyn Display,
@@ -102,7 +98,7 @@ fn run_shown(
     let identity = FitIdentity {
         inputs: &job.inputs,
         capture: &job.capture,
-        method,
+        methods: &job.methods,
         exposure: job.exposure,
         also_render: &job.also_render,
     };
@@ -113,7 +109,7 @@ fn run_shown(
         out_name: &job.out_name,
         identity: identity.of_run()?,
         resume: job.resume,
-        seed: method.seed,
+        seed: job.methods.common().seed,
         metrics,
         score: Some(Arc::new(move || best.get())),
         parts: PartLedger::default(),
@@ -129,7 +125,7 @@ fn run_shown(
         display.event(event);
     })?;
     let outcome = planner.into_outcome().context("the graph ended without a result: please report this")?;
-    let notes = notes(method, &outcome);
+    let notes = notes(job.methods.get(outcome.chosen), &outcome);
     let mut seconds = vec![("inputs", job.input_seconds)];
     seconds.extend(clock.stages());
     seconds.push(("total", job.input_seconds + clock.total()));
@@ -142,12 +138,13 @@ fn run_shown(
         requeued: summary.requeued_nodes,
     };
     // Not an error of the input: a full disk may have room later, and the resumed run computes nothing again.
-    let pictures = write_results(&job.out, &record(job, method, &outcome, &notes), &timing);
+    let pictures = write_results(&job.out, &record(job, &outcome, &notes), &timing);
     let pictures = pictures.context(Exit::RunFailed)?;
     session.finish(job.out.results().context(Exit::RunFailed)?)?;
     Ok(Some(Done { outcome, pictures, timing, notes }))
 }
 
-fn record<'a>(job: &'a FitJob, method: &'a Method, outcome: &'a FitOutcome, notes: &'a [String]) -> FitRecord<'a> {
-    FitRecord { method, capture: &job.capture, inputs: &job.inputs, outcome, display_exposure: job.exposure, notes }
+fn record<'a>(job: &'a FitJob, outcome: &'a FitOutcome, notes: &'a [String]) -> FitRecord<'a> {
+    let (methods, capture, inputs, display_exposure) = (&job.methods, &*job.capture, &job.inputs, job.exposure);
+    FitRecord { methods, capture, inputs, outcome, display_exposure, notes }
 }

@@ -2,11 +2,11 @@
 
 use crate::outputs::{FitRecord, OutFolder, Pictures, Timing, candidates_csv, parameters_json, write_pictures};
 use anyhow::Context;
-use lookalike::{fit::Method, image::metadata, plan::FitOutcome};
+use lookalike::{fit::JudgedBy, image::metadata, plan::FitOutcome};
 
 /// Writes all files of a finished fit. `fit.json` comes last, because it marks the fit as finished.
 pub(crate) fn write_results(out: &OutFolder, record: &FitRecord<'_>, timing: &Timing) -> anyhow::Result<Pictures> {
-    let (method, outcome, exposure) = (record.method, record.outcome, record.display_exposure);
+    let (method, outcome, exposure) = (record.method(), record.outcome, record.display_exposure);
     let pictures = Pictures::new(record.capture, outcome, exposure);
     let parameters = parameters_json(method.model, final_parameters(outcome)).to_string();
     let about = [
@@ -39,8 +39,8 @@ pub(crate) fn final_scores(outcome: &FitOutcome) -> (f64, f64) {
     polished.unwrap_or((winner.cssim, winner.cssim_object))
 }
 
-/// The score that the method selects and polishes by.
-pub(crate) fn final_score(method: &Method, outcome: &FitOutcome) -> f64 {
+/// The score that the fit selects and polishes by.
+pub(crate) fn final_score(judge: JudgedBy, outcome: &FitOutcome) -> f64 {
     let (image, object) = final_scores(outcome);
-    method.judge.pick(image, object)
+    judge.pick(image, object)
 }

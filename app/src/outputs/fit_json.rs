@@ -6,7 +6,7 @@
 use super::conventions;
 use lookalike::{
     brdf::{Channels, Model},
-    fit::{Judged, Method, Uncertainty},
+    fit::{Judged, Method, Methods, Tried, Uncertainty, Verdict},
     plan::FitOutcome,
     scene::Capture,
 };
@@ -18,7 +18,7 @@ const SCHEMA: &str = "lookalike.fit/1";
 /// The data for the document.
 #[derive(Debug)]
 pub(crate) struct FitRecord<'a> {
-    pub(crate) method: &'a Method,
+    pub(crate) methods: &'a Methods,
     pub(crate) capture: &'a Capture,
     /// The inputs of the fit.
     pub(crate) inputs: &'a Value,
@@ -42,9 +42,21 @@ pub(crate) struct Timing {
 }
 
 impl FitRecord<'_> {
+    /// The method with the model that was chosen.
+    pub(crate) fn method(&self) -> &Method {
+        self.methods.get(self.outcome.chosen)
+    }
+
+    /// How good the match is, in words.
+    pub(crate) fn verdict(&self) -> Verdict {
+        let FitOutcome { judged, winner, polished, noise, .. } = self.outcome;
+        let object = polished.as_ref().map_or(judged[*winner].cssim_object, |p| p.cssim_object);
+        Verdict::of(object, noise.map_or(0.0, |(_, (_, floor))| floor))
+    }
+
     /// The document.
     pub(crate) fn json(&self, timing: &Timing) -> Value {
-        let model = self.method.model;
+        let model = self.method().model;
         let score = |cssim: f64, object: f64| json!({ "cssim": cssim, "cssim_object": object });
         let candidate = |j: &Judged| {
             let c = &j.candidate;
@@ -79,7 +91,7 @@ impl FitRecord<'_> {
         let counts = self.capture.counts();
         let software = json!({ "name": "lookalike", "version": env!("CARGO_PKG_VERSION") });
         let mut document = json!({ "schema": SCHEMA, "software": software });
-        let settings = self.method.settings().into_iter().filter_map(|setting| setting.field);
+        let settings = self.method().settings().into_iter().filter_map(|setting| setting.field);
         merge(&mut document, settings.map(|(name, value)| (name.to_owned(), value)).collect());
         let rest = json!({
             "display_exposure": self.display_exposure,
@@ -96,6 +108,10 @@ impl FitRecord<'_> {
             "conventions": conventions(),
             "exposure_gain": [1.0, 1.0, 1.0],
             "candidates": order.into_iter().map(candidate).collect::<Vec<_>>(),
+            "models": self.models_json(),
+            "noise": self.outcome.noise.map(|(noise, _)| noise),
+            "noise_floor": self.outcome.noise.map(|(_, (image, object))| self.method().judge.pick(image, object)),
+            "verdict": self.verdict().to_string(),
             "stage_two": stage_two,
             "polished": polished,
             "notes": self.notes,
@@ -103,6 +119,49 @@ impl FitRecord<'_> {
         });
         merge(&mut document, rest);
         document
+    }
+
+    /// Every model that was tried, in order, and why it was chosen or not.
+    fn models_json(&self) -> Vec<Value> {
+        let tried = self.methods.iter().zip(&self.outcome.tried).enumerate();
+        tried
+            .map(|(i, (method, tried))| {
+                json!({
+                    "model": method.model.name(),
+                    "fixed": method.ranges.held(),
+                    "gamma": tried.gamma,
+                    "cssim": tried.cssim,
+                    "cssim_object": tried.cssim_object,
+                    "coarse": tried.is_coarse,
+                    "above_best": {
+                        "difference": tried.above_best.0,
+                        "standard_error": tried.above_best.1,
+                        "tolerance": tried.tolerance,
+                    },
+                    "chosen": i == self.outcome.chosen,
+                    "why": why(tried, i, self.outcome.chosen),
+                    "parameters": parameters_json(method.model, &tried.parameters),
+                })
+            })
+            .collect()
+    }
+}
+
+/// Why a model was chosen or not, in words.
+pub(crate) fn why(tried: &Tried, index: usize, chosen: usize) -> String {
+    let (difference, error) = tried.above_best;
+    match (index == chosen, tried.is_as_good()) {
+        _ if tried.is_coarse => {
+            format!("given up on a coarse picture: above the best there by {difference:.4} +- {error:.4}")
+        }
+        (true, _) if index == 0 && difference == 0.0 => "the best match".to_owned(),
+        (true, _) if difference == 0.0 => "the best match; no simpler model is as good".to_owned(),
+        (true, _) => {
+            let tolerance = tried.tolerance;
+            format!("the simplest that is as good as the best: above it by {difference:.4}, within {tolerance:.4}")
+        }
+        (false, true) => "as good, but not simpler".to_owned(),
+        (false, false) => format!("above the best by {difference:.4} +- {error:.4}"),
     }
 }
 

@@ -2,12 +2,13 @@
 
 use super::{
     FitRecord, Timing,
+    fit_json::why,
     table::{CSSIM_HINT, aligned, counted, print_result},
 };
 use crate::wrap::wrap;
 use lookalike::{
     brdf::{Channels, Model},
-    fit::Method,
+    fit::{Method, Tried, Verdict},
     plan::FitOutcome,
 };
 use std::{fmt::Write as _, io};
@@ -18,13 +19,15 @@ pub(crate) fn print_summary(record: &FitRecord<'_>, timing: &Timing, out: &str) 
 }
 
 fn summary(record: &FitRecord<'_>, timing: &Timing, out: &str) -> String {
-    let (model, outcome) = (record.method.model, record.outcome);
+    let (method, outcome) = (record.method(), record.outcome);
     let usable = record.capture.counts().usable;
-    let mut text = format!("{} on {} of {usable} usable pixels", model.name(), record.method.samples);
-    let gammas = counted(record.method.gammas.len(), "gamma");
-    let _ = writeln!(text, ", {gammas}, seed {}\n", record.method.seed);
-    text.push_str(&aligned(&rows(record.method, outcome)));
+    let mut text = format!("{} on {} of {usable} usable pixels", method.model.name(), method.samples);
+    let gammas = counted(method.gammas.len(), "gamma");
+    let _ = writeln!(text, ", {gammas}, seed {}\n", method.seed);
+    text.push_str(&aligned(&rows(method, outcome)));
     let _ = writeln!(text, "\n  {CSSIM_HINT}");
+    let _ = writeln!(text, "\n{}", wrap(&verdict(record)));
+    text.push_str(&models(record));
     for note in record.notes {
         let _ = writeln!(text, "\n{}", wrap(&format!("note: {note}")));
     }
@@ -33,6 +36,38 @@ fn summary(record: &FitRecord<'_>, timing: &Timing, out: &str) -> String {
     let _ = writeln!(text, "\n{}", wrap(&format!("seconds: {} ({workers})", seconds.join(", "))));
     let _ = writeln!(text, "results: {out}");
     text
+}
+
+/// How good the match is, in a sentence, with what noise alone costs.
+fn verdict(record: &FitRecord<'_>) -> String {
+    let verdict = record.verdict();
+    let meaning = match verdict {
+        Verdict::Indistinguishable => "photo and match look the same side by side",
+        Verdict::Close => "photo and match look alike; differences show where one looks for them",
+        Verdict::VisibleDifference => "the same kind of material, but anyone sees differences",
+        Verdict::NoMatch => "the material is another one, or the map, the camera or the object's place is wrong",
+    };
+    let noise = record.outcome.noise.map_or_else(String::new, |(noise, (_, object))| {
+        format!(". The photo's noise of {:.1} % alone costs {object:.4} on the object", 100.0 * noise)
+    });
+    format!("verdict: {verdict} ({meaning}){noise}")
+}
+
+/// The models that were compared, one row each; empty for a single one.
+fn models(record: &FitRecord<'_>) -> String {
+    let (methods, FitOutcome { tried, chosen, .. }) = (record.methods, record.outcome);
+    if tried.len() < 2 {
+        return String::new();
+    }
+    let header = ["model", "CSSIM on object", "CSSIM on image", ""].map(str::to_owned).to_vec();
+    let row = |(i, (method, tried)): (usize, (&Method, &Tried))| {
+        let mark = if i == *chosen { "chosen: " } else { "" };
+        let scores = [tried.cssim_object, tried.cssim].map(|score| format!("{score:.4}"));
+        let name = methods.label(method);
+        [name].into_iter().chain(scores).chain([format!("{mark}{}", why(tried, i, *chosen))]).collect()
+    };
+    let rows = std::iter::once(header).chain(methods.iter().zip(tried).enumerate().map(row)).collect::<Vec<_>>();
+    format!("\n{}", aligned(&rows))
 }
 
 /// One row per score and parameter, one column per result. A model may have too many parameters for columns.

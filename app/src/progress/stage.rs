@@ -122,7 +122,7 @@ impl Tally {
             nodes::TRANSPORT | nodes::TRANSPORT_COARSE => Stage::Tables,
             nodes::SEARCH | nodes::BRUTE_FORCE => Stage::Searches,
             nodes::TRANSPORT_FULL | nodes::SELECT | nodes::APPRAISE => Stage::Judging,
-            nodes::EXPLORE | nodes::POLISH => Stage::Polish,
+            nodes::SCOUT | nodes::EXPLORE | nodes::POLISH => Stage::Polish,
             nodes::REPORT | nodes::RENDER => Stage::Pictures,
             _ => return None,
         })

@@ -1,7 +1,7 @@
 //! The settings of `lookalike batch`.
 
 use super::{CaptureSettings, ClusterSettings, DisplayExposure, MetricsAddress, OldFiles, ProgressKind};
-use lookalike::fit::Method;
+use lookalike::fit::Methods;
 use std::{ffi::OsString, path::PathBuf};
 
 /// Many fits as one run.
@@ -46,7 +46,7 @@ pub struct BatchFit {
     /// The photo with its scene.
     pub capture: CaptureSettings,
     /// How to fit.
-    pub method: Method,
+    pub methods: Methods,
     /// Exposure before the metric.
     pub display_exposure: DisplayExposure,
     /// A final CSSIM above this makes the exit code 1; finite, at or above 0.

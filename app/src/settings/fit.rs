@@ -1,7 +1,7 @@
 //! The settings of `lookalike fit`.
 
 use super::{CaptureSettings, ClusterSettings, DisplayExposure, MetricsAddress, OldFiles, ProgressKind};
-use lookalike::fit::Method;
+use lookalike::fit::Methods;
 use std::path::PathBuf;
 
 /// One photo, its light, and how to fit it.
@@ -9,8 +9,8 @@ use std::path::PathBuf;
 pub struct FitSettings {
     /// The photo with its scene.
     pub capture: CaptureSettings,
-    /// How to fit.
-    pub method: Method,
+    /// How to fit, with which models.
+    pub methods: Methods,
     /// Exposure before the metric.
     pub display_exposure: DisplayExposure,
     /// A final CSSIM above this makes the exit code 1; finite, at or above 0.

@@ -31,7 +31,7 @@ pub use demo::DemoSettings;
 pub use exposure::DisplayExposure;
 pub use fit::FitSettings;
 pub use metrics::MetricsAddress;
-pub use model::{ModelBounds, ModelName, ModelParams, ModelParser};
+pub use model::{FitModels, FitModelsParser, ModelBounds, ModelName, ModelParams, ModelParser};
 pub use old_files::OldFiles;
 pub use render::{Material, RenderSettings};
 pub use scene::{CaptureSettings, EnvironmentSettings, ViewSettings};

@@ -6,7 +6,10 @@ use clap::{
     builder::{EnumValueParser, PossibleValue, TypedValueParser},
     error::ErrorKind,
 };
-use lookalike::brdf::{self, DEFAULT_MODEL, MODELS, Model, ParameterError};
+use lookalike::{
+    brdf::{self, DEFAULT_MODEL, MODELS, Model, ParameterError},
+    fit::Methods,
+};
 use std::{ffi::OsStr, fmt, str::FromStr, sync::LazyLock};
 
 /// A BRDF model of the registry (design section 4).
@@ -77,6 +80,65 @@ impl TypedValueParser for ModelParser {
 
     fn possible_values(&self) -> Option<Box<dyn Iterator<Item = PossibleValue> + '_>> {
         Some(Box::new(ModelName::value_variants().iter().filter_map(ValueEnum::to_possible_value)))
+    }
+}
+
+/// The models that a fit tries.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum FitModels {
+    /// Those of [`AUTO`](brdf::AUTO).
+    Auto,
+    /// These, from simple to rich.
+    List(Vec<ModelName>),
+}
+
+/// The name of [`FitModels::Auto`].
+const AUTO: &str = "auto";
+
+impl fmt::Display for FitModels {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Auto => f.write_str(AUTO),
+            Self::List(models) => f.write_str(&models.iter().map(|model| model.as_str()).collect::<Vec<_>>().join(",")),
+        }
+    }
+}
+
+/// Parses `--model` of a fit: `auto`, or the names of models, separated by commas.
+#[derive(Debug, Clone, Copy)]
+pub struct FitModelsParser;
+
+impl TypedValueParser for FitModelsParser {
+    type Value = FitModels;
+
+    fn parse_ref(&self, command: &Command, flag: Option<&Arg>, value: &OsStr) -> Result<FitModels, clap::Error> {
+        let text = value.to_str().unwrap_or_default();
+        if text == AUTO {
+            return Ok(FitModels::Auto);
+        }
+        let mut models = Vec::new();
+        for name in text.split(',').map(str::trim) {
+            if name == AUTO {
+                let text = "auto stands alone: name the models of a list, separated by commas\n";
+                return Err(command.clone().error(ErrorKind::InvalidValue, text));
+            }
+            if brdf::model(name).is_err_and(|error| matches!(error, ParameterError::UnknownModel { .. })) {
+                let known: Vec<&str> = std::iter::once(AUTO).chain(MODELS.iter().map(|model| model.name())).collect();
+                let flag = flag.map_or_else(String::new, |flag| format!(" for '{flag}'"));
+                let text = format!("invalid value '{name}'{flag}\n  [possible values: {}]\n", known.join(", "));
+                return Err(command.clone().error(ErrorKind::InvalidValue, text));
+            }
+            models.push(ModelParser.parse_ref(command, flag, OsStr::new(name))?);
+        }
+        Ok(FitModels::List(models))
+    }
+
+    fn possible_values(&self) -> Option<Box<dyn Iterator<Item = PossibleValue> + '_>> {
+        let models = Methods::default();
+        let labels: Vec<String> = models.iter().map(|method| models.label(method)).collect();
+        let help = format!("The simplest of these that matches as well as the best: {}", labels.join("; "));
+        let auto = std::iter::once(PossibleValue::new(AUTO).help(help));
+        Some(Box::new(auto.chain(ModelParser.possible_values().into_iter().flatten())))
     }
 }
 

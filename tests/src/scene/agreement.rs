@@ -8,7 +8,8 @@ use lookalike::{
     brdf::{Model, flat_bounds, lobe_terms, term_count},
     math::{Rgb, cell},
     render::{
-        knots::{self, Knots},
+        knots::Knots,
+        spans::LobeKnots,
         table::TransportTable,
         transport::{Accuracy, Pixel, TransportPlan},
     },
@@ -84,9 +85,11 @@ impl References {
     ) -> Self {
         let coarse = coarse_table(scene, model);
         let mut entries = Vec::new();
-        let grids = knots::of_lobes(model, knots);
-        for (lobe, basis) in model.lobes().iter().enumerate().filter(|(_, basis)| keep(basis.lobe.name())) {
-            let mut widths = grids[lobe].map_or_else(|| vec![0.0], |grid| mid_knots(&grid, widths));
+        for LobeKnots { lobe: of_table, knots } in TransportPlan::of_model(model, knots, Accuracy::SUBSET).lobes {
+            let place = model.lobes().iter().position(|basis| basis.lobe.name() == of_table.name());
+            let Some(lobe) = place.filter(|_| keep(of_table.name())) else { continue };
+            let basis = model.lobes()[lobe];
+            let mut widths = knots.map_or_else(|| vec![0.0], |grid| mid_knots(&grid, widths));
             widths.dedup();
             for (w, &width) in widths.iter().enumerate() {
                 let split = SplitLobe { lobe: basis.lobe, width };
@@ -151,7 +154,7 @@ impl References {
     /// Integrates a table of `accuracy` on `knots` and compares every term with its reference.
     #[must_use]
     pub fn compare(&self, scene: &Scene, knots: Knots, accuracy: Accuracy) -> Vec<Agreement> {
-        let plan = TransportPlan { model: self.model, knots, accuracy };
+        let plan = TransportPlan::of_model(self.model, knots, accuracy);
         let table = plan.integrate(&scene.geometry, &scene.pyramid, &self.pixels);
         self.entries.iter().flat_map(|entry| (0..3).map(|channel| self.summary(&table, entry, channel))).collect()
     }
@@ -196,11 +199,8 @@ fn part(model: &dyn Model, table: &TransportTable, lobe: usize, width: f64, chan
 
 /// A table of the whole object for mean radiances: a sphere in few pixels, any other shape at full size.
 fn coarse_table(scene: &Scene, model: &'static dyn Model) -> TransportTable {
-    let plan = TransportPlan {
-        model,
-        knots: Knots::covering(0.005, 1.0, 4.0),
-        accuracy: Accuracy { tolerance: 1e-4, footprint: 1.0 },
-    };
+    let accuracy = Accuracy { tolerance: 1e-4, footprint: 1.0 };
+    let plan = TransportPlan::of_model(model, Knots::covering(0.005, 1.0, 4.0), accuracy);
     if scene.geometry.circle().is_none() {
         return plan.integrate(&scene.geometry, &scene.pyramid, &scene.interior());
     }

@@ -81,7 +81,7 @@ impl Photograph {
 fn radiance(scene: &Scene, material: &Material, pixels: &[Pixel]) -> Vec<Rgb> {
     let (model, parameters) = (material.model(), material.parameters());
     let width = model.lobes().iter().find_map(|basis| basis.width_at(parameters)).unwrap_or(0.5);
-    let plan = TransportPlan { model, knots: Knots::covering(0.8 * width, 1.25 * width, 24.0), accuracy: FINE };
+    let plan = TransportPlan::of_model(model, Knots::covering(0.8 * width, 1.25 * width, 24.0), FINE);
     let table = plan.integrate(&scene.geometry, &scene.pyramid, pixels);
     let mut planes = table.planes();
     table.radiance(model, parameters, &mut planes);

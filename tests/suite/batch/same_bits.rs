@@ -10,7 +10,7 @@ const PICTURES: [&str; 5] = ["match.exr", "match.png", "reference.png", "differe
 fn fits_of_a_batch_equal_single_fits_wherever_they_are_judged() {
     let models = if cfg!(feature = "slow") { "'ggx', 'cook-torrance'" } else { "'ggx'" };
     let folder = folder(&format!(
-        "photos = ['photo.exr', 'red.exr']\nenvironments = 'map.exr'\nmodels = [{models}]\n[defaults]\nsamples = 32\ngammas = '1:2:0.5'\n\
+        "photos = ['photo.exr', 'red.exr']\nenvironments = 'map.exr'\nmodels = [{models}]\n[defaults]\nmodel = 'ggx'\nsamples = 32\ngammas = '1:2:0.5'\n\
          [[fit]]\nname = 'again'\nphoto = 'photo.exr'\nenv = 'map.exr'\njudge = 'object'\n"
     ));
     batch(&folder, "here", "--workers 1").done();
@@ -24,7 +24,7 @@ fn fits_of_a_batch_equal_single_fits_wherever_they_are_judged() {
     ];
     let alone = &alone[..if cfg!(feature = "slow") { 5 } else { 3 }];
     for (name, photo, flags) in alone {
-        let quick = "--samples 32 --gammas 1:2:0.5 --workers 1 --progress none";
+        let quick = "--model ggx --samples 32 --gammas 1:2:0.5 --workers 1 --progress none";
         lookalike(folder.path(), &format!("fit {photo} --env map.exr --out alone/{name} {quick} {flags}")).done();
         let at = |run: &str| folder.path().join(run).join(name);
         for run in ["here", "there"] {

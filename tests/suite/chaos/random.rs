@@ -14,9 +14,9 @@ use crate::fit::scene::{fit, folder_of_size, without_timing};
 
 /// Four shards, the coarse table, eleven searches, full tables, judging, exploration, polish, pictures.
 const FLAGS: &str = if cfg!(feature = "slow") {
-    "--samples 128 --gammas 1:3:0.2 --seed 5"
+    "--model ggx --samples 128 --gammas 1:3:0.2 --seed 5"
 } else {
-    "--samples 128 --gammas 1:3:0.2 --seed 5 --polish off"
+    "--model ggx --samples 128 --gammas 1:3:0.2 --seed 5 --polish off"
 };
 
 /// The files of results that are the same from run to run.

@@ -19,7 +19,7 @@ use crate::fit::scene::{fit, folder_of_size, without_timing};
 const RUNS: u64 = if cfg!(feature = "slow") { 200 } else { 2 };
 
 /// Shards, the coarse table, six searches, full tables, judging, exploration, pictures: at least 16 nodes.
-const FLAGS: &str = "--samples 32 --gammas 1:2:0.2 --seed 5 --polish off";
+const FLAGS: &str = "--model ggx --samples 32 --gammas 1:2:0.2 --seed 5 --polish off";
 
 /// Columns and rows of the photo.
 const SIZE: usize = 24;

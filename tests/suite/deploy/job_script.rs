@@ -14,7 +14,7 @@ use std::{
 use tempfile::TempDir;
 
 /// Several shards of the subset's table, so that a process can be killed between them.
-const FLAGS: &str = "--samples 128 --gammas 1:2:0.5 --seed 5 --polish off";
+const FLAGS: &str = "--model ggx --samples 128 --gammas 1:2:0.5 --seed 5 --polish off";
 
 /// The fit by this machine alone.
 static LOCAL: Finished = Finished::new(FLAGS);

@@ -78,7 +78,7 @@ fn output_folder_that_cannot_be_created_is_refused_before_any_work() {
 fn unknown_model_is_refused_with_a_list_of_models() {
     let folder = folder();
     let answer = fit(folder.path(), "out", &format!("{QUICK} --model phong"));
-    answer.refused(&["--model", "phong", "ggx, cook-torrance"]);
+    answer.refused(&["--model", "phong", "ggx, ggx-haze, cook-torrance"]);
     assert!(!folder.path().join("out").exists());
 }
 

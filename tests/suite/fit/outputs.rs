@@ -23,9 +23,35 @@ fn check_ggx(parameters: &Value) {
 }
 
 #[test]
+fn every_model_that_was_tried_is_in_fit_json_with_the_reason() {
+    let folder = folder();
+    let answer = fit(folder.path(), "out", "--samples 32 --gammas 1:3:1 --workers 2 --progress none").done();
+    let json = fit_json(&folder.path().join("out"));
+    let models = json["models"].as_array().unwrap();
+    let tried: Vec<(&Value, &Value)> = models.iter().map(|tried| (&tried["model"], &tried["fixed"])).collect();
+    let (ggx, haze) = (json!("ggx"), json!("ggx-haze"));
+    assert_eq!(tried, [(&ggx, &json!({ "f90": 1.0 })), (&ggx, &json!({})), (&haze, &json!({}))]);
+    let chosen: Vec<&Value> = models.iter().filter(|tried| tried["chosen"] == true).collect();
+    let [chosen] = chosen[..] else { panic!("{models:?}") };
+    assert_eq!((&json["model"], &json["fixed"]), (&chosen["model"], &chosen["fixed"]));
+    assert_eq!(
+        (&json["polished"]["cssim"], &json["polished"]["parameters"]),
+        (&chosen["cssim"], &chosen["parameters"])
+    );
+    assert!(answer.stdout.contains("\n  model") && answer.stdout.contains("chosen: "), "{}", answer.stdout);
+    for tried in models {
+        let is_chosen = tried["chosen"] == true;
+        assert!(is_chosen || tried["coarse"] == true || number(&tried["above_best"]["difference"]) >= 0.0, "{tried}");
+        assert!(!tried["why"].as_str().unwrap().is_empty());
+    }
+    let verdict = json["verdict"].as_str().unwrap();
+    assert!(answer.stdout.contains(&format!("verdict: {verdict} (")), "{}", answer.stdout);
+}
+
+#[test]
 fn fit_json_has_the_documented_fields() {
     let folder = folder();
-    let answer = fit(folder.path(), "out", "--samples 32 --workers 2 --seed 3 --progress none").done();
+    let answer = fit(folder.path(), "out", "--model ggx --samples 32 --workers 2 --seed 3 --progress none").done();
     let json = fit_json(&folder.path().join("out"));
     for (name, expected) in [
         ("schema", json!("lookalike.fit/1")),
@@ -164,7 +190,8 @@ fn score_of_the_written_pictures_is_the_reported_score() {
 fn results_fit_in_100_columns_and_notes_stay_whole_in_fit_json() {
     let folder = folder();
     // The winner of two gammas is the first or the last, which gives a note if there is no polish.
-    let fitted = fit(folder.path(), "out", "--samples 32 --gammas 1:1.1:0.1 --polish off --workers 1").done();
+    let fitted =
+        fit(folder.path(), "out", "--model ggx --samples 32 --gammas 1:1.1:0.1 --polish off --workers 1").done();
     let notes = fit_json(&folder.path().join("out"))["notes"].as_array().unwrap().clone();
     assert!(notes.iter().any(|note| note.as_str().unwrap().len() > 100), "{notes:?}");
     let status = lookalike(folder.path(), "status out").done();

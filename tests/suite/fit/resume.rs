@@ -10,9 +10,9 @@ use std::{fs, path::Path, process::Command};
 /// Two shards, the coarse table, two searches, one full table, judging, exploration, polish, pictures: at least 10 nodes; with
 /// `--features slow` four shards and six searches, at least 16 nodes.
 const WITH_POLISH: &str = if cfg!(feature = "slow") {
-    "--samples 128 --gammas 1:2:0.2 --seed 5 --workers 2"
+    "--model ggx --samples 128 --gammas 1:2:0.2 --seed 5 --workers 2"
 } else {
-    "--samples 64 --gammas 1:2:1 --seed 5 --workers 2"
+    "--model ggx --samples 64 --gammas 1:2:1 --seed 5 --workers 2"
 };
 
 /// The undisturbed fit of [`WITH_POLISH`].

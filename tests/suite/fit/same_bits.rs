@@ -24,7 +24,7 @@ use std::{
 };
 
 /// Several shards of the subset's table, so that a worker can be killed between them.
-const FLAGS: &str = "--samples 128 --gammas 1:3:0.5 --seed 5";
+const FLAGS: &str = "--model ggx --samples 128 --gammas 1:3:0.5 --seed 5";
 
 /// The numbers of workers that are compared.
 const WORKERS: &[usize] = if cfg!(feature = "slow") { &[1, 2, 5] } else { &[1, 2] };
@@ -84,6 +84,18 @@ fn results_do_not_depend_on_the_simd_level() {
     assert_eq!(numbers_of(&detected), numbers_of(&baseline));
     assert!(detected.matched == baseline.matched, "the images differ");
     assert!(detected.error_map == baseline.error_map, "the error maps differ");
+}
+
+#[test]
+fn choice_among_models_does_not_depend_on_the_number_of_workers() {
+    let folder = folder();
+    let json = |workers: u32| {
+        let out = format!("auto-{workers}");
+        let flags = format!("--samples 64 --gammas 1:3:1 --seed 5 --workers {workers} --progress none");
+        fit(folder.path(), &out, &flags).done();
+        without_timing(&folder.path().join(out))
+    };
+    assert_eq!(json(1), json(2));
 }
 
 /// The fit of [`FLAGS`] with this number of samples, without workers, at a SIMD level.

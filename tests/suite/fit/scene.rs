@@ -20,10 +20,10 @@ use tempfile::TempDir;
 pub(crate) const SIZE: usize = 32;
 
 /// A cheap fit: few pixels, few gammas, no polish, one worker.
-pub(crate) const QUICK: &str = "--samples 32 --gammas 1:2:0.5 --workers 1 --progress none --polish off";
+pub(crate) const QUICK: &str = "--model ggx --samples 32 --gammas 1:2:0.5 --workers 1 --progress none --polish off";
 
 /// The same with polish.
-pub(crate) const QUICK_POLISHED: &str = "--samples 32 --gammas 1:2:0.5 --workers 1 --progress none";
+pub(crate) const QUICK_POLISHED: &str = "--model ggx --samples 32 --gammas 1:2:0.5 --workers 1 --progress none";
 
 /// A folder with `photo.exr` and `map.exr`.
 pub(crate) fn folder() -> TempDir {
@@ -73,7 +73,7 @@ pub(crate) static QUICK_FIT: Finished = Finished::new(QUICK);
 pub(crate) static POLISHED: Finished = Finished::new(QUICK_POLISHED);
 
 /// Four shards, the coarse table, six searches, one full table, judging, pictures: at least 14 nodes.
-pub(crate) const MANY_NODES: &str = "--samples 128 --gammas 1:2:0.2 --seed 5 --polish off --workers 2";
+pub(crate) const MANY_NODES: &str = "--model ggx --samples 128 --gammas 1:2:0.2 --seed 5 --polish off --workers 2";
 
 /// The fit of [`MANY_NODES`].
 pub(crate) static MANY_NODES_FIT: Finished = Finished::new(MANY_NODES);

@@ -1,8 +1,6 @@
 //! Every setting of the method has the effect, visible in `fit.json`, that its documentation states.
 
-use super::scene::{
-    POLISHED, QUICK, QUICK_FIT, QUICK_POLISHED, fit, fit_json, folder, folder_of_size, number, quick, without_timing,
-};
+use super::scene::{POLISHED, QUICK, QUICK_FIT, fit, fit_json, folder, folder_of_size, number, quick, without_timing};
 use serde_json::{Value, json};
 use std::fs;
 
@@ -17,8 +15,8 @@ fn names(parameters: &Value) -> Vec<&str> {
 #[test]
 fn settings_file_gives_the_result_of_the_flags() {
     let folder = folder();
-    fit(folder.path(), "flags", "--samples 24 --gammas 1:2:1 --seed 9 --polish off --workers 1").done();
-    let text = "photo = \"photo.exr\"\nenv = \"map.exr\"\nout = \"file\"\nsamples = 24\ngammas = \"1:2:1\"\nseed = 4\n\
+    fit(folder.path(), "flags", "--model ggx --samples 24 --gammas 1:2:1 --seed 9 --polish off --workers 1").done();
+    let text = "photo = \"photo.exr\"\nenv = \"map.exr\"\nout = \"file\"\nmodel = \"ggx\"\nsamples = 24\ngammas = \"1:2:1\"\nseed = 4\n\
                 polish = \"off\"\nworkers = 2\n";
     fs::write(folder.path().join("fit.toml"), text).unwrap();
     // A flag takes precedence over the file.
@@ -77,7 +75,8 @@ fn direct_integrator_is_searched_by_pattern_only() {
 #[test]
 fn preset_paper_is_the_method_of_the_paper() {
     let folder = folder();
-    fit(folder.path(), "out", &format!("{QUICK_POLISHED} --preset paper")).done();
+    let flags = "--samples 32 --gammas 1:2:0.5 --workers 1 --progress none --preset paper";
+    fit(folder.path(), "out", flags).done();
     let json = fit_json(&folder.path().join("out"));
     // Explicit flags take precedence over the preset: here those of the quick fit.
     assert_eq!((json["samples"].as_u64(), gammas(&json).len()), (Some(32), 3));

@@ -9,7 +9,7 @@ use super::PROGRAM;
 use crate::fit::scene::{fit, folder, folder_of_size, without_timing};
 
 /// Few nodes, so that the false worker is assigned some.
-const FLAGS: &str = "--samples 32 --gammas 1:2:0.5 --seed 5 --polish off --progress json";
+const FLAGS: &str = "--model ggx --samples 32 --gammas 1:2:0.5 --seed 5 --polish off --progress json";
 
 /// A fit with a worker that returns wrong results of this kind of node, and possibly an honest one: its exit code and output.
 fn fit_with_false_worker(folder: &Path, kind: &str, flags: &str, has_honest: bool) -> (Option<i32>, String) {

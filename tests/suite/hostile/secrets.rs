@@ -44,7 +44,7 @@ fn logs_at_level_trace_do_not_contain_secret_or_key() {
         }),
     );
     write_exr(&folder.path().join("map.exr"), &image(16, 8, |_, y| if y < 4 { [1.0; 3] } else { [0.2; 3] }));
-    let fit = "fit photo.exr --env map.exr --out run --gammas 1:2:1 --samples 32 --polish off --workers 1";
+    let fit = "fit photo.exr --env map.exr --out run --model ggx --gammas 1:2:1 --samples 32 --polish off --workers 1";
     let mut command = Command::new(env!("CARGO_BIN_EXE_lookalike-under-test"));
     command.args(fit.split(' ')).current_dir(folder.path()).env("RUST_LOG", "trace");
     let output = Process::start(&mut command).output();

@@ -34,7 +34,7 @@ fn render(scene: &Scene, pixels: &[Pixel], surface: Surface, accuracy: Accuracy)
         parameters[f90] = 1.0;
     }
     *parameters.last_mut().unwrap() = surface.unwrap_or(0.1);
-    let plan = TransportPlan { model, knots: knots(PER_OCTAVE), accuracy };
+    let plan = TransportPlan::of_model(model, knots(PER_OCTAVE), accuracy);
     let table = plan.integrate(&scene.geometry, &scene.pyramid, pixels);
     let mut planes = table.planes();
     table.radiance(model, &parameters, &mut planes);

@@ -122,7 +122,7 @@ fn compare_with_smaller_parts(
         }
         let integrate = |footprint: f64| {
             let accuracy = Accuracy { footprint, ..Accuracy::SUBSET };
-            TransportPlan { model: *model, knots, accuracy }.integrate(&scene.geometry, &scene.pyramid, &pixels)
+            TransportPlan::of_model(*model, knots, accuracy).integrate(&scene.geometry, &scene.pyramid, &pixels)
         };
         let (ours, fine) = (integrate(Accuracy::SUBSET.footprint), integrate(0.1 * Accuracy::SUBSET.footprint));
         for l in wanted {
@@ -168,7 +168,7 @@ impl Silhouette {
 
     /// The green channel of some pixels by a table of full images.
     fn radiance(&self, pixels: &[Pixel], parameters: &[f64; 8]) -> Vec<f64> {
-        let plan = TransportPlan { model: &Ggx, knots: knots(PER_OCTAVE), accuracy: Accuracy::FULL };
+        let plan = TransportPlan::of_model(&Ggx, knots(PER_OCTAVE), Accuracy::FULL);
         let table = plan.integrate(&self.scene.geometry, &self.scene.pyramid, pixels);
         let mut planes = table.planes();
         table.radiance(&Ggx, parameters, &mut planes);

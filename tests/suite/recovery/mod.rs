@@ -41,7 +41,7 @@ impl Session {
         let material = Material::new(model, truth.clone()).unwrap();
         let photo = Photograph::take(scene, &material, exposure);
         let knots = Knots::covering(0.005, 1.0, PER_OCTAVE);
-        let plan = TransportPlan { model, knots, accuracy: Accuracy::SUBSET };
+        let plan = TransportPlan::of_model(model, knots, Accuracy::SUBSET);
         let table = plan.integrate(&scene.geometry, &scene.pyramid, &photo.subset.pixels);
         Self { model, truth, photo, table }
     }

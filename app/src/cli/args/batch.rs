@@ -106,7 +106,7 @@ impl EntryArgs {
             line,
             capture: self.capture.into_settings()?,
             display_exposure: self.method.display_exposure.clone(),
-            method: self.method.into_method()?,
+            methods: self.method.into_methods()?,
             max_cssim: self.max_cssim,
         })
     }

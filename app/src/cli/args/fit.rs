@@ -56,7 +56,7 @@ impl FitArgs {
         Ok(FitSettings {
             capture: self.capture.into_settings()?,
             display_exposure: self.method.display_exposure.clone(),
-            method: self.method.into_method()?,
+            methods: self.method.into_methods()?,
             max_cssim: self.output.max_cssim,
             out: self.output.out,
             old_files: OldFilesFlags { resume: self.output.resume, force: self.output.force }.into(),

@@ -1,11 +1,12 @@
 //! Flags of the method.
 
 use super::{super::preset, choice::choice};
-use crate::settings::{DisplayExposure, ModelBounds, ModelName, ModelParams, ModelParser, Preset};
+use crate::settings::{DisplayExposure, FitModels, FitModelsParser, ModelBounds, ModelName, ModelParams, Preset};
 use anyhow::Context;
 use clap::{Args, ValueEnum};
 use lookalike::{
-    fit::{Gammas, Integration, JudgedBy, Method, Ranges, SearchKind},
+    brdf::{DEFAULT_MODEL, Model},
+    fit::{Gammas, Integration, JudgedBy, Method, Methods, Ranges, SearchKind},
     render::subset::{SampleCount, Sampling},
 };
 use std::num::NonZeroU32;
@@ -17,9 +18,10 @@ pub(crate) struct MethodArgs {
     /// from one start, 21 gammas, no polish
     #[arg(long, value_name = "PRESET", value_enum)]
     pub(crate) preset: Option<Preset>,
-    /// BRDF model
-    #[arg(long, value_name = "NAME", value_parser = ModelParser, default_value_t)]
-    model: ModelName,
+    /// BRDF model: auto, one name, or several separated by commas, from simple to rich: the simplest one that matches as well as the
+    /// best is kept
+    #[arg(long, value_name = "NAME[,..]", value_parser = FitModelsParser, default_value_t = FitModels::Auto)]
+    model: FitModels,
     /// Hold parameters of the model at these values, such as f90=1 or kd=0,f0=.04; a colour takes one number or three
     #[arg(long, value_name = "NAME=V[,..]")]
     fix: Option<ModelParams>,
@@ -63,17 +65,17 @@ pub(crate) struct MethodArgs {
 impl MethodArgs {
     /// # Errors
     /// If the model has no parameter of a name in `--fix` or `--bounds`, or a value is outside its range.
-    pub(crate) fn into_method(self) -> anyhow::Result<Method> {
-        let (model, mut ranges) = (self.model.model(), Ranges::default());
-        for (name, values) in self.fix.iter().flat_map(ModelParams::entries) {
-            ranges.hold(model, name, values).with_context(|| format!("--fix {name}"))?;
-        }
-        for (name, lower, upper) in self.bounds.iter().flat_map(ModelBounds::entries) {
-            ranges.narrow(model, name, *lower, *upper).with_context(|| format!("--bounds {name}"))?;
-        }
-        Ok(Method {
-            model,
-            ranges,
+    pub(crate) fn into_methods(self) -> anyhow::Result<Methods> {
+        let models = match &self.model {
+            FitModels::Auto => Methods::auto(&self.ranges(DEFAULT_MODEL)?).context("--model auto")?,
+            FitModels::List(models) => {
+                let model = |name: &ModelName| Ok((name.model(), self.ranges(name.model())?));
+                models.iter().map(model).collect::<anyhow::Result<_>>()?
+            }
+        };
+        let method = Method {
+            model: DEFAULT_MODEL,
+            ranges: Ranges::default(),
             gammas: self.gammas.values(),
             samples: self.samples,
             sampling: self.sampling,
@@ -85,7 +87,20 @@ impl MethodArgs {
             polish: matches!(self.polish, Switch::On),
             judge: self.judge,
             seed: self.seed,
-        })
+        };
+        Ok(Methods::new(method, models))
+    }
+
+    /// The ranges of `--fix` and `--bounds` for a model.
+    fn ranges(&self, model: &dyn Model) -> anyhow::Result<Ranges> {
+        let mut ranges = Ranges::default();
+        for (name, values) in self.fix.iter().flat_map(ModelParams::entries) {
+            ranges.hold(model, name, values).with_context(|| format!("--fix {name}"))?;
+        }
+        for (name, lower, upper) in self.bounds.iter().flat_map(ModelBounds::entries) {
+            ranges.narrow(model, name, *lower, *upper).with_context(|| format!("--bounds {name}"))?;
+        }
+        Ok(ranges)
     }
 }
 

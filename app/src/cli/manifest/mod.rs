@@ -293,7 +293,7 @@ impl<'a> Reader<'a> {
             Some(name) => name,
             None => {
                 let (photo, light) = (&fit.capture.photo, &fit.capture.environment.path);
-                names::of_inputs(draft.prefix.as_deref(), photo, light, fit.method.model.name())
+                names::of_inputs(draft.prefix.as_deref(), photo, light, &fit.methods.name())
             }
         };
         names::check(&fit.name, names::MADE)?;

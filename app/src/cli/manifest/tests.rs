@@ -48,15 +48,15 @@ fn product_is_every_photo_under_every_light_with_every_model() {
     assert_eq!(names(&fits), expected);
     assert_eq!(fits[7].capture.photo, folder.path().join("in/b.exr"));
     assert_eq!(fits[7].capture.environment.path, folder.path().join("n.hdr"));
-    assert_eq!((fits[7].method.model.name(), fits[7].line), ("cook-torrance", 1));
+    assert_eq!((&*fits[7].methods.name(), fits[7].line), ("cook-torrance", 1));
 }
 
 #[test]
 fn single_files_need_no_list_and_need_not_exist() {
     let fits = fits("photos = 'a [1].exr'\nenvironments = 'm.hdr'\n", &["a 1.exr"]);
-    assert_eq!(names(&fits), ["a_1-m-ggx"], "brackets are a pattern");
+    assert_eq!(names(&fits), ["a_1-m-auto"], "brackets are a pattern");
     let fits = self::fits("photos = 'not-there.exr'\nenvironments = 'm.hdr'\n", &[]);
-    assert_eq!(names(&fits), ["not-there-m-ggx"]);
+    assert_eq!(names(&fits), ["not-there-m-auto"]);
 }
 
 #[test]
@@ -67,9 +67,12 @@ fn later_settings_win_defaults_then_set_or_fit_then_the_command_line() {
     let folder = folder(text, &[]);
     let of = |given: &[&str]| read_with(&folder, given).unwrap();
     let fits = of(&[]);
-    assert_eq!(names(&fits), ["a-m-ggx", "other"]);
-    assert_eq!((fits[0].method.seed, fits[1].method.seed), (2, 3));
-    assert_eq!((fits[0].method.samples, fits[1].method.samples), (fits[0].method.samples, "64".parse().unwrap()));
+    assert_eq!(names(&fits), ["a-m-auto", "other"]);
+    assert_eq!((fits[0].methods.common().seed, fits[1].methods.common().seed), (2, 3));
+    assert_eq!(
+        (fits[0].methods.common().samples, fits[1].methods.common().samples),
+        (fits[0].methods.common().samples, "64".parse().unwrap())
+    );
     assert_eq!([0, 1].map(|i: usize| fits[i].capture.environment.rotation_deg), [10.0, 10.0]);
     assert_eq!([0, 1].map(|i: usize| fits[i].capture.mask.clone()), [Some(folder.path().join("mask.png")), None]);
     assert_eq!((fits[0].max_cssim, fits[1].max_cssim), (None, Some(0.1)));
@@ -77,7 +80,7 @@ fn later_settings_win_defaults_then_set_or_fit_then_the_command_line() {
     assert_eq!((fits[0].line, fits[1].line), (6, 10));
     let fits = of(&["--seed=9", "--model=cook-torrance"]);
     assert_eq!(names(&fits), ["a-m-cook-torrance", "other"]);
-    assert!(fits.iter().all(|fit| fit.method.seed == 9));
+    assert!(fits.iter().all(|fit| fit.methods.common().seed == 9));
 }
 
 #[test]
@@ -85,14 +88,17 @@ fn presets_come_before_everything_else() {
     let text = "photos = ['a.exr', 'b.exr']\nenvironments = 'm.hdr'\n[defaults]\npreset = 'paper'\nsamples = 32\n";
     let fits = fits(text, &[]);
     assert_eq!(names(&fits), ["a-m-cook-torrance", "b-m-cook-torrance"]);
-    assert_eq!((fits[1].method.search, fits[1].method.samples), (SearchKind::Pattern, "32".parse().unwrap()));
+    assert_eq!(
+        (fits[1].methods.common().search, fits[1].methods.common().samples),
+        (SearchKind::Pattern, "32".parse().unwrap())
+    );
 }
 
 #[test]
 fn name_of_a_set_is_a_prefix_of_the_names_of_its_fits() {
     let text = "[[set]]\nname = 'day'\nphotos = 'a.exr'\nenv = 'm.hdr'\n[[set]]\nname = 'turned'\nphotos = 'a.exr'\n\
                 env = 'm.hdr'\nenv-rotation = 90\n";
-    assert_eq!(names(&fits(text, &[])), ["day-a-m-ggx", "turned-a-m-ggx"]);
+    assert_eq!(names(&fits(text, &[])), ["day-a-m-auto", "turned-a-m-auto"]);
 }
 
 /// What is said of a manifest.
@@ -125,7 +131,7 @@ fn mistakes_are_reported_with_line_and_key() {
         ("photos = 'a.exr'", "batch.toml:1: a.exr has no light; give env or environments"),
         (
             "photos = 'a.exr'\nenvironments = 'm.hdr'\nmodels = 'phong'",
-            "batch.toml:1: invalid value 'phong' for '--model <NAME>'",
+            "batch.toml:1: invalid value 'phong' for '--model <NAME[,..]>'",
         ),
         (
             "[defaults]\nsampels = 3\n[[fit]]\nphoto = 'a.exr'\nenv = 'm.hdr'",
@@ -154,7 +160,7 @@ fn mistakes_are_reported_with_line_and_key() {
             "[[fit]]\nphotos = 'a.exr'\nenv = 'm.hdr'",
             "batch.toml:2: unknown key \"photos\"; the nearest one is \"photo\"",
         ),
-        ("photos = ['a.exr', 'in/a.exr']\nenvironments = 'm.hdr'", "two fits are named \"a-m-ggx\"; list a file once"),
+        ("photos = ['a.exr', 'in/a.exr']\nenvironments = 'm.hdr'", "two fits are named \"a-m-auto\"; list a file once"),
         (
             "[[fit]]\nphoto = 'a.exr'\nenv = 'm.hdr'\nname = 'x'\n[[fit]]\nphoto = 'b.exr'\nenv = 'm.hdr'\nname = 'X'",
             "batch.toml:5: two fits are named \"X\", the other one on line 1",
@@ -169,7 +175,7 @@ fn mistakes_are_reported_with_line_and_key() {
 fn name_that_is_too_long_by_itself_has_a_way_out() {
     let said = refusal(&format!("photos = '{}.exr'\nenvironments = 'm.hdr'", "x".repeat(200)));
     assert!(said.ends_with("; give the fit a name in a [[fit]], or rename the photo"), "{said}");
-    assert_eq!(names(&fits("photos = 'run.0001.exr'\nenvironments = 'm.hdr'", &[])), ["run.0001-m-ggx"]);
+    assert_eq!(names(&fits("photos = 'run.0001.exr'\nenvironments = 'm.hdr'", &[])), ["run.0001-m-auto"]);
 }
 
 #[test]
