@@ -91,7 +91,7 @@ def main():
     with tempfile.TemporaryDirectory() as out:
         before = resource.getrusage(resource.RUSAGE_CHILDREN)
         wall = time.perf_counter()
-        line = [options.lookalike, "fit", options.photo, "--env", options.map, "--out", out + "/fit", "--progress", "none"]
+        line = [options.lookalike, "fit", options.photo, "--env", options.map, "--model", "ggx", "--out", out + "/fit", "--progress", "none"]
         subprocess.run([str(part) for part in line], check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         wall = time.perf_counter() - wall
         after = resource.getrusage(resource.RUSAGE_CHILDREN)

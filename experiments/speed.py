@@ -16,14 +16,16 @@ import subprocess
 import sys
 import tempfile
 
+GGX = ["--model", "ggx"]
 # By name: what it is, parameters of the photo (`ggx`), side in pixels, probe, flags of the fit.
 PHOTOS = {
-    "256": ("256 px, alpha .1", "kd=.4,.15,.08,f0=.05,alpha=.1", 256, "uffizi.hdr", []),
-    "128 sharp": ("128 px, alpha .02", "kd=.02,f0=.9,alpha=.02", 128, "uffizi.hdr", []),
+    "256": ("256 px, alpha .1", "kd=.4,.15,.08,f0=.05,alpha=.1", 256, "uffizi.hdr", GGX),
+    "256 auto": ("the same, auto", "kd=.4,.15,.08,f0=.05,alpha=.1", 256, "uffizi.hdr", []),
+    "128 sharp": ("128 px, alpha .02", "kd=.02,f0=.9,alpha=.02", 128, "uffizi.hdr", GGX),
     "cook-torrance": ("the same, cook-torrance", "kd=.02,f0=.9,alpha=.02", 128, "uffizi.hdr", ["--model", "cook-torrance"]),
     "disney": ("the same, disney", "kd=.02,f0=.9,alpha=.02", 128, "uffizi.hdr", ["--model", "disney"]),
-    "512": ("512 px, alpha .1", "kd=.4,.15,.08,f0=.05,alpha=.1", 512, "uffizi.hdr", []),
-    "1024": ("1024 px, alpha .1", "kd=.4,.15,.08,f0=.05,alpha=.1", 1024, "uffizi.hdr", []),
+    "512": ("512 px, alpha .1", "kd=.4,.15,.08,f0=.05,alpha=.1", 512, "uffizi.hdr", GGX),
+    "1024": ("1024 px, alpha .1", "kd=.4,.15,.08,f0=.05,alpha=.1", 1024, "uffizi.hdr", GGX),
 }
 
 
