@@ -62,7 +62,9 @@ fn models(record: &FitRecord<'_>) -> String {
     let header = ["model", "CSSIM on object", "CSSIM on image", ""].map(str::to_owned).to_vec();
     let row = |(i, (method, tried)): (usize, (&Method, &Tried))| {
         let mark = if i == *chosen { "chosen: " } else { "" };
-        let scores = [tried.cssim_object, tried.cssim].map(|score| format!("{score:.4}"));
+        // Scores on another picture cannot be compared.
+        let shown = |score: f64| if tried.is_coarse { "-".to_owned() } else { format!("{score:.4}") };
+        let scores = [tried.cssim_object, tried.cssim].map(shown);
         let name = methods.label(method);
         [name].into_iter().chain(scores).chain([format!("{mark}{}", why(tried, i, *chosen))]).collect()
     };
