@@ -24,7 +24,7 @@ const TRIAL: usize = 80;
 /// Decrease of CSSIM below which two iterations in a row end a search. Evaluations cost little here, and save some at full resolution.
 const TOLERANCE: f64 = 4e-6;
 
-/// Most trials that are continued. A sharp lobe may score worse than a wide one after the trials and better at the end (specular red phenolic
+/// Trials that are continued. A sharp lobe may score worse than a wide one after the trials and better at the end (specular red phenolic
 /// under Eucalyptus Grove: .2393 against .2339 after the trials, .2246 against .2322 at the end).
 const CONTINUED: usize = 2;
 
@@ -98,14 +98,9 @@ pub(crate) fn can_follow(model: &dyn Model, other: &dyn Model) -> bool {
     other.parameters().iter().all(has)
 }
 
-/// Trials that are continued: of every two one, at most [`CONTINUED`].
-fn continued(starts: usize) -> usize {
-    CONTINUED.min(starts / 2).max(1)
-}
-
 /// Most evaluations in all of an exploration from so many starts.
 pub(crate) fn most_evaluations(starts: usize, max_evaluations: usize) -> usize {
-    starts * max_evaluations.min(TRIAL) + continued(starts) * max_evaluations
+    starts * max_evaluations.min(TRIAL) + CONTINUED * max_evaluations
 }
 
 /// Searches from every start for a while, continues from the best results, and returns the one of lowest score, the first of equal ones.
@@ -135,9 +130,7 @@ pub(crate) fn explore(
         }
     }
     found.sort_by(|a, b| score(a).total_cmp(&score(b)));
-    for trial in
-        found.iter_mut().take(continued(starts.len())).filter(|trial| trial.termination == Termination::MaxEvaluations)
-    {
+    for trial in found.iter_mut().take(CONTINUED).filter(|trial| trial.termination == Termination::MaxEvaluations) {
         // It ends no worse than it starts; if it fails, the trial stands.
         if let Ok(further) = search(trial.parameters.clone(), max_evaluations) {
             spent += further.evaluations;

@@ -50,7 +50,7 @@ impl Methods {
         let of_model = |&(model, held): &HeldModel| {
             ranges.check(model)?;
             let mut all = ranges.clone();
-            for (name, value) in held.iter().filter(|(name, _)| !ranges.name(name)) {
+            for (name, value) in held.iter().filter(|(name, _)| !ranges.has(name)) {
                 all.hold(model, name, &[*value])?;
             }
             Ok((model, all))

@@ -61,7 +61,7 @@ impl Ranges {
     }
 
     /// Whether a parameter of this name has a range.
-    pub(crate) fn name(&self, name: &str) -> bool {
+    pub(crate) fn has(&self, name: &str) -> bool {
         self.0.iter().any(|range| range.name == name)
     }
 
@@ -74,7 +74,7 @@ impl Ranges {
 
     fn add(&mut self, parameter: &Parameter, lower: Vec<f64>, upper: Vec<f64>) -> Result<(), ParameterError> {
         let &Parameter { name, lower: least, upper: most, .. } = parameter;
-        if self.name(name) {
+        if self.has(name) {
             return Err(ParameterError::Twice { name });
         }
         if let Some(&found) = lower.iter().chain(&upper).find(|x| !(least..=most).contains(*x)) {

@@ -39,10 +39,18 @@ fn every_model_that_was_tried_is_in_fit_json_with_the_reason() {
         (&chosen["cssim"], &chosen["parameters"])
     );
     assert!(answer.stdout.contains("\n  model") && answer.stdout.contains("chosen: "), "{}", answer.stdout);
-    for tried in models {
-        let is_chosen = tried["chosen"] == true;
-        assert!(is_chosen || tried["coarse"] == true || number(&tried["above_best"]["difference"]) >= 0.0, "{tried}");
-        assert!(!tried["why"].as_str().unwrap().is_empty());
+    // Simpler ones than the chosen one are worse than the best by more than the tolerance, those given up by three times it.
+    for (i, tried) in models.iter().enumerate() {
+        let of_best = |name: &str| number(&tried["above_best"][name]);
+        let (is_given_up, is_before) =
+            (tried["coarse"] == true, models[..i].iter().all(|other| other["chosen"] == false));
+        let least = if is_given_up { 3.0 } else { 1.0 };
+        let is_worse = of_best("difference") > least * of_best("tolerance");
+        let is_excluded = is_given_up || (is_before && tried["chosen"] == false);
+        assert!(!is_excluded || is_worse, "{tried}");
+        assert!(tried["chosen"] == false || (!is_given_up && of_best("difference") <= of_best("tolerance")), "{tried}");
+        let why = tried["why"].as_str().unwrap();
+        assert_eq!(why.starts_with("given up on a coarse picture"), is_given_up, "{why}");
     }
     let verdict = json["verdict"].as_str().unwrap();
     assert!(answer.stdout.contains(&format!("verdict: {verdict} (")), "{}", answer.stdout);
