@@ -1,13 +1,13 @@
 //! Notes for the user on a result.
 
 use lookalike::{
-    brdf::{Model, flat_bounds, flat_names},
-    fit::{Method, Ranges, Uncertainty, gamma_range},
+    brdf::{Model, flat_bounds, flat_names, main_lobe},
+    fit::{Known, Method, Ranges, Standing, Uncertainty, gamma_range},
     plan::FitOutcome,
 };
 
-/// Notes on the winner: without polish, its gamma is the first or the last one; parameters are at their bounds, it reflects more light than it
-/// receives.
+/// Notes on the result: without polish, its gamma is the first or the last one; polish left the lobe of stage two; parameters are at their bounds
+/// or not determined; it reflects more light than it receives.
 pub(crate) fn notes(method: &Method, outcome: &FitOutcome) -> Vec<String> {
     let winner = &outcome.judged[outcome.winner].candidate;
     let last = outcome.polished.as_ref().map_or(&winner.parameters, |p| &p.parameters);
@@ -28,10 +28,16 @@ pub(crate) fn notes(method: &Method, outcome: &FitOutcome) -> Vec<String> {
             ));
         }
     }
-    let known = |i: usize| !matches!(outcome.uncertainty.get(i), Some(Uncertainty::Undetermined | Uncertainty::Held));
+    let entries = &outcome.uncertainty.entries;
+    let known = |i: usize| {
+        let standing = entries.get(i).map(|known| known.standing);
+        !matches!(standing, Some(Standing::Undetermined | Standing::Held))
+    };
+    notes.extend(jumped(method.model, &winner.parameters, last, entries));
     notes.extend(at_bounds(method.model, &method.ranges, last, known));
     notes.extend(method.model.remark(last, &known));
-    notes.extend(undetermined(method.model, &outcome.uncertainty));
+    notes.extend(undetermined(method.model, entries));
+    notes.extend(trade(method.model, &outcome.uncertainty));
     notes.extend(bright(method.model, last));
     notes
 }
@@ -63,14 +69,49 @@ fn at_bounds(
     (!limited.is_empty()).then(|| format!("at the end of the range: {list}; a value beyond it may match better"))
 }
 
+/// The lobes of two widths look different if their ratio is above this.
+const OTHER_LOBE: f64 = 1.25;
+
+/// Polish may end at another lobe than that of stage two, which the cost of stage one did not find.
+fn jumped(model: &dyn Model, won: &[f64], last: &[f64], entries: &[Known]) -> Option<String> {
+    let (_, width) = main_lobe(model)?;
+    let ratio = width.at(last) / width.at(won);
+    let (name, before, after) =
+        (flat_names(model.parameters()).swap_remove(width.entry), won[width.entry], last[width.entry]);
+    let is_outside = entries.get(width.entry).is_some_and(|known| !(known.low..=known.high).contains(&before));
+    (is_outside && !(1.0 / OTHER_LOBE..=OTHER_LOBE).contains(&ratio)).then(|| {
+        format!(
+            "polish found another lobe than stage two: {name} {before:.3} became {after:.3}. The material may have \
+             both, or the light may be blurred; look at match.png before you trust either"
+        )
+    })
+}
+
+/// Parameters of which one can make up for another, strongest first, by name.
+fn trade(model: &dyn Model, uncertainty: &Uncertainty) -> Option<String> {
+    let names = flat_names(model.parameters());
+    let of = |i: usize| names[i].split('.').next().unwrap_or_default();
+    let mut pairs: Vec<String> = Vec::new();
+    for &(a, b) in uncertainty.trades.iter().filter(|(a, b)| of(*a) != of(*b)) {
+        let pair = format!("{} and {}", of(a), of(b));
+        if !pairs.contains(&pair) {
+            pairs.push(pair);
+        }
+    }
+    let list = pairs.join(", ");
+    (!list.is_empty()).then(|| {
+        format!("within their ranges these make up for each other: {list}; hold one of them with --fix if you know it")
+    })
+}
+
 /// The parameters that the photo does not determine: values from much of their range match it equally well.
-fn undetermined(model: &dyn Model, uncertainty: &[Uncertainty]) -> Option<String> {
+fn undetermined(model: &dyn Model, known: &[Known]) -> Option<String> {
     let names = flat_names(model.parameters());
     let mut list = Vec::new();
     let mut first = 0;
     for parameter in model.parameters() {
         let entries = first..first + parameter.channels.count();
-        let open: Vec<usize> = entries.clone().filter(|&i| uncertainty[i] == Uncertainty::Undetermined).collect();
+        let open: Vec<usize> = entries.clone().filter(|&i| known[i].standing == Standing::Undetermined).collect();
         if open.len() == entries.len() {
             list.push(parameter.name.to_owned());
         } else {
@@ -98,18 +139,37 @@ mod tests {
     use super::*;
     use lookalike::brdf::{CookTorrance, Disney, Ggx};
 
-    const KNOWN: Uncertainty = Uncertainty::StandardError(0.01);
+    const KNOWN: Known = Known { low: 0.1, high: 0.2, standing: Standing::Determined };
 
     #[test]
     fn parameters_that_are_not_determined_are_named_in_one_note() {
         let mut uncertainty = [KNOWN; 8];
-        uncertainty[3] = Uncertainty::AtBound;
+        uncertainty[3].standing = Standing::AtBound;
         assert_eq!(undetermined(&CookTorrance, &uncertainty), None);
         for open in [1, 3, 4, 5, 7] {
-            uncertainty[open] = Uncertainty::Undetermined;
+            uncertainty[open].standing = Standing::Undetermined;
         }
         let note = undetermined(&CookTorrance, &uncertainty).unwrap();
         assert!(note.starts_with("the photo does not determine kd.g, ks, m: other values look the same"), "{note}");
+    }
+
+    #[test]
+    fn parameters_that_trade_are_named_once() {
+        let of =
+            |trades: &[(usize, usize)]| trade(&Ggx, &Uncertainty { entries: vec![KNOWN; 8], trades: trades.to_vec() });
+        let note = of(&[(3, 6), (4, 6), (0, 3), (0, 1)]).unwrap();
+        assert!(note.contains("f0 and f90, kd and f0;"), "{note}");
+        assert_eq!(of(&[(0, 1)]), None, "channels of one colour");
+    }
+
+    #[test]
+    fn another_lobe_than_that_of_stage_two_is_said() {
+        let with = |alpha: f64| [0.3, 0.3, 0.3, 0.04, 0.04, 0.04, 1.0, alpha];
+        let entries = |low, high| [[KNOWN; 7].to_vec(), vec![Known { low, high, ..KNOWN }]].concat();
+        let note = jumped(&Ggx, &with(0.318), &with(0.057), &entries(0.05, 0.06)).unwrap();
+        assert!(note.contains("alpha 0.318 became 0.057"), "{note}");
+        assert_eq!(jumped(&Ggx, &with(0.062), &with(0.057), &entries(0.05, 0.06)), None, "nearly the same");
+        assert_eq!(jumped(&Ggx, &with(0.318), &with(0.2), &entries(0.1, 0.4)), None, "within the range");
     }
 
     #[test]

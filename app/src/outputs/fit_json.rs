@@ -5,8 +5,9 @@
 
 use super::conventions;
 use lookalike::{
-    brdf::{Channels, Model},
-    fit::{Judged, Method, Methods, Tried, Uncertainty, Verdict},
+    brdf::{Channels, Model, flat_names},
+    fit::{Judged, Known, Method, Methods, Neighbour, Standing, Tried, Uncertainty, Verdict, spread},
+    light::FORMULA_LIGHTS,
     plan::FitOutcome,
     scene::Capture,
 };
@@ -74,11 +75,6 @@ impl FitRecord<'_> {
         let mut stage_two = json!({ "gamma": winner.candidate.gamma, "subset": winner.candidate.subset });
         merge(&mut stage_two, score(winner.cssim, winner.cssim_object));
         merge(&mut stage_two, json!({ "parameters": parameters_json(model, &winner.candidate.parameters) }));
-        let winner_parameters = &winner.candidate.parameters;
-        merge(
-            &mut stage_two,
-            json!({ "uncertainty": uncertainty_json(model, winner_parameters, &self.outcome.uncertainty) }),
-        );
         let polished = self.outcome.polished.as_ref().map(|p| {
             let mut entry = score(p.cssim, p.cssim_object);
             merge(&mut entry, json!({ "parameters": parameters_json(model, &p.parameters) }));
@@ -114,6 +110,8 @@ impl FitRecord<'_> {
             "verdict": self.verdict().to_string(),
             "stage_two": stage_two,
             "polished": polished,
+            "uncertainty": uncertainty_json(model, &self.outcome.uncertainty),
+            "relighting": relighting_json(&self.outcome.neighbours),
             "notes": self.notes,
             "timing": timing.json(),
         });
@@ -208,21 +206,31 @@ fn by_name(model: &dyn Model, entries: &[Value]) -> Value {
     Value::Object(object)
 }
 
-/// How well the photo determines each parameter: the standard error relative to the value (`null` if it is unknown), and
-/// whether the value is `determined`, `at-bound`, `undetermined`, or `held` by the settings.
-fn uncertainty_json(model: &dyn Model, parameters: &[f64], uncertainty: &[Uncertainty]) -> Value {
-    let relative = parameters.iter().zip(uncertainty).map(|(value, known)| match known {
-        Uncertainty::StandardError(error) => json!(error / value.abs()),
-        Uncertainty::AtBound | Uncertainty::Undetermined | Uncertainty::Held => Value::Null,
-    });
-    let state = uncertainty.iter().map(|known| match known {
-        Uncertainty::StandardError(_) => json!("determined"),
-        Uncertainty::AtBound => json!("at-bound"),
-        Uncertainty::Undetermined => json!("undetermined"),
-        Uncertainty::Held => json!("held"),
-    });
-    let relative = by_name(model, &relative.collect::<Vec<_>>());
-    json!({ "relative": relative, "state": by_name(model, &state.collect::<Vec<_>>()) })
+/// How well the photo determines each reported parameter: the 95 % range, whether the value is `determined`, `at-bound`, `undetermined`, or
+/// `held` by the settings, and the pairs of which one can make up for the other.
+fn uncertainty_json(model: &dyn Model, uncertainty: &Uncertainty) -> Value {
+    let of =
+        |field: &dyn Fn(&Known) -> Value| by_name(model, &uncertainty.entries.iter().map(field).collect::<Vec<_>>());
+    let state = |known: &Known| match known.standing {
+        Standing::Determined => json!("determined"),
+        Standing::AtBound => json!("at-bound"),
+        Standing::Undetermined => json!("undetermined"),
+        Standing::Held => json!("held"),
+    };
+    let names = flat_names(model.parameters());
+    let trades: Vec<[&String; 2]> = uncertainty.trades.iter().map(|&(a, b)| [&names[a], &names[b]]).collect();
+    json!({ "low": of(&|known| json!(known.low)), "high": of(&|known| json!(known.high)), "state": of(&state), "trades": trades })
+}
+
+/// The neighbours of the match under other lights.
+fn relighting_json(neighbours: &[Neighbour]) -> Value {
+    let of = |neighbour: &Neighbour| {
+        let by_light =
+            FORMULA_LIGHTS.iter().zip(&neighbour.cssim).map(|(light, score)| (light.name.to_owned(), json!(score)));
+        json!({ "match": neighbour.name, "cssim_object": Value::Object(by_light.collect()) })
+    };
+    let spread = spread(neighbours).map(|spread| spread.to_string());
+    json!({ "spread": spread, "neighbours": neighbours.iter().map(of).collect::<Vec<_>>() })
 }
 
 fn merge(into: &mut Value, from: Value) {

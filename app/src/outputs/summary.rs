@@ -8,7 +8,8 @@ use super::{
 use crate::wrap::wrap;
 use lookalike::{
     brdf::{Channels, Model},
-    fit::{Method, Tried, Verdict},
+    fit::{Known, Method, Standing, Tried, Verdict, spread},
+    light::FORMULA_LIGHTS,
     plan::FitOutcome,
 };
 use std::{fmt::Write as _, io};
@@ -28,6 +29,9 @@ fn summary(record: &FitRecord<'_>, timing: &Timing, out: &str) -> String {
     let _ = writeln!(text, "\n  {CSSIM_HINT}");
     let _ = writeln!(text, "\n{}", wrap(&verdict(record)));
     text.push_str(&models(record));
+    if let Some(other_lights) = other_lights(outcome) {
+        let _ = writeln!(text, "\n{}", wrap(&other_lights));
+    }
     for note in record.notes {
         let _ = writeln!(text, "\n{}", wrap(&format!("note: {note}")));
     }
@@ -51,6 +55,24 @@ fn verdict(record: &FitRecord<'_>) -> String {
         format!(". The photo's noise of {:.1} % alone costs {object:.4} on the object", 100.0 * noise)
     });
     format!("verdict: {verdict} ({meaning}){noise}")
+}
+
+/// Whether matches that are as good look the same under other lights, in a sentence; `None` if there are none.
+fn other_lights(outcome: &FitOutcome) -> Option<String> {
+    let spread = spread(&outcome.neighbours)?;
+    let names: Vec<&str> = outcome.neighbours.iter().map(|neighbour| &*neighbour.name).collect();
+    let scores = outcome.neighbours.iter().flat_map(|neighbour| FORMULA_LIGHTS.iter().zip(&neighbour.cssim));
+    let (light, most) = scores.max_by(|a, b| a.1.total_cmp(b.1))?;
+    let so = match spread {
+        Verdict::Indistinguishable => "look the same as the match",
+        Verdict::Close => "look much like the match",
+        _ => "differ from the match: the photo does not tell which is right",
+    };
+    Some(format!(
+        "other lights: under three lights made by formula, matches that are as good ({}) {so} (CSSIM at most {most:.4}, light {:?})",
+        names.join("; "),
+        light.name
+    ))
 }
 
 /// The models that were compared, one row each; empty for a single one.
@@ -85,6 +107,7 @@ fn rows(method: &Method, outcome: &FitOutcome) -> Vec<Vec<String>> {
     if let Some(p) = &outcome.polished {
         add(&mut rows, column(model, "polished", "", p.cssim, p.cssim_object, &p.parameters));
     }
+    add(&mut rows, ranges(model, &outcome.uncertainty.entries));
     rows
 }
 
@@ -97,6 +120,25 @@ fn names(model: &dyn Model, is_held: impl Fn(&str) -> bool) -> Vec<Vec<String>> 
 
 fn add(rows: &mut [Vec<String>], column: Vec<String>) {
     rows.iter_mut().zip(column).for_each(|(row, cell)| row.push(cell));
+}
+
+/// The 95 % range of each parameter: of a colour half the range of its least certain channel.
+fn ranges(model: &dyn Model, entries: &[Known]) -> Vec<String> {
+    let mut column = ["95 % range", "", "", ""].map(str::to_owned).to_vec();
+    let mut rest = entries;
+    for parameter in model.parameters() {
+        let (of_parameter, after) = rest.split_at(parameter.channels.count().min(rest.len()));
+        rest = after;
+        let are = |standing| of_parameter.iter().any(|known| known.standing == standing);
+        let half = of_parameter.iter().map(|known| 0.5 * (known.high - known.low)).fold(0.0, f64::max);
+        column.push(match of_parameter {
+            _ if are(Standing::Held) => "held".to_owned(),
+            _ if are(Standing::Undetermined) => "undetermined".to_owned(),
+            [known] => format!("{:.3} to {:.3}", known.low, known.high),
+            _ => format!("± {half:.3}"),
+        });
+    }
+    column
 }
 
 fn column(model: &dyn Model, name: &str, gamma: &str, cssim: f64, object: f64, parameters: &[f64]) -> Vec<String> {
@@ -127,6 +169,8 @@ mod tests {
                 ["L2 baseline", "stage two", "polished"].map(|name| column(*model, name, "1.5", 0.5, 0.5, &upper));
             let mut rows = names(*model, |_| true);
             results.into_iter().for_each(|result| add(&mut rows, result));
+            let known = |&x: &f64| Known { low: 0.5 * x, high: x, standing: Standing::Undetermined };
+            add(&mut rows, ranges(*model, &upper.iter().map(known).collect::<Vec<_>>()));
             let text = aligned(&rows);
             assert!(text.lines().all(|line| line.len() <= COLUMNS), "{text}");
         }

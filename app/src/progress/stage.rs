@@ -123,7 +123,7 @@ impl Tally {
             nodes::SEARCH | nodes::BRUTE_FORCE => Stage::Searches,
             nodes::TRANSPORT_FULL | nodes::SELECT | nodes::APPRAISE => Stage::Judging,
             nodes::SCOUT | nodes::EXPLORE | nodes::POLISH => Stage::Polish,
-            nodes::REPORT | nodes::RENDER => Stage::Pictures,
+            nodes::REPORT | nodes::UNCERTAINTY | nodes::RELIGHT | nodes::RENDER => Stage::Pictures,
             _ => return None,
         })
     }

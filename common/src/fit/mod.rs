@@ -19,6 +19,7 @@ mod methods;
 mod objective;
 pub(crate) mod polish;
 mod ranges;
+pub(crate) mod relight;
 mod scan;
 pub(crate) mod stage_one;
 mod stage_two;
@@ -40,9 +41,11 @@ pub use methods::Methods;
 pub use objective::Objective;
 pub use polish::{Judges, Limits, MAX_EVALUATIONS, Polished, polish};
 pub use ranges::Ranges;
+pub use relight::{Neighbour, spread};
+pub(crate) use stage_one::scaled_distance;
 pub use stage_one::{ScannedTable, SearchFailure, search_gamma};
 pub use stage_two::{FullView, Judged, judge_candidates, winner};
-pub use uncertainty::{LARGEST_SHARE, Uncertainty};
+pub use uncertainty::{Known, Standing, Uncertainty};
 pub use verdict::{CLOSE, INDISTINGUISHABLE, VISIBLE, Verdict};
 
 #[cfg(test)]

@@ -12,7 +12,7 @@ use super::{
     stage_two::{FullView, Renderer},
 };
 use crate::{
-    brdf::{Role, Width, lit_lobes, main_lobe},
+    brdf::{Model, Role, Width, lit_lobes, main_lobe},
     math::elementary::ln,
     metric::{Judge, Score},
     search::{
@@ -170,16 +170,20 @@ const EDGE: f64 = 0.02;
 /// The box of the parameters with the main lobe's width restricted to the table's span, and whether the span is tighter than the lower
 /// and the upper bound of its range.
 fn polish_bounds(view: &FullView<'_>, ranges: &Ranges) -> Result<(Bounds, [bool; 2]), SearchError> {
-    let whole = search_bounds(view.model, ranges, SearchKind::LeastSquares)?;
-    let (bounds, tighter) = within_table(view.model, &whole, view.span())?;
+    within_table(view.model, &visible_bounds(view.model, ranges)?, view.span())
+}
+
+/// The box of the parameters, scaled so that equal steps look about equal.
+pub(super) fn visible_bounds(model: &dyn Model, ranges: &Ranges) -> Result<Bounds, SearchError> {
+    let bounds = search_bounds(model, ranges, SearchKind::LeastSquares)?;
     // Small steps of a reflectance are visible where the reflectance is small.
     let is_of = |width: &Width, entry| width.entry == entry || width.widened_by == Some(entry);
-    let is_width = |entry| view.model.lobes().iter().any(|b| b.width.is_some_and(|width| is_of(&width, entry)));
+    let is_width = |entry| model.lobes().iter().any(|b| b.width.is_some_and(|width| is_of(&width, entry)));
     let scale = |(entry, role)| match role {
         Role::Width => Scale::Logarithmic,
         _ if is_width(entry) => Scale::Linear,
         _ => Scale::OffsetLogarithmic,
     };
-    let scales: Vec<Scale> = flat_roles(view.model).into_iter().enumerate().map(scale).collect();
-    Ok((Bounds::new(bounds.lower().to_vec(), bounds.upper().to_vec(), scales)?, tighter))
+    let scales: Vec<Scale> = flat_roles(model).into_iter().enumerate().map(scale).collect();
+    Bounds::new(bounds.lower().to_vec(), bounds.upper().to_vec(), scales)
 }

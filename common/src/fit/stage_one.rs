@@ -191,6 +191,11 @@ pub(super) fn within_table(
     Ok((Bounds::new(lower, upper, bounds.scales().to_vec())?, tighter))
 }
 
+/// Largest distance of two parameter vectors in a parameter, as a share of its range (for widths, of the logarithmic range).
+pub(crate) fn scaled_distance(model: &dyn Model, a: &[f64], b: &[f64]) -> Result<f64, SearchError> {
+    Ok(search_bounds(model, &Ranges::default(), SearchKind::LeastSquares)?.scaled_distance(a, b))
+}
+
 /// The bounds of a model's parameters in a fit and the scale in which a search steps. Least squares steps in the logarithm of a width,
 /// because the table's widths are evenly spaced in it. For all other parameters, and in pattern search, the model declares the scale.
 pub(super) fn search_bounds(model: &dyn Model, ranges: &Ranges, search: SearchKind) -> Result<Bounds, SearchError> {

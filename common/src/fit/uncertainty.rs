@@ -1,33 +1,38 @@
-//! How well the photo determines each parameter of a candidate.
+//! How well the photo determines the reported parameters (design section 2): the range of each one over which another match would look about
+//! as good.
 //!
-//! A candidate minimises Eq. 1, a weighted sum of squares whose residuals are the noise of the photo and the error of the model. Its
-//! weights are those of the sampling, not of the precision of pixels, so `s^2 (J^T W J)^-1` would be wrong. The standard errors come
-//! from the sandwich estimator ([`Sandwich`]): `A^-1 B A^-1` with `A = sum_p w_p J_p^T J_p` and
-//! `B = sum_p (w_p J_p^T r_p)(w_p J_p^T r_p)^T`, `J_p` the derivatives of the three compressed channels of pixel p with
-//! respect to the parameters at the candidate's gamma, `r_p` their residuals. The errors of a pixel's channels are correlated; pixels are
-//! independent draws. (A pixel that was drawn twice counts as one of twice the weight, which makes the errors slightly too large.)
+//! The range of a parameter holds the values for which CSSIM, at its minimum over all other parameters, stays within a share of the reached
+//! score. That is a profile, as of a likelihood: the reached score is what the photo's noise and the error of the model leave, so it stands for the
+//! variance of the residuals. The share ([`SHARE`]) is set so that the ranges of synthetic photos hold the truth in about 95 of 100 cases
+//! (docs/accuracy.md); there is no theory that gives it, because the windows of CSSIM overlap.
 //!
-//! Parameters at a bound are held there while the others are judged. Each of them is then freed alone: if its standard error is too
-//! large, it is undetermined, not at its bound. (Without a highlight, the width of the highlight drifts to an end of its range.)
+//! The profile is that of a quadratic, whose gradient and Hessian are differences of CSSIM over steps that raise it visibly, in the scaled
+//! parameters of polish. It knows the bounds: near one, a range has one side.
 //!
-//! Derivatives at one point do not show that a parameter has an effect only if another one is not zero, such as the Fresnel reflectance
-//! of a highlight whose strength may be zero within its error. So the test is repeated with each parameter moved by two standard errors
-//! either way: a parameter that is undetermined at any of these points is undetermined.
+//! A parameter may have an effect only where another one is not zero, such as the width of a haze whose strength may be 0. Where the range
+//! of a parameter reaches 0, the others are judged there too.
 //!
 //! Not included: errors of the light and of the geometry.
 
-use super::{method::SearchKind, objective::Objective, ranges::Ranges, stage_one::search_bounds};
+use super::{
+    method::SearchKind,
+    polish::{Judges, visible_bounds},
+    ranges::Ranges,
+    stage_one::{search_bounds, within_table},
+    stage_two::{FullView, Renderer},
+};
 use crate::{
     brdf::Model,
-    search::{NormalEquations, Sandwich, SearchError, least_squares::LeastSquaresProblem},
+    search::{Bounds, NormalEquations, SearchError, bvls},
 };
+use std::cmp::Ordering;
 
-/// How well the photo determines one entry of the flat parameter vector.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Uncertainty {
-    /// The photo determines the parameter with this standard error, in the parameter's unit.
-    StandardError(f64),
-    /// The parameter is at its lower or upper bound, and would stay near it if it were free.
+/// What the photo says of one entry of the flat parameter vector.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Standing {
+    /// The range is narrow.
+    Determined,
+    /// The value is at its lower or upper bound, and the range is narrow.
     AtBound,
     /// A large part of the parameter's range matches the photo equally well.
     Undetermined,
@@ -35,119 +40,302 @@ pub enum Uncertainty {
     Held,
 }
 
-impl Uncertainty {
-    /// The standard error, if the parameter has one.
-    fn standard_error(self) -> Option<f64> {
-        match self {
-            Self::StandardError(error) => Some(error),
-            Self::AtBound | Self::Undetermined | Self::Held => None,
+/// The range of one entry of the flat parameter vector.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Known {
+    /// The smallest value.
+    pub low: f64,
+    /// The largest value.
+    pub high: f64,
+    /// What the photo says of the entry.
+    pub standing: Standing,
+}
+
+/// How well the photo determines the reported parameters.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Uncertainty {
+    /// One entry per entry of the flat parameter vector.
+    pub entries: Vec<Known>,
+    /// Pairs of entries of which one can make up for the other.
+    pub trades: Vec<(usize, usize)>,
+}
+
+/// Ranges hold the values for which CSSIM rises by at most this share of the reached score.
+const SHARE: f64 = 0.004;
+
+/// What the error of tables costs at least, as if it were reached (it is what noise of .5 % costs: design sections 5 and 6).
+const LEAST: f64 = 4e-4;
+
+/// Steps of the differences raise CSSIM by about this much. Single precision is exact to a fiftieth of it.
+const RISE: f64 = 1e-4;
+
+/// Steps that raise it by up to so many times less or more are kept.
+const NEAR: f64 = 6.0;
+
+/// Most trials to find a step.
+const TRIALS: usize = 5;
+
+/// The first step and the largest, as shares of the range.
+const FIRST: f64 = 0.01;
+const LARGEST: f64 = 0.1;
+
+/// A parameter is undetermined if its range is above this share of its range in the model (of the logarithmic range for widths).
+const LARGEST_SHARE: f64 = 0.5;
+
+/// Entries trade if their correlation is beyond this, and each range is above a share of its value.
+const TRADE: (f64, f64) = (0.9, 0.1);
+
+/// CSSIM near the match.
+struct Surroundings<'a> {
+    view: &'a FullView<'a>,
+    renderer: Renderer<'a>,
+    judges: Judges<'a>,
+    bounds: Bounds,
+    /// Where it can be rendered, in scaled parameters: the table may not have all widths.
+    inside: Vec<(f64, f64)>,
+}
+
+impl Surroundings<'_> {
+    /// CSSIM at scaled parameters.
+    fn score(&self, scaled: &[f64]) -> Result<f64, SearchError> {
+        let point: Vec<f64> = scaled.iter().enumerate().map(|(i, &t)| self.bounds.to_natural(i, t)).collect();
+        let score = self.judges.searching.score(&self.renderer.render(&point));
+        let picked = score.map(|score| self.judges.by.pick(score.cssim, score.cssim_object));
+        picked.map_err(|_| SearchError::NotFinite { what: "the CSSIM", point })
+    }
+
+    fn moved(&self, from: &[f64], steps: &[(usize, f64)]) -> Result<f64, SearchError> {
+        let mut scaled = from.to_vec();
+        steps.iter().for_each(|&(i, step)| scaled[i] += step);
+        self.score(&scaled)
+    }
+
+    /// The middle of a step to both sides that stays where it can be rendered.
+    fn middle(&self, i: usize, at: f64, step: f64) -> f64 {
+        let (low, high) = self.inside[i];
+        at.min(high - step).max(low + step)
+    }
+
+    /// A step of entry `i` that raises CSSIM by about `rise`.
+    fn step(&self, i: usize, at: &[f64], rise: f64) -> Result<f64, SearchError> {
+        let (low, high) = self.inside[i];
+        let most = LARGEST.min(0.5 * (high - low));
+        let mut step = FIRST.min(most);
+        for _ in 0..TRIALS {
+            let mut middle = at.to_vec();
+            middle[i] = self.middle(i, at[i], step);
+            let (below, here, above) =
+                (self.moved(&middle, &[(i, -step)])?, self.score(&middle)?, self.moved(&middle, &[(i, step)])?);
+            let found = 0.5 * (below + above) - here;
+            if (rise / NEAR..=rise * NEAR).contains(&found) || (step >= most && found < rise) {
+                break;
+            }
+            step = (step * (rise / found.max(0.01 * rise)).sqrt()).min(most);
         }
+        Ok(step)
+    }
+
+    /// The differences of CSSIM around the scaled parameters `at`, over the entries `free`.
+    fn quadratic(&self, at: &[f64], free: &[usize], rise: f64) -> Result<Quadratic, SearchError> {
+        let steps = free.iter().map(|&i| self.step(i, at, rise)).collect::<Result<Vec<_>, _>>()?;
+        let mut middle = at.to_vec();
+        free.iter().zip(&steps).for_each(|(&i, &step)| middle[i] = self.middle(i, at[i], step));
+        let mut normal = NormalEquations::new(free.len());
+        let here = self.score(&middle)?;
+        // Entries of widths last: neighbouring evaluations then have the same widths, whose integrals are kept.
+        let mut above = Vec::new();
+        for (a, (&i, &step)) in free.iter().zip(&steps).enumerate() {
+            let (up, down) = (self.moved(&middle, &[(i, step)])?, self.moved(&middle, &[(i, -step)])?);
+            normal.set_matrix(a, a, (up - 2.0 * here + down) / (step * step));
+            normal.set_vector(a, (down - up) / (2.0 * step));
+            for b in 0..a {
+                let both = self.moved(&middle, &[(i, step), (free[b], steps[b])])?;
+                normal.set_matrix(a, b, (both - up - above[b] + here) / (step * steps[b]));
+            }
+            above.push(up);
+        }
+        Ok(Quadratic { middle: free.iter().map(|&i| middle[i]).collect(), normal })
     }
 }
 
-/// Distance from the minimum at which the test is repeated, in standard errors.
-const REACH: f64 = 2.0;
+/// A quadratic: its value above that in the middle is `x^T A x / 2 - b^T x` at x from the middle, with A and b of the normal equations.
+struct Quadratic {
+    middle: Vec<f64>,
+    normal: NormalEquations,
+}
 
-/// A parameter counts as undetermined if its standard error is above this share of its range in the model (of the logarithmic range for widths): the
-/// values within two standard errors are then half of the range.
-pub const LARGEST_SHARE: f64 = 0.125;
+impl Quadratic {
+    fn value(&self, at: &[f64]) -> f64 {
+        let x: Vec<f64> = at.iter().zip(&self.middle).map(|(t, middle)| t - middle).collect();
+        let of = |(i, (x, ax)): (usize, (&f64, f64))| x * (0.5 * ax - self.normal.vector(i));
+        x.iter().zip(self.normal.times(&x)).enumerate().map(of).sum()
+    }
 
-/// A parameter nearer to a bound than this share of the range counts as at the bound: a pattern search ends within its last mesh size
-/// of it.
-const AT_BOUND: f64 = 1e-5;
+    /// Adds curvature, the same in all directions, until there is some in each of them: over a whole range no less than `least`.
+    fn make_convex(&mut self, least: f64) {
+        let n = self.normal.dimension();
+        let all = vec![true; n];
+        let mut added = 2.0 * least;
+        loop {
+            (0..n).for_each(|i| self.normal.set_matrix(i, i, self.normal.matrix(i, i) + added));
+            let is_convex = self.normal.variances(&all).iter().all(|x| x.is_finite());
+            if is_convex || added > 1e3 {
+                return;
+            }
+            added *= 2.0;
+        }
+    }
 
-/// The uncertainty of every entry of the flat vector `point`, a minimum of `objective`.
+    /// Its minimum over all entries in [0, 1] but entry `i`, which is `t`.
+    fn profile(&self, i: usize, t: f64) -> Result<f64, SearchError> {
+        let mut lower: Vec<f64> = self.middle.iter().map(|middle| -middle).collect();
+        let mut upper: Vec<f64> = self.middle.iter().map(|middle| 1.0 - middle).collect();
+        (lower[i], upper[i]) = (t - self.middle[i], t - self.middle[i]);
+        let minimum = bvls::solve(&self.normal, &lower, &upper)?.point;
+        Ok(self.value(&minimum.iter().zip(&self.middle).map(|(x, middle)| x + middle).collect::<Vec<_>>()))
+    }
+
+    /// The end of the range of entry `i` towards `end`: where its profile rises above `limit`.
+    fn end(&self, i: usize, at: f64, end: f64, limit: f64) -> Result<f64, SearchError> {
+        if self.profile(i, end)? <= limit {
+            return Ok(end);
+        }
+        let (mut within, mut beyond) = (at, end);
+        for _ in 0..BISECTIONS {
+            let between = 0.5 * (within + beyond);
+            if self.profile(i, between)? <= limit { within = between } else { beyond = between }
+        }
+        Ok(within)
+    }
+}
+
+/// Bisections to the end of a range: to 1e-6 of the whole one.
+const BISECTIONS: usize = 20;
+
+/// The uncertainty of the match at `point`.
 ///
 /// # Errors
-/// If the model's bounds are not a valid box.
-pub(crate) fn uncertainties(
-    (model, ranges): (&dyn Model, &Ranges),
-    objective: &mut Objective<'_>,
+/// If the bounds are not a valid box, or a picture near the match cannot be scored.
+pub(crate) fn uncertainty(
+    view: &FullView<'_>,
+    judges: Judges<'_>,
+    ranges: &Ranges,
     point: &[f64],
-) -> Result<Vec<Uncertainty>, SearchError> {
-    let bounds = search_bounds(model, ranges, SearchKind::LeastSquares)?;
-    // A narrower range of the search makes no value less certain.
+) -> Result<Uncertainty, SearchError> {
+    let model = view.model;
+    let bounds = visible_bounds(model, ranges)?;
+    let (table, _) = within_table(model, &bounds, view.span())?;
+    let scaled: Vec<f64> = (0..point.len()).map(|i| bounds.to_scaled(i, point[i])).collect();
+    let limits = |i: usize| {
+        let limit = |x: f64| bounds.to_scaled(i, x);
+        // An end of the table that lies beyond the match by rounding counts as its own.
+        (limit(table.lower()[i]).min(scaled[i]), limit(table.upper()[i]).max(scaled[i]))
+    };
+    let inside = (0..point.len()).map(limits).collect();
+    let near = Surroundings { view, renderer: Renderer::new(view), judges, bounds, inside };
+    let reached = near.score(&scaled)?;
+    let allowed = SHARE * reached.max(LEAST);
+    let free: Vec<usize> = (0..point.len()).filter(|&i| near.bounds.lower()[i] < near.bounds.upper()[i]).collect();
+    let mut entries: Vec<Known> = point.iter().map(|&x| Known { low: x, high: x, standing: Standing::Held }).collect();
+    if free.is_empty() {
+        return Ok(Uncertainty { entries, trades: Vec::new() });
+    }
+    let mut quadratic = near.quadratic(&scaled, &free, allowed.max(RISE))?;
+    quadratic.make_convex(allowed);
+    let at: Vec<f64> = free.iter().map(|&i| scaled[i]).collect();
+    let limit = quadratic.value(&at) + allowed;
+    // A narrower range of the search makes no value more certain.
     let of_model = search_bounds(model, &Ranges::default(), SearchKind::LeastSquares)?;
-    let is_inside = |i: usize| {
-        let t = bounds.to_scaled(i, point[i]);
-        (AT_BOUND..=1.0 - AT_BOUND).contains(&t)
-    };
-    let inside: Vec<bool> = (0..point.len()).map(is_inside).collect();
-    let is_held = |i: usize| bounds.lower()[i] == bounds.upper()[i];
-    // One set of free parameters for those inside, and one more for each parameter at its bound, with that parameter free as well.
-    let mut freed = vec![inside.clone()];
-    for i in (0..point.len()).filter(|&i| !inside[i] && !is_held(i)) {
-        freed.push((0..point.len()).map(|j| inside[j] || j == i).collect());
-    }
-    let residuals = residuals(objective, point);
-    let mut judged_at = |place: &[f64]| {
-        let errors = standard_errors(objective, place, &residuals, &freed);
-        let mut of_bounds = errors[1..].iter();
-        let judge = |i: usize| {
-            if is_held(i) {
-                return Uncertainty::Held;
-            }
-            let errors = if inside[i] { Some(&errors[0]) } else { of_bounds.next() };
-            let error = errors.map_or(f64::INFINITY, |errors| errors[i]);
-            let share = error / of_model.scaled_derivative(i, place[i]);
-            match share <= LARGEST_SHARE {
-                true if inside[i] => Uncertainty::StandardError(error),
-                true => Uncertainty::AtBound,
-                // Also if the share is not a number.
-                false => Uncertainty::Undetermined,
-            }
+    for (k, &i) in free.iter().enumerate() {
+        let (low, high) = (quadratic.end(k, at[k], 0.0, limit)?, quadratic.end(k, at[k], 1.0, limit)?);
+        let (low, high) = (near.bounds.to_natural(i, low).min(point[i]), near.bounds.to_natural(i, high).max(point[i]));
+        let share = of_model.to_scaled(i, high) - of_model.to_scaled(i, low);
+        let standing = match at[k] {
+            _ if share > LARGEST_SHARE => Standing::Undetermined,
+            t if t <= AT_BOUND || t >= 1.0 - AT_BOUND => Standing::AtBound,
+            _ => Standing::Determined,
         };
-        (0..place.len()).map(judge).collect::<Vec<_>>()
+        entries[i] = Known { low, high, standing };
+    }
+    near.judge_where_others_vanish(&scaled, allowed, &mut entries)?;
+    let trades = trades(&quadratic, &free, &entries, point);
+    Ok(Uncertainty { entries, trades })
+}
+
+/// A value nearer to a bound than this share of the range is at the bound.
+const AT_BOUND: f64 = 1e-5;
+
+/// How far a value is moved, as a share of its range, to see whether it has an effect.
+const MOVED: f64 = 0.25;
+
+impl Surroundings<'_> {
+    /// A parameter without effect where another one is 0, as it may be, is undetermined.
+    fn judge_where_others_vanish(&self, at: &[f64], allowed: f64, entries: &mut [Known]) -> Result<(), SearchError> {
+        for (name, vanishing) in groups(self.view.model) {
+            let can_vanish = |i: usize| entries[i].standing != Standing::Held && entries[i].low <= 0.0;
+            if !vanishing.clone().all(can_vanish) {
+                continue;
+            }
+            let mut there = at.to_vec();
+            vanishing.clone().for_each(|i| there[i] = 0.0);
+            let here = self.score(&there)?;
+            for (_, others) in groups(self.view.model).filter(|(other, _)| *other != name) {
+                for i in others {
+                    if matches!(entries[i].standing, Standing::Determined | Standing::AtBound)
+                        && self.has_no_effect(i, &there, here, allowed)?
+                    {
+                        entries[i].standing = Standing::Undetermined;
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether moving entry `i` either way changes CSSIM by little. The table may not have all widths: then a smaller way counts for more.
+    fn has_no_effect(&self, i: usize, at: &[f64], here: f64, allowed: f64) -> Result<bool, SearchError> {
+        let (low, high) = self.inside[i];
+        for end in [(at[i] - MOVED).max(low), (at[i] + MOVED).min(high)] {
+            let way = (end - at[i]).abs();
+            if way > 0.0 {
+                let rise = (self.moved(at, &[(i, end - at[i])])? - here).abs();
+                let share = MOVED.min(1.0 - MOVED) / way;
+                if rise * (share * share).max(1.0) > allowed {
+                    return Ok(false);
+                }
+            }
+        }
+        Ok(true)
+    }
+}
+
+/// The parameters of a model: name and entries of the flat vector.
+fn groups(model: &dyn Model) -> impl Iterator<Item = (&'static str, std::ops::Range<usize>)> {
+    let mut first = 0;
+    model.parameters().iter().map(move |parameter| {
+        let entries = first..first + parameter.channels.count();
+        first = entries.end;
+        (parameter.name, entries)
+    })
+}
+
+/// The pairs of entries of which one can make up for the other, strongest first.
+fn trades(quadratic: &Quadratic, free: &[usize], entries: &[Known], point: &[f64]) -> Vec<(usize, usize)> {
+    let is_wide = |i: usize| {
+        let Known { low, high, standing } = entries[i];
+        let is_known = matches!(standing, Standing::Determined | Standing::Undetermined);
+        is_known && high - low > TRADE.1 * point[i].abs()
     };
-    let here = judged_at(point);
-    let mut judged = here.clone();
-    for (i, error) in here.iter().enumerate().filter_map(|(i, u)| Some((i, u.standard_error()?))) {
-        for reach in [-REACH, REACH] {
-            let mut place = point.to_vec();
-            place[i] += reach * error;
-            bounds.clamp(&mut place);
-            let there = judged_at(&place);
-            let lost = (0..point.len()).filter(|&j| j != i && there[j] == Uncertainty::Undetermined);
-            lost.for_each(|j| judged[j] = Uncertainty::Undetermined);
+    let at: Vec<usize> = (0..free.len()).filter(|&k| is_wide(free[k])).collect();
+    let mut found: Vec<(f64, (usize, usize))> = Vec::new();
+    for (n, &a) in at.iter().enumerate() {
+        for &b in &at[..n] {
+            let correlation = quadratic.normal.correlation(b, a);
+            if correlation.abs() > TRADE.0 {
+                found.push((correlation.abs(), (free[b], free[a])));
+            }
         }
     }
-    Ok(judged)
-}
-
-/// The residuals of all rows.
-fn residuals(objective: &mut Objective<'_>, point: &[f64]) -> Vec<f64> {
-    let mut residuals = Vec::new();
-    objective.rows(point, &mut |_, _, residual| residuals.push(residual));
-    residuals
-}
-
-/// The standard errors of all parameters for each set of free ones (0 for the others), from the derivatives at `place` and the residuals
-/// at the minimum.
-fn standard_errors(
-    objective: &mut Objective<'_>,
-    place: &[f64],
-    residuals: &[f64],
-    freed: &[Vec<bool>],
-) -> Vec<Vec<f64>> {
-    let mut normal = NormalEquations::new(place.len());
-    objective.linearise(place, &mut normal);
-    let mut sandwiches: Vec<Sandwich> = freed.iter().map(|free| Sandwich::new(&normal, free)).collect();
-    let mut pixel = 0;
-    let mut residuals = residuals.iter();
-    objective.rows(place, &mut |p, row, _| {
-        if p != pixel {
-            sandwiches.iter_mut().for_each(Sandwich::close_group);
-            pixel = p;
-        }
-        // The rows come in the same order at every place.
-        let residual = residuals.next().copied().unwrap_or(f64::NAN);
-        sandwiches.iter_mut().for_each(|sandwich| sandwich.add_row(row, residual));
-    });
-    sandwiches.iter_mut().for_each(Sandwich::close_group);
-    let spread = |(sandwich, free): (&Sandwich, &Vec<bool>)| {
-        let mut variances = sandwich.variances().into_iter();
-        let error = |&free: &bool| if free { variances.next().map_or(f64::INFINITY, f64::sqrt) } else { 0.0 };
-        free.iter().map(error).collect()
-    };
-    sandwiches.iter().zip(freed).map(spread).collect()
+    found.sort_by(|a, b| b.0.partial_cmp(&a.0).unwrap_or(Ordering::Equal));
+    found.into_iter().map(|(_, pair)| pair).collect()
 }

@@ -18,6 +18,10 @@ pub const EXPLORE: &str = "explore";
 pub const POLISH: &str = "polish";
 /// Renders the pictures at the end of a fit.
 pub const REPORT: &str = "report";
+/// How well the photo determines the parameters of the match.
+pub const UNCERTAINTY: &str = "uncertainty";
+/// Compares the match with its neighbours under other lights.
+pub const RELIGHT: &str = "relight";
 /// Renders a photo.
 pub const RENDER: &str = "render";
 /// Minimises the score from one start.

@@ -1,7 +1,7 @@
 //! The steps of the method as nodes of the job graph, one file per [`NodeType`](crate::graph::NodeType). Every node is a pure function
 //! of its parameters and input blobs.
 //!
-//! `transport` and `search` run on workers; `select`, `explore`, `polish` and `report` in the coordinator's process, or on workers if a
+//! `transport` and `search` run on workers; `select`, `explore`, `polish`, `report`, `uncertainty` and `relight` in the coordinator's process, or on workers if a
 //! batch asks for it. `render`, `brute-force` and `appraise` belong to studies.
 
 mod appraise;
@@ -9,11 +9,13 @@ mod brute_force;
 mod explore;
 mod kinds;
 mod polish;
+mod relight;
 mod render;
 mod report;
 mod search;
 mod select;
 mod transport;
+mod uncertainty;
 mod view;
 pub(crate) mod wire;
 
@@ -23,15 +25,17 @@ pub(crate) use appraise::{AppraiseParameters, AppraisedWire};
 pub(crate) use brute_force::BruteForceParameters;
 pub(crate) use explore::ExploredWire;
 pub use kinds::{
-    APPRAISE, BRUTE_FORCE, EXPLORE, POLISH, RENDER, REPORT, SCOUT, SEARCH, SELECT, TRANSPORT, TRANSPORT_COARSE,
-    TRANSPORT_FULL,
+    APPRAISE, BRUTE_FORCE, EXPLORE, POLISH, RELIGHT, RENDER, REPORT, SCOUT, SEARCH, SELECT, TRANSPORT,
+    TRANSPORT_COARSE, TRANSPORT_FULL, UNCERTAINTY,
 };
 pub(crate) use polish::PolishParameters;
+pub(crate) use relight::{RelightParameters, RelitWire};
 pub(crate) use render::{RenderParameters, RenderedWire};
 pub(crate) use report::{ReportParameters, ReportWire};
 pub(crate) use search::{DirectWire, SearchParameters};
 pub(crate) use select::SelectParameters;
 pub(crate) use transport::TransportParameters;
+pub(crate) use uncertainty::{UncertaintyParameters, UncertaintyWire};
 pub(crate) use view::{ViewWire, joined};
 
 /// All node types of fits and studies. Coordinator and workers hold the same registry.
@@ -47,6 +51,8 @@ pub fn registry() -> Registry {
         .with(explore::Explore)
         .with(polish::Polish)
         .with(report::Report)
+        .with(uncertainty::Uncertainty)
+        .with(relight::Relight)
         .with(render::Render)
         .with(brute_force::BruteForce)
         .with(appraise::Appraise)

@@ -10,7 +10,7 @@ use super::{
 };
 use crate::{
     brdf::Model,
-    fit::{COST_OF_NOISE, Candidate, Judged, Match, Method, Tried, uncertainty::Uncertainty, winner},
+    fit::{COST_OF_NOISE, Candidate, Judged, Match, Method, Tried, winner},
     graph::{Blob, GraphEdit, NodeId, PlanError},
     metric::Blocks,
     nodes::{self, ReportParameters, SelectParameters, wire::CandidateWire},
@@ -29,7 +29,6 @@ pub(super) struct Contender {
     /// The candidates of stage one that have arrived, by their place among the searches.
     pub(super) candidates: BTreeMap<usize, Candidate>,
     pub(super) judged: Vec<Judged>,
-    pub(super) uncertainty: Vec<Uncertainty>,
     pub(super) polishing: Polishing,
     pub(super) step: Step,
     /// Whether another model explores first.
@@ -54,7 +53,6 @@ impl Contender {
             is_sharp: false,
             candidates: BTreeMap::new(),
             judged: Vec::new(),
-            uncertainty: Vec::new(),
             polishing,
             step: Step::Searching,
             follows: false,
@@ -204,9 +202,10 @@ impl Contender {
         Ok(&self.judged[self.index_of_winner()?])
     }
 
-    /// What the tables span that it still needs.
-    pub(super) fn spans(&self) -> [&Spans; 2] {
-        [self.polishing.judged_on(), self.polishing.spans()]
+    /// What the tables span that it still needs: at the end that on which it was matched.
+    pub(super) fn spans(&self) -> Vec<&Spans> {
+        let judged_on = (self.step != Step::Reporting).then_some(self.polishing.judged_on());
+        judged_on.into_iter().chain([self.polishing.spans()]).collect()
     }
 
     /// The parameters of the match so far, CSSIM over the whole image and over the object.
@@ -255,6 +254,11 @@ impl Contender {
             self.pictures.ask(node, count);
         }
         Ok(())
+    }
+
+    /// What the table spans on which it was matched.
+    pub(super) fn spans_of_match(&self) -> &Spans {
+        self.polishing.spans()
     }
 
     /// The candidates of these gammas, of the first subset.

@@ -1,7 +1,7 @@
 //! The plan of one fit: its nodes, and the further nodes that their outputs lead to (design section 7).
 //!
 //! ```text
-//! transport(subset) shards -> search(gamma) x 21 -> transport(full) shards -> select -> explore -> polish -> report
+//! transport(subset) shards -> search(gamma) x 21 -> transport(full) shards -> select -> explore -> polish -> report -> uncertainty
 //! ```
 //!
 //! With several models everything but the tables is done for each of them, and the choice is made at the end.
@@ -10,6 +10,7 @@
 
 use super::{
     coarse::Coarse,
+    conclusion::Conclusion,
     contender::Contender,
     encode::{add, encode, index},
     limits::FitError,
@@ -23,11 +24,10 @@ use super::{
 };
 use crate::{
     fit::{
-        BestScore, Candidate, Judged, Method, Methods, Objective, Polished, Tried, chosen, compare,
+        BestScore, Candidate, Judged, Methods, Neighbour, Objective, Polished, Tried, Uncertainty, chosen, compare,
         explore::{can_follow, explored_span},
         is_hopeless, needed_span,
         stage_one::objective_of,
-        uncertainty::{Uncertainty, uncertainties},
     },
     graph::{Blob, GraphEdit, Input, NodeId, NodeSpec, Placement, PlanError, Planner},
     image::Image,
@@ -55,8 +55,10 @@ pub struct FitOutcome {
     pub judged: Vec<Judged>,
     /// Index of the winner of stage two.
     pub winner: usize,
-    /// How well the photo determines each entry of the winner's flat parameter vector, at its gamma and on its subset.
-    pub uncertainty: Vec<Uncertainty>,
+    /// How well the photo determines the final parameters.
+    pub uncertainty: Uncertainty,
+    /// The matches that the photo does not tell from it, under other lights.
+    pub neighbours: Vec<Neighbour>,
     /// The outcome of stage three, when it ran.
     pub polished: Option<Polished>,
     /// Evaluations of CSSIM on the coarse picture before stage three; 0 when it did not run.
@@ -89,6 +91,8 @@ pub struct FitPlanner {
     tables_of_subsets: SubsetTables,
     coarse: Option<Coarse>,
     best: Arc<BestScore>,
+    /// Once a model is chosen.
+    conclusion: Option<Conclusion>,
     outcome: Option<FitOutcome>,
 }
 
@@ -126,6 +130,7 @@ impl FitPlanner {
             tables_of_subsets: SubsetTables::default(),
             coarse: None,
             best: Arc::default(),
+            conclusion: None,
             outcome: None,
         })
     }
@@ -370,17 +375,6 @@ impl FitPlanner {
     /// Takes the scores of the candidates of model `c`.
     fn selected(&mut self, c: usize, output: &Blob, graph: &mut GraphEdit<'_>) -> Result<(), PlanError> {
         self.contenders[c].judged(output)?;
-        let winner = self.contenders[c].winner()?.candidate.clone();
-        let Method { model, ranges, .. } = self.contenders[c].method.clone();
-        self.contenders[c].uncertainty = self
-            .with_objective(c, &winner, graph, |objective| {
-                uncertainties((model, &ranges), objective, &winner.parameters)
-            })?
-            .map_err(|error| PlanError::Other(error.into()))?;
-        self.release_subset_tables(graph);
-        if self.subset_tables.is_empty() {
-            self.tables_of_subsets = SubsetTables::default();
-        }
         self.contenders[c].polish(self.coarse.as_ref(), &mut self.scene, graph)?;
         self.moved_on(c, graph)
     }
@@ -405,18 +399,17 @@ impl FitPlanner {
         if !self.contenders.iter().any(is_exploring) {
             self.release_coarse(graph);
         }
-        let open = self.contenders.iter().filter(|c| c.given_up.is_none() && c.step != Step::Reporting);
+        let open = self.contenders.iter().filter(|c| c.given_up.is_none());
         let needed: Vec<&Spans> = open.flat_map(Contender::spans).collect();
         self.scene.release_tables_but(&needed, graph);
         Ok(())
     }
 
-    /// Releases the tables of the pixel subsets that no model reads any more, to search or to tell how sure its winner is.
+    /// Releases the tables of the pixel subsets that no open search reads.
     fn release_subset_tables(&mut self, graph: &mut GraphEdit<'_>) {
-        let reads =
-            |c: &Contender, is_sharp: bool| c.is_sharp == is_sharp && c.given_up.is_none() && c.judged.is_empty();
+        let (searches, contenders) = (&self.searches, &self.contenders);
         self.subset_tables.retain(|(_, is_sharp), shards| {
-            let is_read = self.contenders.iter().any(|contender| reads(contender, *is_sharp));
+            let is_read = searches.values().any(|(c, _)| contenders[*c].is_sharp == *is_sharp);
             if !is_read {
                 shards.iter().filter_map(Input::node).for_each(|shard| graph.release(shard));
             }
@@ -425,7 +418,12 @@ impl FitPlanner {
     }
 
     /// Takes the pictures of model `c`; when all models have theirs, chooses one of them.
-    fn reported(&mut self, c: usize, node: NodeId, output: &Blob) -> Result<(), PlanError> {
+    fn reported(
+        &mut self,
+        (c, node): (usize, NodeId),
+        output: &Blob,
+        graph: &mut GraphEdit<'_>,
+    ) -> Result<(), PlanError> {
         let (width, height) = (self.scene.capture.photo().width(), self.scene.capture.photo().height());
         let contender = &mut self.contenders[c];
         contender.made = contender.pictures.made(node, output, (width, height))?;
@@ -451,9 +449,20 @@ impl FitPlanner {
         let tried: Vec<Tried> =
             self.contenders.iter().filter_map(|c| c.given_up.clone().or_else(|| compared.next())).collect();
         let chosen = chosen(&tried).ok_or_else(|| PlanError::new("no model was chosen"))?;
-        let contender = self.contenders.swap_remove(chosen);
+        let contender = &self.contenders[chosen];
         // A simpler model may be chosen than the one of the best score.
         self.best.set(contender.score());
+        let (contenders, methods) = (&self.contenders, &self.methods);
+        self.conclusion = Some(Conclusion::new((tried, chosen), contenders, methods, &mut self.scene, graph)?);
+        Ok(())
+    }
+
+    /// Ends the fit.
+    fn conclude(&mut self, conclusion: Conclusion) -> Result<(), PlanError> {
+        let missing = || PlanError::new("the report lacks an image");
+        let Conclusion { tried, chosen, uncertainty, neighbours, .. } = conclusion;
+        let contender = self.contenders.swap_remove(chosen);
+        let (width, height) = (self.scene.capture.photo().width(), self.scene.capture.photo().height());
         let winner = contender.index_of_winner()?;
         let gammas: Vec<f64> = contender.shown(&self.shown_gammas).into_iter().map(|j| j.candidate.gamma).collect();
         let Made { mut images, error, noise_floor, .. } = contender.made.ok_or_else(missing)?;
@@ -465,7 +474,8 @@ impl FitPlanner {
             noise: self.noise.zip(noise_floor),
             judged: contender.judged,
             winner,
-            uncertainty: contender.uncertainty,
+            uncertainty: uncertainty.unwrap_or_default(),
+            neighbours,
             polished: contender.polishing.outcome,
             explored: contender.polishing.explored.map_or(0, |found| found.evaluations),
             winner_image,
@@ -505,6 +515,14 @@ impl Planner for FitPlanner {
             self.contenders[c].candidates.insert(place, candidate);
             return if self.searches.is_empty() { self.searched(graph) } else { Ok(()) };
         }
+        if let Some(mut conclusion) = self.conclusion.take() {
+            conclusion.takes(node, output, &self.contenders)?;
+            if conclusion.is_complete() {
+                return self.conclude(conclusion);
+            }
+            self.conclusion = Some(conclusion);
+            return Ok(());
+        }
         for c in 0..self.contenders.len() {
             if self.contenders[c].step == Step::Selecting(node) {
                 return self.selected(c, output, graph);
@@ -513,7 +531,7 @@ impl Planner for FitPlanner {
                 return self.moved_on(c, graph);
             }
             if self.contenders[c].pictures.is_of(node) {
-                return self.reported(c, node, output);
+                return self.reported((c, node), output, graph);
             }
         }
         Ok(())

@@ -2,6 +2,7 @@
 
 mod appraisal;
 mod coarse;
+mod conclusion;
 mod contender;
 mod direct;
 mod encode;

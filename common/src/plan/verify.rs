@@ -7,11 +7,11 @@
 use super::encode::other;
 use crate::{
     brdf::{Model, lobe_terms},
-    fit::{Candidate, Method, Objective, Polished},
+    fit::{Candidate, Known, Method, Objective, Polished, Uncertainty},
     graph::{Blob, GraphEdit, Input, NodeFailure, NodeId, PlanError},
     metric::Blocks,
     nodes::{
-        ExploredWire, joined,
+        ExploredWire, UncertaintyWire, joined,
         wire::{PolishedWire, ScoresWire, TableWire, read},
     },
     render::{spans::LobeKnots, table::TransportTable},
@@ -128,6 +128,21 @@ pub(super) fn explored(method: &Method, output: &Blob, most: usize) -> Result<(P
     let found = checked(method.model, Ok(found), most)?;
     check_blocks(&blocks, method.judge.pick(found.cssim, found.cssim_object))?;
     Ok((found, blocks))
+}
+
+/// How well the photo determines the parameters `point`.
+pub(super) fn uncertainty(method: &Method, output: &Blob, point: &[f64]) -> Result<Uncertainty, PlanError> {
+    let wire: UncertaintyWire =
+        read("uncertainty", output).map_err(|failure| wrong("ranges of parameters", &failure))?;
+    let found = wire.uncertainty().ok_or_else(|| wrong("ranges of parameters", &"others"))?;
+    let (lower, upper) = method.ranges.bounds(method.model);
+    let is_around = |(i, known): (usize, &Known)| {
+        lower[i] <= known.low && known.low <= point[i] && point[i] <= known.high && known.high <= upper[i]
+    };
+    if found.entries.len() != point.len() || !found.entries.iter().enumerate().all(is_around) {
+        return Err(wrong(format!("ranges around {point:?}"), &format!("{:?}", found.entries)));
+    }
+    Ok(found)
 }
 
 /// Refuses windows that do not have the score of their picture.

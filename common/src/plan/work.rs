@@ -13,7 +13,7 @@ pub enum Work {
     StageTwo,
     /// Exploring and polishing, and the tables for them.
     StageThree,
-    /// The pictures at the end.
+    /// The pictures and the uncertainty at the end.
     Pictures,
     /// Anything else: the photo, the scores of given points.
     Other,
@@ -27,7 +27,7 @@ impl Work {
             nodes::TRANSPORT_FULL if is_judged => Self::StageThree,
             nodes::TRANSPORT_FULL | nodes::SELECT => Self::StageTwo,
             nodes::TRANSPORT_COARSE | nodes::SCOUT | nodes::EXPLORE | nodes::POLISH => Self::StageThree,
-            nodes::REPORT => Self::Pictures,
+            nodes::REPORT | nodes::UNCERTAINTY | nodes::RELIGHT => Self::Pictures,
             _ => Self::Other,
         }
     }

@@ -32,7 +32,6 @@ pub mod multi_start;
 pub mod normal_equations;
 pub mod pattern;
 pub mod quasi_newton;
-pub mod sandwich;
 mod semidefinite;
 pub mod termination;
 #[cfg(test)]
@@ -41,5 +40,4 @@ mod test_functions;
 pub use bounds::{Bounds, Scale};
 pub use error::SearchError;
 pub use normal_equations::NormalEquations;
-pub use sandwich::Sandwich;
 pub use termination::{Progress, Termination};

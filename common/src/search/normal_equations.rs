@@ -135,6 +135,16 @@ impl NormalEquations {
         variances
     }
 
+    /// The correlation of two parameters in the inverse of `J^T J`, from -1 to 1; NaN if the residuals do not determine one of them.
+    #[must_use]
+    pub fn correlation(&self, a: usize, b: usize) -> f64 {
+        let all: Vec<usize> = (0..self.dimension()).collect();
+        let factor = self.factor(&all);
+        let diagonal = factor.inverse_diagonal();
+        let unit: Vec<f64> = all.iter().map(|&i| f64::from(u8::from(i == a))).collect();
+        factor.solve(&unit)[b] / (diagonal[a] * diagonal[b]).sqrt()
+    }
+
     /// The factorised submatrix of the given parameters.
     pub(super) fn factor(&self, indices: &[usize]) -> Factor {
         Factor::new(indices.len(), |a, b| self.matrix(indices[a], indices[b]))

@@ -95,10 +95,13 @@ fn fit_json_has_the_documented_fields() {
     for name in ["cssim", "cssim_object", "parameters"] {
         assert_eq!(won[name], stage_two[name]);
     }
-    let uncertainty = &stage_two["uncertainty"];
-    assert_eq!(uncertainty["state"]["kd"], json!(["determined", "determined", "determined"]), "{stage_two}");
-    assert!(number(&uncertainty["relative"]["kd"][0]) < 0.2, "{stage_two}");
-    assert!(uncertainty["state"]["alpha"].is_string() && uncertainty["relative"]["f0"].is_array(), "{stage_two}");
+    let uncertainty = &json["uncertainty"];
+    assert_eq!(uncertainty["state"]["kd"], json!(["determined", "determined", "determined"]), "{uncertainty}");
+    let kd =
+        [&uncertainty["low"], &json["polished"]["parameters"], &uncertainty["high"]].map(|of| number(&of["kd"][0]));
+    assert!(kd[0] < kd[1] && kd[1] < kd[2] && kd[2] < 1.5 * kd[0], "{kd:?}");
+    assert!(uncertainty["state"]["alpha"].is_string() && uncertainty["low"]["f0"].is_array(), "{uncertainty}");
+    assert!(answer.stdout.contains("95 % range"), "{}", answer.stdout);
     let open = uncertainty.to_string().contains("undetermined");
     assert_eq!(answer.stdout.contains("the photo does not determine"), open, "{}", answer.stdout);
     let polished = &json["polished"];

@@ -155,7 +155,7 @@ fn every_search_obeys_held_parameters_and_narrower_ranges() {
             assert_eq!((&parameters["f90"], &parameters["kd"]), (&json!(1.0), &json!([0.25, 0.1, 0.05])));
             assert!((0.3..=0.4).contains(&number(&parameters["alpha"])), "{parameters}");
         }
-        let state = &json["stage_two"]["uncertainty"]["state"];
+        let state = &json["uncertainty"]["state"];
         assert_eq!((&state["f90"], &state["kd"]), (&json!("held"), &json!(["held", "held", "held"])));
         assert_ne!(state["f0"], json!(["held", "held", "held"]));
     }

@@ -2,12 +2,12 @@
 
 use super::scene::{Bench, capture, method};
 use crate::{
-    fit::{Method, Uncertainty},
+    fit::{Known, Method, Standing},
     plan::{FitOutcome, FitPlanner},
 };
 
 fn outcome(name: &str, material: &[f64], noise: f64) -> FitOutcome {
-    let method = Method { polish: false, ..method(name) };
+    let method = Method { gammas: vec![1.0, 2.0], ..method(name) };
     let planner = FitPlanner::new(capture(name, material, noise), method, 1.0).unwrap();
     Bench::default().run(planner, |_| 0, |_, output| output).unwrap().into_outcome().unwrap()
 }
@@ -15,27 +15,30 @@ fn outcome(name: &str, material: &[f64], noise: f64) -> FitOutcome {
 #[test]
 fn width_and_fresnel_of_a_material_without_highlights_are_not_determined() {
     let outcome = outcome("cook-torrance", &[0.3, 0.2, 0.1, 0.0, 0.0, 0.0, 0.3, 0.2], 0.02);
-    let won = &outcome.judged[outcome.winner];
-    assert_eq!(outcome.uncertainty[7], Uncertainty::Undetermined, "m: {won:?} {:?}", outcome.uncertainty);
-    assert_eq!(outcome.uncertainty[6], Uncertainty::Undetermined, "f0: {won:?} {:?}", outcome.uncertainty);
-    for colour in &outcome.uncertainty[..3] {
-        assert!(matches!(colour, Uncertainty::StandardError(e) if *e < 0.02), "{:?}", outcome.uncertainty);
+    let entries = &outcome.uncertainty.entries;
+    assert_eq!(
+        (entries[7].standing, entries[6].standing),
+        (Standing::Undetermined, Standing::Undetermined),
+        "{entries:?}"
+    );
+    for Known { low, high, standing } in &entries[..3] {
+        assert!(*standing == Standing::Determined && high - low < 0.04, "{entries:?}");
     }
 }
 
 #[test]
-fn parameters_of_a_glossy_material_are_determined_and_within_their_errors() {
+fn parameters_of_a_glossy_material_are_determined_and_within_their_ranges() {
     let material = [0.3, 0.2, 0.1, 0.05, 0.05, 0.05, 1.0, 0.2];
-    for noise in [0.0, 0.02] {
+    let mut widths = Vec::new();
+    for noise in [0.005, 0.02] {
         let outcome = outcome("ggx", &material, noise);
-        let errors = outcome.uncertainty.iter().map(|u| match u {
-            Uncertainty::StandardError(error) => *error,
-            other => panic!("{other:?}: {:?}", outcome.uncertainty),
-        });
-        let found = &outcome.judged[outcome.winner].candidate.parameters;
-        for ((error, found), known) in errors.zip(found).zip(&material) {
-            // Beside the noise there is the difference of two quadratures, below 0.01 in every parameter here.
-            assert!((found - known).abs() < 4.0 * error + 0.01, "{found} +- {error} of {known}");
+        let entries = &outcome.uncertainty.entries;
+        for (Known { low, high, standing }, known) in entries.iter().zip(&material) {
+            assert_eq!(*standing, Standing::Determined, "{entries:?}");
+            // The difference of two quadratures is below 0.01 in every parameter here.
+            assert!((low - 0.01..=high + 0.01).contains(known), "{low} to {high} of {known}");
         }
+        widths.push(entries[7].high - entries[7].low);
     }
+    assert!(widths[1] > 1.5 * widths[0], "noise makes a width less certain: {widths:?}");
 }

@@ -1,0 +1,71 @@
+//! `uncertainty`: how well the photo determines the parameters of the match.
+
+use super::view::Scene;
+use crate::{
+    fit::{self, Known, Ranges, Standing},
+    graph::{Blob, NodeFailure, NodeType, RunContext},
+    nodes::wire::{check_parameters, read, write},
+};
+use serde::{Deserialize, Serialize};
+
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub(crate) struct UncertaintyParameters {
+    pub(crate) model: String,
+    pub(crate) ranges: Ranges,
+    pub(crate) point: Vec<f64>,
+}
+
+#[derive(Debug, Serialize, Deserialize)]
+pub(crate) struct UncertaintyWire {
+    /// For every entry of the flat parameter vector the smallest and the largest value, and the number of its standing.
+    pub(crate) entries: Vec<(f64, f64, u8)>,
+    pub(crate) trades: Vec<(u32, u32)>,
+}
+
+/// The standings in the order of their numbers.
+const STANDINGS: [Standing; 4] = [Standing::Determined, Standing::AtBound, Standing::Undetermined, Standing::Held];
+
+impl UncertaintyWire {
+    fn of(found: &fit::Uncertainty) -> Self {
+        let number = |of: Standing| STANDINGS.iter().position(|standing| *standing == of).unwrap_or(0) as u8;
+        let entries = found.entries.iter().map(|known| (known.low, known.high, number(known.standing)));
+        let trades = found.trades.iter().map(|&(a, b)| (a as u32, b as u32));
+        Self { entries: entries.collect(), trades: trades.collect() }
+    }
+
+    /// What was found; `None` if the numbers cannot be that.
+    pub(crate) fn uncertainty(self) -> Option<fit::Uncertainty> {
+        let known = |(low, high, number): (f64, f64, u8)| {
+            let standing = *STANDINGS.get(usize::from(number))?;
+            (low <= high && (high - low).is_finite()).then_some(Known { low, high, standing })
+        };
+        let entries = self.entries.into_iter().map(known).collect::<Option<Vec<_>>>()?;
+        let trade = |(a, b): (u32, u32)| {
+            let (a, b) = (a as usize, b as usize);
+            (a < entries.len() && b < entries.len()).then_some((a, b))
+        };
+        let trades = self.trades.into_iter().map(trade).collect::<Option<Vec<_>>>()?;
+        Some(fit::Uncertainty { entries, trades })
+    }
+}
+
+#[derive(Debug)]
+pub(super) struct Uncertainty;
+
+impl NodeType for Uncertainty {
+    fn kind(&self) -> &'static str {
+        super::UNCERTAINTY
+    }
+
+    fn run(&self, parameters: &[u8], inputs: &[Blob], context: &RunContext) -> Result<Vec<u8>, NodeFailure> {
+        let UncertaintyParameters { model, ranges, point } = read("parameters of uncertainty", parameters)?;
+        let scene = Scene::read(&model, inputs, context)?;
+        ranges.check(scene.model).map_err(|error| NodeFailure::new(error.to_string()))?;
+        check_parameters("point", scene.model, &point)?;
+        let searching = scene.view.searching()?;
+        let found = fit::uncertainty::uncertainty(&scene.full(), scene.view.judges(&searching), &ranges, &point)
+            .map_err(|error| NodeFailure::new(format!("uncertainty: {error}")))?;
+        context.check()?;
+        write("uncertainty", &UncertaintyWire::of(&found))
+    }
+}
