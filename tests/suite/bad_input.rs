@@ -155,7 +155,7 @@ fn capture(folder: &Path, photo: &str, mask: Option<&str>, normals: Option<&str>
     let environment = EnvironmentSettings { path: folder.join("map.exr"), mapping: None, rotation_deg: 0.0 };
     let view = ViewSettings { camera: Camera::Orthographic, normals: normals.map(|name| folder.join(name)) };
     let (photo, mask) = (folder.join(photo), mask.map(|name| folder.join(name)));
-    let files = CaptureSettings { photo, mask, environment, view, sphere: None };
+    let files = CaptureSettings { photo, layer: None, mask, environment, view, sphere: None };
     load_capture(&files).map_err(|error| format!("{error:#}"))
 }
 

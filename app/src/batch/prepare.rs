@@ -38,7 +38,8 @@ impl Prepared {
         let inputs = loaded.to_json();
         let capture = Arc::new(loaded.capture);
         let coverage = capture.scoring_coverage();
-        let exposure = resolve_display_exposure(&fit.display_exposure, capture.photo(), &coverage)?;
+        let exposure =
+            resolve_display_exposure(&fit.display_exposure, capture.photo(), &coverage, capture.clipped_at())?;
         let methods = fit.methods.clone();
         let placement = match stage_two {
             StageTwo::Coordinator => Placement::Coordinator,

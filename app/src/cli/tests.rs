@@ -88,13 +88,14 @@ fn a_plain_fit_has_the_defaults_of_the_design() {
 
 #[test]
 fn every_group_of_flags_reaches_the_settings() {
-    let flags = "--mask m.png --env-mapping angular --env-rotation -30 --camera perspective:30 --sphere -5,6.5,100 \
+    let flags = "--mask m.png --layer beauty --env-mapping angular --env-rotation -30 --camera perspective:30 --sphere -5,6.5,100 \
                  --model cook-torrance --fix ks=.5,f0=.1 --bounds m=.1:.3 --gammas 1:2:0.5 --samples full --sampling uniform --subsets 4 --search pattern \
                  --polish off --judge object --display-exposure from:old.json --seed 7 --max-cssim 0.1 --workers 0 \
                  --listen 10.0.0.1:4100 --advertise node7:4101 --wait-for-workers 90s --grace 1h \
                  --progress json";
     let settings = fit(&[&PLAIN[..], &flags.split_whitespace().collect::<Vec<_>>()].concat()).unwrap();
     assert_eq!(settings.capture.mask, Some("m.png".into()));
+    assert_eq!(settings.capture.layer.as_deref(), Some("beauty"));
     assert_eq!(settings.capture.environment.rotation_deg, -30.0);
     assert_eq!(settings.capture.sphere.unwrap().x, -5.0);
     assert_eq!(settings.methods.common().gammas, [1.0, 1.5, 2.0]);

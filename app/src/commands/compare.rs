@@ -35,7 +35,7 @@ pub(crate) fn run(settings: CompareSettings) -> anyhow::Result<ExitCode> {
     check_sizes(&settings, &reference, &image)?;
     let mask = settings.mask.as_deref().map(load_mask).transpose()?;
     let coverage = Coverage::choose(mask.as_ref(), &reference, &image)?;
-    let exposure = resolve_display_exposure(&settings.display_exposure, &reference.image, &coverage.exposed)?;
+    let exposure = resolve_display_exposure(&settings.display_exposure, &reference.image, &coverage.exposed, None)?;
     let mut warnings = [&reference.warnings[..], &image.warnings].concat();
     warnings.extend(mixed_encodings(&reference, &image, exposure));
     show_warnings(&warnings);

@@ -17,7 +17,12 @@ pub(crate) fn run(settings: FitSettings) -> anyhow::Result<ExitCode> {
     let loaded = load_capture(&settings.capture)?;
     show_warnings(&loaded.warnings);
     let coverage = loaded.capture.scoring_coverage();
-    let exposure = resolve_display_exposure(&settings.display_exposure, loaded.capture.photo(), &coverage)?;
+    let exposure = resolve_display_exposure(
+        &settings.display_exposure,
+        loaded.capture.photo(),
+        &coverage,
+        loaded.capture.clipped_at(),
+    )?;
     drop(activity);
     let out = folder.begin()?;
     let job = FitJob {

@@ -72,7 +72,8 @@ pub fn load_capture_under(
     files: &CaptureSettings,
     light: impl FnOnce(&EnvironmentSettings) -> anyhow::Result<LoadedEnvironment>,
 ) -> anyhow::Result<LoadedCapture> {
-    let LoadedPhoto { image, clipped, encoding, source, mut warnings, .. } = load_photo(&files.photo)?;
+    let LoadedPhoto { image, clipped, encoding, source, mut warnings, .. } =
+        load_photo(&files.photo, files.layer.as_deref())?;
     let (width, height) = (image.width(), image.height());
     let mask = files.mask.as_deref().map(|path| same_size(path, width, height)).transpose()?;
     let mask_values = mask.as_ref().map(|loaded| &loaded.mask);

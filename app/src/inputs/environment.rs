@@ -4,8 +4,9 @@ use super::file::{InputFile, cannot_use, read_with};
 use crate::settings::EnvironmentSettings;
 use anyhow::{Context, bail};
 use lookalike::{
-    image::{Decoded, Encoding, decode},
+    image::{Decoded, Encoding, Image, decode},
     light::{Environment, Mapping, to_lat_long},
+    scene::plateau,
 };
 use std::sync::Arc;
 
@@ -37,10 +38,24 @@ pub fn load_environment(settings: &EnvironmentSettings) -> anyhow::Result<Loaded
         None => Mapping::recognise(width, height),
     };
     let mapping = mapping.with_context(|| cannot_use(path, ROLE))?;
+    let clipped = cut_off(&decoded.image);
     let environment = to_lat_long(decoded.image, mapping).with_context(|| cannot_use(path, ROLE))?;
     let environment = Arc::new(environment.rotated(settings.rotation_deg));
-    let warnings = decoded.warnings.iter().map(|text| format!("{}: {text}", path.display())).collect();
+    let warnings = decoded.warnings.iter().chain(&clipped).map(|text| format!("{}: {text}", path.display())).collect();
     Ok(LoadedEnvironment { environment, mapping, source, warnings })
+}
+
+/// A warning if the brightest texels were cut off, in all channels at one level.
+fn cut_off(map: &Image) -> Option<String> {
+    let level = plateau(map.pixels().iter().map(|texel| texel[0]))?;
+    let count = map.pixels().iter().filter(|texel| **texel == [level; 3]).count();
+    let is_common = [1, 2].iter().all(|&c| plateau(map.pixels().iter().map(|texel| texel[c])) == Some(level));
+    is_common.then(|| {
+        format!(
+            "{count} texels have the same largest value {level} in all channels: lamps or the sun were probably cut off there, and \
+             highlights will look too strong for the light; use a map of full range"
+        )
+    })
 }
 
 /// Refuses display values.

@@ -11,17 +11,29 @@ use serde_json::Value;
 use std::path::Path;
 
 /// The factor of the display transform. An automatic exposure is computed from the pixels of `reference` whose `coverage` (one value per
-/// pixel) is 1.
+/// pixel) is 1. If the reference is clipped at a level, that level becomes white: a match is not clipped, and above it both must look the same.
 ///
 /// # Errors
 /// If there is no light to expose for, or the file that holds the factor cannot be used.
-pub fn resolve_display_exposure(asked: &DisplayExposure, reference: &Image, coverage: &[f32]) -> anyhow::Result<f64> {
+pub fn resolve_display_exposure(
+    asked: &DisplayExposure,
+    reference: &Image,
+    coverage: &[f32],
+    clipped_at: Option<f32>,
+) -> anyhow::Result<f64> {
     match asked {
-        DisplayExposure::Auto => auto_exposure(reference, coverage).context("--display-exposure auto"),
+        DisplayExposure::Auto => {
+            let auto = auto_exposure(reference, coverage).context("--display-exposure auto")?;
+            let white = clipped_at.map_or(0.0, |level| 1.0 / f64::from(level));
+            Ok(auto.max(white.min(MOST_RAISED * auto)))
+        }
         DisplayExposure::Value(value) => Ok(*value),
         DisplayExposure::From(path) => load_display_exposure(path),
     }
 }
+
+/// By how much a clipped level may raise the exposure: above it most of the photo would be white.
+const MOST_RAISED: f64 = 4.0;
 
 /// The factor that an earlier run used, from its `fit.json` or the metadata of one of its images.
 ///

@@ -3,7 +3,7 @@
 use super::file::{InputFile, cannot_use, read_with};
 use anyhow::Context;
 use lookalike::{
-    image::{Decoded, Encoding, Image, Plane, decode, decode_mask},
+    image::{Decoded, Encoding, Image, Plane, Source, decode_mask},
     math::{narrow, widen},
     scene::Mask,
 };
@@ -32,8 +32,8 @@ pub struct LoadedPhoto {
 ///
 /// # Errors
 /// If the file cannot be read or decoded.
-pub fn load_photo(path: &Path) -> anyhow::Result<LoadedPhoto> {
-    load_image(path, "photo")
+pub fn load_photo(path: &Path, layer: Option<&str>) -> anyhow::Result<LoadedPhoto> {
+    load_layer(path, layer, "photo")
 }
 
 /// Reads an image. Errors name its `role`, such as "reference".
@@ -41,7 +41,11 @@ pub fn load_photo(path: &Path) -> anyhow::Result<LoadedPhoto> {
 /// # Errors
 /// If the file cannot be read or decoded.
 pub fn load_image(path: &Path, role: &str) -> anyhow::Result<LoadedPhoto> {
-    let mut decoded = read_with(path, role, decode)?;
+    load_layer(path, None, role)
+}
+
+fn load_layer(path: &Path, layer: Option<&str>, role: &str) -> anyhow::Result<LoadedPhoto> {
+    let mut decoded = read_with(path, role, |name, bytes| Source::new(name, bytes).with_layer(layer).decode())?;
     let is_blended = blend_over_black(&mut decoded);
     let mut warnings = decoded.warnings;
     if is_blended {

@@ -11,6 +11,8 @@ use std::path::{Path, PathBuf};
 pub struct CaptureSettings {
     /// The photo.
     pub photo: PathBuf,
+    /// The layer of an OpenEXR photo. `None`: the one that looks like a picture by its name.
+    pub layer: Option<String>,
     /// Which pixels show the object. `None`: all that the silhouette covers.
     pub mask: Option<PathBuf>,
     /// The light.

@@ -23,7 +23,9 @@ use super::{
 };
 use crate::{
     brdf::Model,
-    search::{Bounds, NormalEquations, SearchError, bvls},
+    image::Image,
+    metric::Score,
+    search::{Bounds, NormalEquations, SearchError, bvls, eigen},
 };
 use std::cmp::Ordering;
 
@@ -61,12 +63,12 @@ pub struct Uncertainty {
 }
 
 /// Ranges hold the values for which CSSIM rises by at most this share of the reached score.
-const SHARE: f64 = 0.004;
+const SHARE: f64 = 0.002;
 
 /// What the error of tables costs at least, as if it were reached (it is what noise of .5 % costs: design sections 5 and 6).
 const LEAST: f64 = 4e-4;
 
-/// Steps of the differences raise CSSIM by about this much. Single precision is exact to a fiftieth of it.
+/// Steps of the first differences raise CSSIM by about this much.
 const RISE: f64 = 1e-4;
 
 /// Steps that raise it by up to so many times less or more are kept.
@@ -89,19 +91,18 @@ const TRADE: (f64, f64) = (0.9, 0.1);
 struct Surroundings<'a> {
     view: &'a FullView<'a>,
     renderer: Renderer<'a>,
-    judges: Judges<'a>,
-    bounds: Bounds,
+    /// The score of a picture; `None` if it cannot be scored.
+    judge: &'a dyn Fn(&Image) -> Option<f64>,
+    bounds: &'a Bounds,
     /// Where it can be rendered, in scaled parameters: the table may not have all widths.
-    inside: Vec<(f64, f64)>,
+    inside: &'a [(f64, f64)],
 }
 
 impl Surroundings<'_> {
     /// CSSIM at scaled parameters.
     fn score(&self, scaled: &[f64]) -> Result<f64, SearchError> {
         let point: Vec<f64> = scaled.iter().enumerate().map(|(i, &t)| self.bounds.to_natural(i, t)).collect();
-        let score = self.judges.searching.score(&self.renderer.render(&point));
-        let picked = score.map(|score| self.judges.by.pick(score.cssim, score.cssim_object));
-        picked.map_err(|_| SearchError::NotFinite { what: "the CSSIM", point })
+        (self.judge)(&self.renderer.render(&point)).ok_or(SearchError::NotFinite { what: "the CSSIM", point })
     }
 
     fn moved(&self, from: &[f64], steps: &[(usize, f64)]) -> Result<f64, SearchError> {
@@ -110,52 +111,71 @@ impl Surroundings<'_> {
         self.score(&scaled)
     }
 
-    /// The middle of a step to both sides that stays where it can be rendered.
-    fn middle(&self, i: usize, at: f64, step: f64) -> f64 {
-        let (low, high) = self.inside[i];
-        at.min(high - step).max(low + step)
-    }
-
-    /// A step of entry `i` that raises CSSIM by about `rise`.
-    fn step(&self, i: usize, at: &[f64], rise: f64) -> Result<f64, SearchError> {
-        let (low, high) = self.inside[i];
-        let most = LARGEST.min(0.5 * (high - low));
-        let mut step = FIRST.min(most);
-        for _ in 0..TRIALS {
-            let mut middle = at.to_vec();
-            middle[i] = self.middle(i, at[i], step);
-            let (below, here, above) =
-                (self.moved(&middle, &[(i, -step)])?, self.score(&middle)?, self.moved(&middle, &[(i, step)])?);
-            let found = 0.5 * (below + above) - here;
-            if (rise / NEAR..=rise * NEAR).contains(&found) || (step >= most && found < rise) {
-                break;
-            }
-            step = (step * (rise / found.max(0.01 * rise)).sqrt()).min(most);
-        }
-        Ok(step)
-    }
-
-    /// The differences of CSSIM around the scaled parameters `at`, over the entries `free`.
-    fn quadratic(&self, at: &[f64], free: &[usize], rise: f64) -> Result<Quadratic, SearchError> {
-        let steps = free.iter().map(|&i| self.step(i, at, rise)).collect::<Result<Vec<_>, _>>()?;
+    /// The nearest place from which a step to both sides stays where it can be rendered.
+    fn middle(&self, at: &[f64], direction: &[(usize, f64)], step: f64) -> Vec<f64> {
         let mut middle = at.to_vec();
-        free.iter().zip(&steps).for_each(|(&i, &step)| middle[i] = self.middle(i, at[i], step));
-        let mut normal = NormalEquations::new(free.len());
+        for &(i, share) in direction {
+            let ((low, high), step) = (self.inside[i], (share * step).abs());
+            middle[i] = at[i].min(high - step).max(low + step);
+        }
+        middle
+    }
+
+    /// CSSIM at a step to either side that raises it by about `rise`, at first `guess`.
+    fn step(&self, at: &[f64], direction: &[(usize, f64)], rise: f64, guess: f64) -> Result<Step, SearchError> {
+        let most = direction.iter().filter(|(_, share)| *share != 0.0).map(|&(i, share)| {
+            let (low, high) = self.inside[i];
+            LARGEST.min(0.5 * (high - low)) / share.abs()
+        });
+        let most = most.fold(f64::INFINITY, f64::min);
+        let scaled = |step: f64| direction.iter().map(|&(i, share)| (i, share * step)).collect::<Vec<_>>();
+        let mut length = guess.min(most);
+        for trial in 1.. {
+            let middle = self.middle(at, direction, length);
+            let (below, here, above) =
+                (self.moved(&middle, &scaled(-length))?, self.score(&middle)?, self.moved(&middle, &scaled(length))?);
+            let found = 0.5 * (below + above) - here;
+            let is_near = (rise / NEAR..=rise * NEAR).contains(&found) || (length >= most && found < rise);
+            if is_near || trial == TRIALS {
+                return Ok(Step { length, middle, below, here, above });
+            }
+            length = (length * (rise / found.max(0.01 * rise)).sqrt()).min(most);
+        }
+        unreachable!("the last trial returns")
+    }
+
+    /// The Hessian of CSSIM around the scaled parameters `at`, over the entries `free`.
+    fn hessian(&self, at: &[f64], free: &[usize], rise: f64) -> Result<NormalEquations, SearchError> {
+        let steps = free.iter().map(|&i| Ok(self.step(at, &[(i, 1.0)], rise, FIRST)?.length));
+        let steps = steps.collect::<Result<Vec<f64>, SearchError>>()?;
+        let mut middle = at.to_vec();
+        for (&i, &step) in free.iter().zip(&steps) {
+            middle = self.middle(&middle, &[(i, 1.0)], step);
+        }
+        let mut hessian = NormalEquations::new(free.len());
         let here = self.score(&middle)?;
-        // Entries of widths last: neighbouring evaluations then have the same widths, whose integrals are kept.
         let mut above = Vec::new();
+        // Widths come last: neighbouring evaluations then have the same widths, whose integrals are kept.
         for (a, (&i, &step)) in free.iter().zip(&steps).enumerate() {
             let (up, down) = (self.moved(&middle, &[(i, step)])?, self.moved(&middle, &[(i, -step)])?);
-            normal.set_matrix(a, a, (up - 2.0 * here + down) / (step * step));
-            normal.set_vector(a, (down - up) / (2.0 * step));
+            hessian.set_matrix(a, a, (up - 2.0 * here + down) / (step * step));
             for b in 0..a {
                 let both = self.moved(&middle, &[(i, step), (free[b], steps[b])])?;
-                normal.set_matrix(a, b, (both - up - above[b] + here) / (step * steps[b]));
+                hessian.set_matrix(a, b, (both - up - above[b] + here) / (step * steps[b]));
             }
             above.push(up);
         }
-        Ok(Quadratic { middle: free.iter().map(|&i| middle[i]).collect(), normal })
+        Ok(hessian)
     }
+}
+
+/// CSSIM in the middle of a step and at its ends.
+struct Step {
+    length: f64,
+    middle: Vec<f64>,
+    below: f64,
+    here: f64,
+    above: f64,
 }
 
 /// A quadratic: its value above that in the middle is `x^T A x / 2 - b^T x` at x from the middle, with A and b of the normal equations.
@@ -171,19 +191,32 @@ impl Quadratic {
         x.iter().zip(self.normal.times(&x)).enumerate().map(of).sum()
     }
 
-    /// Adds curvature, the same in all directions, until there is some in each of them: over a whole range no less than `least`.
-    fn make_convex(&mut self, least: f64) {
-        let n = self.normal.dimension();
-        let all = vec![true; n];
-        let mut added = 2.0 * least;
-        loop {
-            (0..n).for_each(|i| self.normal.set_matrix(i, i, self.normal.matrix(i, i) + added));
-            let is_convex = self.normal.variances(&all).iter().all(|x| x.is_finite());
-            if is_convex || added > 1e3 {
-                return;
+    /// The quadratic around `at` over the entries `free`, along the eigenvectors of the Hessian. Valleys are narrow and curved: the differences over
+    /// the parameters do not tell how CSSIM rises along one, so along each eigenvector slope and curvature are measured again, over a step that
+    /// raises CSSIM by about `allowed`.
+    fn along(
+        hessian: &NormalEquations,
+        near: &Surroundings<'_>,
+        (at, free): (&[f64], &[usize]),
+        allowed: f64,
+    ) -> Result<Self, SearchError> {
+        let n = free.len();
+        let mut normal = NormalEquations::new(n);
+        for (value, vector) in eigen::symmetric(n, |i, j| hessian.matrix(i, j)) {
+            let direction: Vec<(usize, f64)> = free.iter().copied().zip(vector.iter().copied()).collect();
+            let guess = if value > 0.0 { (2.0 * allowed / value).sqrt() } else { LARGEST };
+            let step = near.step(at, &direction, allowed, guess)?;
+            // Over the whole range CSSIM rises by so much at least.
+            let curvature =
+                ((step.above - 2.0 * step.here + step.below) / (step.length * step.length)).max(2.0 * allowed);
+            let moved: f64 = direction.iter().map(|&(i, share)| share * (step.middle[i] - at[i])).sum();
+            let slope = (step.above - step.below) / (2.0 * step.length) - curvature * moved;
+            for i in 0..n {
+                normal.set_vector(i, normal.vector(i) - slope * vector[i]);
+                (i..n).for_each(|j| normal.set_matrix(i, j, normal.matrix(i, j) + curvature * vector[i] * vector[j]));
             }
-            added *= 2.0;
         }
+        Ok(Self { middle: free.iter().map(|&i| at[i]).collect(), normal })
     }
 
     /// Its minimum over all entries in [0, 1] but entry `i`, which is `t`.
@@ -231,8 +264,13 @@ pub(crate) fn uncertainty(
         // An end of the table that lies beyond the match by rounding counts as its own.
         (limit(table.lower()[i]).min(scaled[i]), limit(table.upper()[i]).max(scaled[i]))
     };
-    let inside = (0..point.len()).map(limits).collect();
-    let near = Surroundings { view, renderer: Renderer::new(view), judges, bounds, inside };
+    let inside: Vec<(f64, f64)> = (0..point.len()).map(limits).collect();
+    let pick = |score: Score| judges.by.pick(score.cssim, score.cssim_object);
+    let roughly = |image: &Image| judges.searching.score(image).ok().map(pick);
+    let exactly = |image: &Image| judges.reporting.score(image).ok().map(pick);
+    let (bounds, inside) = (&bounds, &inside[..]);
+    let around = |judge| Surroundings { view, renderer: Renderer::new(view), judge, bounds, inside };
+    let near = around(&roughly);
     let reached = near.score(&scaled)?;
     let allowed = SHARE * reached.max(LEAST);
     let free: Vec<usize> = (0..point.len()).filter(|&i| near.bounds.lower()[i] < near.bounds.upper()[i]).collect();
@@ -240,8 +278,9 @@ pub(crate) fn uncertainty(
     if free.is_empty() {
         return Ok(Uncertainty { entries, trades: Vec::new() });
     }
-    let mut quadratic = near.quadratic(&scaled, &free, allowed.max(RISE))?;
-    quadratic.make_convex(allowed);
+    let hessian = near.hessian(&scaled, &free, allowed.max(RISE))?;
+    let quadratic = Quadratic::along(&hessian, &around(&exactly), (&scaled, &free), allowed)?;
+    judges.reporting.free_buffers();
     let at: Vec<f64> = free.iter().map(|&i| scaled[i]).collect();
     let limit = quadratic.value(&at) + allowed;
     // A narrower range of the search makes no value more certain.

@@ -3,16 +3,17 @@
 use super::decoded::{Decoded, Format};
 use super::error::ImageError;
 use super::source::Source;
-use super::{Plane, jpeg, mask, normals, openexr, pfm, png, rgbe};
+use super::{Plane, jpeg, mask, normals, openexr, pfm, png, rgbe, tiff};
 use crate::math::Vec3;
 
 /// Decodes a colour image of any supported format. The format is recognised by content; `name` is used only in errors.
 ///
-/// - OpenEXR: the first part with `R G B` (the unnamed layer before named ones), else `Y` as grey. The data window is
+/// - OpenEXR: `R G B` of the unnamed layer or of one that is named like a picture, else `Y` as grey. The data window is
 ///   placed in the display window: black where it does not cover it, cropped where it exceeds it. `chromaticities` are
 ///   converted to Rec. 709.
 /// - Radiance HDR: divided by `EXPOSURE` and `COLORCORR`; `PRIMARIES` are converted to Rec. 709.
 /// - PFM: multiplied by the magnitude of the scale.
+/// - TIFF: float and half as radiance, integers as PNG.
 /// - PNG, JPEG: decoded from sRGB, even if the file declares other colours, which gives a warning. Exif orientation is
 ///   applied.
 ///
@@ -48,12 +49,21 @@ impl Source<'_> {
     /// # Errors
     /// See [`decode`].
     pub fn decode(&self) -> Result<Decoded, ImageError> {
-        match self.format()? {
+        let format = self.format()?;
+        if let Some(layer) = self.layer.filter(|_| format != Format::OpenExr) {
+            return Err(self.unsupported(
+                format,
+                format!("a layer ({layer:?})"),
+                "leave out --layer, which is for OpenEXR",
+            ));
+        }
+        match format {
             Format::OpenExr => openexr::decode(self),
             Format::RadianceHdr => rgbe::decode(self),
             Format::Pfm => pfm::decode(self),
             Format::Png => png::decode(self),
             Format::Jpeg => jpeg::decode(self),
+            Format::Tiff => tiff::decode(self),
         }
     }
 

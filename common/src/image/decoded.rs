@@ -28,7 +28,7 @@ pub struct Decoded {
 }
 
 impl Decoded {
-    /// Whether the colours are multiplied by [`Self::alpha`]: in OpenEXR they are, in PNG they are not.
+    /// Whether the colours are multiplied by [`Self::alpha`]: in OpenEXR they are, in PNG and TIFF they are not.
     #[must_use]
     pub fn is_premultiplied(&self) -> bool {
         self.format == Format::OpenExr
@@ -57,6 +57,8 @@ pub enum Format {
     Png,
     /// JPEG, `.jpg`.
     Jpeg,
+    /// TIFF, `.tif`.
+    Tiff,
 }
 
 impl Format {
@@ -69,6 +71,7 @@ impl Format {
             [b'P', b'F' | b'f', b' ' | b'\t' | b'\r' | b'\n', ..] => Some(Self::Pfm),
             [0x89, b'P', b'N', b'G', b'\r', b'\n', 0x1a, b'\n', ..] => Some(Self::Png),
             [0xff, 0xd8, 0xff, ..] => Some(Self::Jpeg),
+            [b'I', b'I', 0x2a, 0, ..] | [b'M', b'M', 0, 0x2a, ..] => Some(Self::Tiff),
             _ => None,
         }
     }
@@ -82,6 +85,7 @@ impl fmt::Display for Format {
             Self::Pfm => "PFM",
             Self::Png => "PNG",
             Self::Jpeg => "JPEG",
+            Self::Tiff => "TIFF",
         })
     }
 }

@@ -8,7 +8,7 @@ use super::decoded::Format;
 pub enum ImageError {
     /// The format is not supported.
     #[error(
-        "{name}: expected OpenEXR, Radiance HDR, PFM, PNG or JPEG, found {found}; convert the file to one of these"
+        "{name}: expected OpenEXR, Radiance HDR, PFM, PNG, JPEG or TIFF, found {found}; convert the file to one of these"
     )]
     UnknownFormat {
         /// The file, as named by the caller.
@@ -64,7 +64,7 @@ pub enum ImageError {
         /// The file, as named by the caller.
         name: String,
         /// The channels that are needed.
-        expected: &'static str,
+        expected: String,
         /// The channels of the file.
         found: String,
     },

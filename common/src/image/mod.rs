@@ -1,6 +1,6 @@
 //! Pixel buffers, and readers and writers of image files. Readers take bytes, not paths; writers return bytes.
 //!
-//! - [`decode`] reads a photograph or a light probe: OpenEXR, Radiance HDR, PFM, PNG or JPEG, recognised by content;
+//! - [`decode`] reads a photograph or a light probe: OpenEXR, Radiance HDR, PFM, PNG, JPEG or TIFF, recognised by content;
 //! - [`decode_mask`] reads a coverage mask, [`decode_normals`] a normal map;
 //! - [`openexr::write`], [`pfm::write`] and [`png::write`] write results; [`metadata`] has the keys of the text in
 //!   them;
@@ -30,6 +30,7 @@ mod source;
 pub mod srgb;
 #[cfg(test)]
 mod tests;
+mod tiff;
 
 pub use decode::{decode, decode_mask, decode_normals};
 pub use decoded::{Decoded, Encoding, Format};

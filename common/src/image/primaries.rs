@@ -33,9 +33,7 @@ impl Primaries {
         }
         let ours = self.to_xyz().ok_or(NotPrimaries)?;
         let rec709 = Self::REC_709.to_xyz().ok_or(NotPrimaries)?;
-        let (from, to) = (BRADFORD * xyz(self.white), BRADFORD * xyz(Self::REC_709.white));
-        let adapt = BRADFORD.inverse() * Mat3::from_diagonal(to / from) * BRADFORD;
-        let matrix = rec709.inverse() * adapt * ours;
+        let matrix = rec709.inverse() * adapted(self.white) * ours;
         if matrix.is_finite() { Ok(Some(matrix)) } else { Err(NotPrimaries) }
     }
 
@@ -55,6 +53,21 @@ impl Primaries {
         let determinant = matrix.determinant();
         (matrix.is_finite() && determinant.is_finite() && determinant.abs() > 1e-6).then_some(matrix)
     }
+}
+
+/// The matrix from XYZ, whose white is `white` with luminance 1, to Rec. 709.
+pub(super) fn xyz_to_rec709(white: [f64; 2]) -> Mat3 {
+    let rec709 = Primaries::REC_709.to_xyz().unwrap_or(Mat3::IDENTITY);
+    rec709.inverse() * adapted(white)
+}
+
+/// The chromaticity of XYZ = (1, 1, 1).
+pub(super) const EQUAL_ENERGY: [f64; 2] = [1.0 / 3.0, 1.0 / 3.0];
+
+/// XYZ under another white, as it looks under D65.
+fn adapted(white: [f64; 2]) -> Mat3 {
+    let (from, to) = (BRADFORD * xyz(white), BRADFORD * xyz(Primaries::REC_709.white));
+    BRADFORD.inverse() * Mat3::from_diagonal(to / from) * BRADFORD
 }
 
 /// The chromaticities are not those of primaries.

@@ -7,6 +7,7 @@
 //!   at most 0.4 % of the brightest component.
 //! - `EXPOSURE` and `COLORCORR` are factors by which the pixels were multiplied. Several are multiplied together. This
 //!   reader divides by them.
+//! - Pixels in CIE XYZ (`FORMAT=32-bit_rle_xyze`) are converted; white is (1, 1, 1), of equal energy.
 //! - `PRIMARIES` other than Rec. 709 are converted. All zero (Photoshop) means unknown. Unknown and missing primaries
 //!   are taken as Rec. 709 (Radiance's documented default is close to Rec. 709, except for an equal-energy white).
 //! - All eight orientations of the resolution line are converted to upright.
@@ -14,8 +15,8 @@
 use super::Image;
 use super::decoded::{Decoded, Encoding, Format};
 use super::error::ImageError;
-use super::primaries::{Primaries, convert};
-use super::source::Source;
+use super::primaries::{EQUAL_ENERGY, Primaries, convert, xyz_to_rec709};
+use super::source::{Source, check_pixel_aspect};
 use crate::math::{Mat3, to_f32};
 
 /// Decodes a Radiance picture.
@@ -77,13 +78,24 @@ impl Header {
     fn apply(&mut self, key: &str, value: &str, source: &Source<'_>) -> Result<(), ImageError> {
         match key {
             "FORMAT" if value == "32-bit_rle_rgbe" => return Ok(()),
+            "FORMAT" if value == "32-bit_rle_xyze" => {
+                self.to_rec709 = Some(xyz_to_rec709(EQUAL_ENERGY));
+                self.warnings.push("colours converted from CIE XYZ (white: equal energy) to Rec. 709".to_owned());
+                return Ok(());
+            }
             "FORMAT" => {
                 return Err(source.unsupported(
                     FORMAT,
                     format!("pixel format {value}"),
-                    "convert it with Radiance's `ra_xyze -r`, or to OpenEXR",
+                    "convert it to 32-bit_rle_rgbe, or to OpenEXR",
                 ));
             }
+            // FreeImage and GIMP write it for "unknown".
+            "EXPOSURE" if number(value) == Some(0.0) => {
+                self.warnings.push(format!("{key}={value} in the header is not a factor and is ignored"));
+                return Ok(());
+            }
+            "PIXASPECT" => check_pixel_aspect(source, FORMAT, number(value).unwrap_or(f64::NAN))?,
             "EXPOSURE" => {
                 let [exposure] = factors(key, value, source)?;
                 self.divisor = self.divisor.map(|d| d * exposure);
@@ -106,6 +118,10 @@ impl Header {
     }
 
     fn set_primaries(&mut self, value: &str, source: &Source<'_>) -> Result<(), ImageError> {
+        // The primaries of XYZ pixels are those of the display for which they were made.
+        if self.to_rec709 == Some(xyz_to_rec709(EQUAL_ENERGY)) {
+            return Ok(());
+        }
         let numbers: Option<[f64; 8]> = numbers(value);
         let Some(numbers) = numbers else {
             return Err(source.malformed(FORMAT, format!("expected eight numbers in PRIMARIES, found `{value}`")));

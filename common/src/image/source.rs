@@ -9,6 +9,8 @@ pub struct Source<'a> {
     pub(super) name: &'a str,
     pub(super) bytes: &'a [u8],
     pub(super) limits: Limits,
+    /// The layer to read, if the user asks for one.
+    pub(super) layer: Option<&'a str>,
 }
 
 /// Size limits, checked before allocation.
@@ -31,13 +33,19 @@ impl<'a> Source<'a> {
     /// The file `name` with content `bytes`, with the default limits.
     #[must_use]
     pub fn new(name: &'a str, bytes: &'a [u8]) -> Self {
-        Self { name, bytes, limits: Limits::default() }
+        Self { name, bytes, limits: Limits::default(), layer: None }
     }
 
     /// The same source with other limits.
     #[must_use]
     pub fn with_limits(self, limits: Limits) -> Self {
         Self { limits, ..self }
+    }
+
+    /// The same source, of which this layer is read: its name, the last component of it, or the name of a part. Only OpenEXR has layers.
+    #[must_use]
+    pub fn with_layer(self, layer: Option<&'a str>) -> Self {
+        Self { layer, ..self }
     }
 
     /// The format by content.
@@ -77,11 +85,42 @@ impl<'a> Source<'a> {
     }
 }
 
+/// Refuses pixels that are not square: a sphere would be an ellipse. `NaN` means that the file says nothing sensible.
+pub(super) fn check_pixel_aspect(source: &Source<'_>, format: Format, aspect: f64) -> Result<(), ImageError> {
+    // Some programs round.
+    const SQUARE: f64 = 0.005;
+    if (aspect - 1.0).abs() <= SQUARE {
+        return Ok(());
+    }
+    let feature = format!("pixels that are not square (width over height {aspect})");
+    Err(source.unsupported(format, feature, "resample it to square pixels, or correct the value in its header"))
+}
+
 /// A description of a file of unknown format.
 fn describe(bytes: &[u8]) -> String {
+    let starts = |text: &[u8]| bytes.starts_with(text);
     match bytes {
         [] => "an empty file".to_owned(),
-        [b'I', b'I', 0x2a | 0x2b, 0, ..] | [b'M', b'M', 0, 0x2a | 0x2b, ..] => "TIFF or a camera's raw file".to_owned(),
+        _ if starts(b"version https://git-lfs.github.com/") => {
+            "a pointer of Git LFS, not the file itself (`git lfs pull` fetches it)".to_owned()
+        }
+        _ if starts(b"/annex/objects/") || starts(b"../.git/annex/") || starts(b".git/annex/") => {
+            "a pointer of git-annex, not the file itself (`git annex get` fetches it)".to_owned()
+        }
+        _ if is_html(bytes) => "an HTML page (the download was a web page, not the file)".to_owned(),
+        _ if starts(b"tensor_file") => {
+            "a tensor file, such as a `.bsdf` of the RGL database: a measured material, not an image".to_owned()
+        }
+        [0x1f, 0x8b, ..] => "a gzip file (unpack it first)".to_owned(),
+        [b'P', b'K', 3, 4, ..] => "a zip archive (unpack it first)".to_owned(),
+        [b'B', b'Z', b'h', ..] => "a bzip2 file (unpack it first)".to_owned(),
+        [0xfd, b'7', b'z', b'X', b'Z', ..] => "an xz file (unpack it first)".to_owned(),
+        [0x28, 0xb5, 0x2f, 0xfd, ..] => "a Zstandard file (unpack it first)".to_owned(),
+        [b'8', b'B', b'P', b'S', ..] => "a Photoshop document".to_owned(),
+        [b'%', b'P', b'D', b'F', ..] => "a PDF document".to_owned(),
+        [0xff, 0x0a, ..] | [0, 0, 0, 12, b'J', b'X', b'L', b' ', ..] => "JPEG XL".to_owned(),
+        [b'I', b'I', 0x2b, 0, ..] | [b'M', b'M', 0, 0x2b, ..] => "BigTIFF".to_owned(),
+        [_, _, _, _, b'f', b't', b'y', b'p', b'c', b'r', b'x', ..] => "a camera's raw file".to_owned(),
         [b'G', b'I', b'F', b'8', ..] => "GIF".to_owned(),
         [b'B', b'M', ..] => "BMP".to_owned(),
         [b'R', b'I', b'F', b'F', _, _, _, _, b'W', b'E', b'B', b'P', ..] => "WebP".to_owned(),
@@ -93,4 +132,11 @@ fn describe(bytes: &[u8]) -> String {
             format!("a file that starts with the bytes {}", start.join(" "))
         }
     }
+}
+
+/// Whether the first words are those of a web page.
+fn is_html(bytes: &[u8]) -> bool {
+    let text: Vec<u8> =
+        bytes.iter().skip_while(|byte| byte.is_ascii_whitespace()).take(14).map(u8::to_ascii_lowercase).collect();
+    [&b"<!doctype html"[..], b"<html", b"<head"].iter().any(|start| text.starts_with(start))
 }

@@ -1,6 +1,6 @@
 //! A photo with its geometry and its light: which pixels show the object, and which of them a fit may use.
 
-use super::{Geometry, Mask, PixelCounts, PixelStatus, SceneError, limits::LEAST_SIDE};
+use super::{Geometry, Mask, PixelCounts, PixelStatus, SceneError, limits::LEAST_SIDE, plateau};
 use crate::image::Image;
 use crate::light::Environment;
 use crate::math::{luminance, widen};
@@ -17,6 +17,7 @@ pub struct Capture {
     status: Vec<PixelStatus>,
     counts: PixelCounts,
     has_background: bool,
+    clipped_at: Option<f32>,
     warnings: Vec<String>,
 }
 
@@ -61,7 +62,8 @@ impl Capture {
         if let Some(clipped) = &clipped {
             assert_eq!(clipped.len(), width * height, "clipping flags of a {width} x {height} photo");
         }
-        let (mut coverage, status) = classify(&photo, clipped.as_deref(), mask.as_ref(), &geometry);
+        let (mut coverage, mut status) = classify(&photo, clipped.as_deref(), mask.as_ref(), &geometry);
+        let clipped_at = clip(&photo, &mut status);
         check_finite(&photo, &coverage, &status)?;
         for (index, pixel) in photo.pixels_mut().iter_mut().enumerate() {
             if !is_finite(*pixel) {
@@ -79,8 +81,17 @@ impl Capture {
         }
         let is_lit_outside = mask.is_none() && means.outside > BACKGROUND * means.usable;
         let has_background = mask.is_some() || is_lit_outside;
-        let mut capture =
-            Self { photo, geometry, environment, coverage, status, counts, has_background, warnings: Vec::new() };
+        let mut capture = Self {
+            photo,
+            geometry,
+            environment,
+            coverage,
+            status,
+            counts,
+            has_background,
+            clipped_at,
+            warnings: Vec::new(),
+        };
         capture.warnings = capture.collect_warnings(is_lit_outside);
         Ok(capture)
     }
@@ -143,6 +154,12 @@ impl Capture {
         self.coverage.iter().map(kept).collect()
     }
 
+    /// The lowest level, of any channel, at which the photo's values were cut off: 1 for formats that limit values, if any pixel is at the limit.
+    #[must_use]
+    pub fn clipped_at(&self) -> Option<f32> {
+        self.clipped_at
+    }
+
     /// Warnings about the photo that the user should read before trusting a fit.
     #[must_use]
     pub fn warnings(&self) -> &[String] {
@@ -171,7 +188,11 @@ impl Capture {
         );
         warn(
             counts.clipped > 0,
-            format!("{} clipped: excluded from the fit, kept in the score", object_pixels(counts.clipped)),
+            format!(
+                "{} clipped (the photo ends at {}): excluded from the fit, kept in the score",
+                object_pixels(counts.clipped),
+                self.clipped_at.unwrap_or(1.0)
+            ),
         );
         warn(
             counts.usable < FEW_PIXELS,
@@ -226,6 +247,25 @@ fn classify(
         (shape * mask, status)
     };
     (0..photo.pixels().len()).into_par_iter().with_min_len(width).map(one).unzip()
+}
+
+/// Marks usable pixels as clipped where a channel is at the level at which it was cut off; returns the lowest of these levels, and of those of pixels
+/// that were marked before.
+fn clip(photo: &Image, status: &mut [PixelStatus]) -> Option<f32> {
+    let values = |c: usize| {
+        let usable = photo.pixels().iter().zip(&*status).filter(|(_, status)| **status == PixelStatus::Usable);
+        usable.map(move |(pixel, _)| pixel[c])
+    };
+    let levels = [0, 1, 2].map(|c| plateau(values(c)));
+    let was_marked = status.contains(&PixelStatus::Clipped);
+    let is_cut_off =
+        |pixel: &[f32; 3]| levels.iter().zip(pixel).any(|(level, x)| level.is_some_and(|level| *x >= level));
+    for (status, pixel) in status.iter_mut().zip(photo.pixels()) {
+        if *status == PixelStatus::Usable && is_cut_off(pixel) {
+            *status = PixelStatus::Clipped;
+        }
+    }
+    levels.into_iter().flatten().chain(was_marked.then_some(1.0)).reduce(f32::min)
 }
 
 /// "1 pixel of the object is", "2 pixels of the object are".

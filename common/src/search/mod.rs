@@ -26,6 +26,7 @@ pub mod bounds;
 pub mod bvls;
 #[cfg(test)]
 pub(crate) mod derivative;
+pub mod eigen;
 pub mod error;
 pub mod least_squares;
 pub mod multi_start;

@@ -106,10 +106,11 @@ fn in_this_process(folder: &Path, level: Level, samples: u32) -> FitOutcome {
     let environment = EnvironmentSettings { path: folder.join("map.exr"), mapping: None, rotation_deg: 0.0 };
     let view = ViewSettings { camera: lookalike::scene::Camera::Orthographic, normals: None };
     let photo = folder.join("photo.exr");
-    let files = CaptureSettings { photo, mask: None, environment, view, sphere: None };
+    let files = CaptureSettings { photo, layer: None, mask: None, environment, view, sphere: None };
     let capture = load_capture(&files).unwrap().capture;
     let coverage = capture.scoring_coverage();
-    let exposure = resolve_display_exposure(&DisplayExposure::Auto, capture.photo(), &coverage).unwrap();
+    let exposure =
+        resolve_display_exposure(&DisplayExposure::Auto, capture.photo(), &coverage, capture.clipped_at()).unwrap();
     let gammas = vec![1.0, 1.5, 2.0, 2.5, 3.0];
     let method = Method { samples: SampleCount::Draws(samples), seed: 5, gammas, ..Method::default() };
     let planner = FitPlanner::new(Arc::new(capture), method, exposure).unwrap();

@@ -9,7 +9,7 @@ use std::path::PathBuf;
 #[derive(Debug, Args)]
 #[command(args_override_self = true, after_long_help = EXAMPLES)]
 pub(crate) struct CompareArgs {
-    /// Reference image (.exr, .hdr, .png, .jpg)
+    /// Reference image (.exr, .hdr, .tif, .png, .jpg)
     #[arg(value_name = "REFERENCE")]
     reference: PathBuf,
     /// Image to judge, of the same size

@@ -31,6 +31,7 @@ impl CaptureArgs {
         }
         Ok(CaptureSettings {
             photo: self.photo.photo,
+            layer: self.photo.layer,
             mask: self.photo.mask,
             environment: self.environment.into_settings(),
             view: self.view.into_settings(),
@@ -42,9 +43,12 @@ impl CaptureArgs {
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Input")]
 struct PhotoArgs {
-    /// Photo of the object (.exr, .hdr, .png, .jpg), or a TOML file of settings
+    /// Photo of the object (.exr, .hdr, .tif, .png, .jpg), or a TOML file of settings
     #[arg(value_name = "PHOTO", help_heading = None)]
     photo: PathBuf,
+    /// Layer of an OpenEXR photo with several, such as beauty [default: unnamed, Combined, beauty, rgba]
+    #[arg(long, value_name = "NAME")]
+    layer: Option<String>,
     /// Image that is white where the photo shows the object [default: all of the silhouette]
     #[arg(long, value_name = "FILE")]
     mask: Option<PathBuf>,

@@ -1,14 +1,19 @@
 //! Parameters that the photo does not determine are reported as such.
 
-use super::scene::{Bench, capture, method};
+use super::scene::{Bench, capture_of, method};
 use crate::{
     fit::{Known, Method, Standing},
     plan::{FitOutcome, FitPlanner},
+    scene::Circle,
 };
+
+const SIZE: usize = 64;
 
 fn outcome(name: &str, material: &[f64], noise: f64) -> FitOutcome {
     let method = Method { gammas: vec![1.0, 2.0], ..method(name) };
-    let planner = FitPlanner::new(capture(name, material, noise), method, 1.0).unwrap();
+    // On fewer pixels the rim, whose coverage two quadratures see differently, would count for too much.
+    let capture = capture_of(name, material, noise, (SIZE, SIZE), Circle::inscribed(SIZE, SIZE));
+    let planner = FitPlanner::new(capture, method, 1.0).unwrap();
     Bench::default().run(planner, |_| 0, |_, output| output).unwrap().into_outcome().unwrap()
 }
 
@@ -22,7 +27,7 @@ fn width_and_fresnel_of_a_material_without_highlights_are_not_determined() {
         "{entries:?}"
     );
     for Known { low, high, standing } in &entries[..3] {
-        assert!(*standing == Standing::Determined && high - low < 0.04, "{entries:?}");
+        assert!(*standing == Standing::Determined && high - low < 0.06, "{entries:?}");
     }
 }
 
@@ -30,7 +35,7 @@ fn width_and_fresnel_of_a_material_without_highlights_are_not_determined() {
 fn parameters_of_a_glossy_material_are_determined_and_within_their_ranges() {
     let material = [0.3, 0.2, 0.1, 0.05, 0.05, 0.05, 1.0, 0.2];
     let mut widths = Vec::new();
-    for noise in [0.005, 0.02] {
+    for noise in [0.005, 0.05] {
         let outcome = outcome("ggx", &material, noise);
         let entries = &outcome.uncertainty.entries;
         for (Known { low, high, standing }, known) in entries.iter().zip(&material) {

@@ -35,33 +35,96 @@ pub(super) struct Layer {
     pub(super) warning: Option<String>,
 }
 
-/// Chooses among the channel names of all parts. The first choice of names, in any part, is preferred to the second.
-/// Within a part the unnamed layer comes first, then the named ones in alphabetical order.
+/// A part of a file.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub(super) struct Part {
+    pub(super) name: Option<String>,
+    pub(super) channels: Vec<String>,
+}
+
+/// Chooses among the layers of all parts. The first choice of channels, in any part, is preferred to the second. Within a choice the unnamed layer comes
+/// first, then layers that are named like a picture, then others, then those that are named like data; of equal ones the first part, in alphabetical
+/// order. `asked` is the name of a layer or of a part, or the last component of one.
 ///
 /// # Errors
-/// A description of the expected channels, if the file has none of them.
-pub(super) fn select(parts: &[Vec<String>], wanted: Wanted) -> Result<Layer, &'static str> {
+/// A description of what was expected, if the file does not have it.
+pub(super) fn select(parts: &[Part], wanted: Wanted, asked: Option<&str>) -> Result<Layer, String> {
     let choices: &[&[&str]] = match wanted {
         Wanted::Colours => &[&["r", "g", "b"], &["y"]],
         Wanted::Mask => &[&["r", "g", "b"], &["y"], &["a"]],
         Wanted::Normals => &[&["x", "y", "z"], &["r", "g", "b"]],
     };
     for names in choices {
-        let mut found = parts.iter().enumerate().flat_map(|(part, channels)| {
-            layers(channels).into_iter().filter_map(move |(prefix, layer)| Some((layer.choose(part, names)?, prefix)))
-        });
-        let Some((mut layer, prefix)) = found.next() else { continue };
-        let others: Vec<String> = found.map(|(other, prefix)| title(other.part, prefix)).collect();
-        let is_main = layer.part == 0 && prefix.is_empty();
-        if !is_main && !others.is_empty() {
-            let title = title(layer.part, prefix);
-            layer.warning = Some(format!("{title} is read; other layers are ignored: {}", others.join(", ")));
+        let mut found: Vec<(Layer, String)> = Vec::new();
+        for (p, part) in parts.iter().enumerate() {
+            for (prefix, layer) in layers(&part.channels) {
+                let of_part = part.name.as_deref().filter(|_| parts.len() > 1).unwrap_or_default();
+                let name = if prefix.is_empty() { of_part } else { prefix };
+                let is_asked = asked.is_none_or(|asked| {
+                    [prefix, part.name.as_deref().unwrap_or_default()].iter().any(|name| is_called(name, asked))
+                });
+                found.extend(layer.choose(p, names).filter(|_| is_asked).map(|layer| (layer, name.to_owned())));
+            }
+        }
+        found.sort_by_key(|(_, name)| Named::of(name));
+        if found.is_empty() {
+            continue;
+        }
+        let (mut layer, name) = found.remove(0);
+        let is_alone = found.is_empty() || asked.is_some();
+        let others: Vec<String> = found.iter().map(|(other, name)| title(other.part, name)).collect();
+        if Named::of(&name) == Named::LikeData && asked.is_none() && wanted == Wanted::Colours {
+            layer.warning =
+                Some(format!("{} is read as colours, although it is named like data", title(layer.part, &name)));
+        } else if !is_alone && !name.is_empty() {
+            let title = title(layer.part, &name);
+            layer.warning = Some(format!(
+                "{title} is read; other layers are ignored: {}; --layer reads another one of the photo",
+                others.join(", ")
+            ));
         }
         return Ok(layer);
     }
-    let single = parts.iter().position(|channels| channels.len() == 1).filter(|_| wanted == Wanted::Mask);
-    single.map(|part| Layer { part, colours: vec![0], alpha: None, warning: None }).ok_or(wanted.describe())
+    if let Some(asked) = asked {
+        return Err(format!("a layer `{asked}` with {}", wanted.describe()));
+    }
+    let single = parts.iter().position(|part| part.channels.len() == 1).filter(|_| wanted == Wanted::Mask);
+    let layer = single.map(|part| Layer { part, colours: vec![0], alpha: None, warning: None });
+    layer.ok_or_else(|| wanted.describe().to_owned())
 }
+
+/// Whether a layer's name, or its last component, is this one.
+fn is_called(name: &str, asked: &str) -> bool {
+    let last = name.rsplit('.').next().unwrap_or_default();
+    name.eq_ignore_ascii_case(asked) || last.eq_ignore_ascii_case(asked)
+}
+
+/// What the name of a layer says, by the conventions of renderers; preferred ones first.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Named {
+    Not,
+    LikeAPicture,
+    LikeAnything,
+    LikeData,
+}
+
+impl Named {
+    fn of(name: &str) -> Self {
+        let last = name.rsplit('.').next().unwrap_or_default().to_ascii_lowercase();
+        let is_data =
+            DATA.iter().any(|start| last.starts_with(start)) || ["n", "p", "z", "uv", "st", "id"].contains(&&*last);
+        match &*last {
+            "" => Self::Not,
+            "combined" | "beauty" | "rgba" | "rgb" | "c" | "color" | "colour" | "composite" => Self::LikeAPicture,
+            _ if is_data => Self::LikeData,
+            _ => Self::LikeAnything,
+        }
+    }
+}
+
+/// The starts of names of layers that do not hold a picture.
+const DATA: [&str; 11] =
+    ["crypto", "depth", "normal", "position", "pworld", "nworld", "motion", "vector", "velocity", "objectid", "mist"];
 
 fn title(part: usize, prefix: &str) -> String {
     if prefix.is_empty() { format!("part {part}") } else { format!("`{prefix}` of part {part}") }
@@ -104,8 +167,16 @@ impl Names {
 mod tests {
     use super::*;
 
-    fn parts(names: &[&[&str]]) -> Vec<Vec<String>> {
-        names.iter().map(|part| part.iter().map(|name| (*name).to_owned()).collect()).collect()
+    fn parts(names: &[&[&str]]) -> Vec<Part> {
+        let part = |channels: &&[&str]| Part {
+            name: None,
+            channels: channels.iter().map(|name| (*name).to_owned()).collect(),
+        };
+        names.iter().map(part).collect()
+    }
+
+    fn select(parts: &[Part], wanted: Wanted) -> Result<Layer, String> {
+        super::select(parts, wanted, None)
     }
 
     #[test]
@@ -123,7 +194,29 @@ mod tests {
         let file = parts(&[&["Z"], &["beauty.B", "beauty.G", "beauty.R", "sss.B", "sss.G", "sss.R"]]);
         let layer = select(&file, Wanted::Colours).unwrap();
         assert_eq!((layer.part, layer.colours), (1, vec![2, 1, 0]));
-        assert_eq!(layer.warning.unwrap(), "`beauty` of part 1 is read; other layers are ignored: `sss` of part 1");
+        assert_eq!(
+            layer.warning.unwrap(),
+            "`beauty` of part 1 is read; other layers are ignored: `sss` of part 1; --layer reads another one of the photo"
+        );
+    }
+
+    /// Blender writes the first, renderers of films the second.
+    #[test]
+    fn picture_is_preferred_to_data_and_a_layer_can_be_asked_for() {
+        let rgb = |prefix: &str| ["B", "G", "R"].map(|channel| format!("{prefix}.{channel}")).to_vec();
+        let channels =
+            [rgb("View.Combined"), rgb("View.CryptoObject00"), rgb("View.Diffuse"), rgb("View.Normal")].concat();
+        let blender = [Part { name: None, channels }];
+        let of = |asked| super::select(&blender, Wanted::Colours, asked).map(|layer| layer.colours[0]);
+        assert_eq!((of(None), of(Some("diffuse")), of(Some("View.Normal"))), (Ok(2), Ok(8), Ok(11)));
+        assert!(of(Some("specular")).unwrap_err().contains("a layer `specular` with channels R, G and B"));
+        let part =
+            |name: &str| Part { name: Some(name.to_owned()), channels: ["B", "G", "R"].map(str::to_owned).to_vec() };
+        let parts = [part("cryptomatte"), part("depth"), part("beauty"), part("albedo")];
+        assert_eq!(select(&parts, Wanted::Colours).unwrap().part, 2);
+        assert_eq!(super::select(&parts, Wanted::Colours, Some("albedo")).unwrap().part, 3);
+        let warning = select(&parts[..2], Wanted::Colours).unwrap().warning.unwrap();
+        assert!(warning.contains("named like data"), "{warning}");
     }
 
     #[test]

@@ -3,8 +3,8 @@
 //!
 //! - The image is the display window. The data window is placed in it. Pixels outside the data window are 0, and pixels
 //!   outside the display window are dropped; both are warnings.
-//! - The first part with `R G B` is read, its unnamed layer before named ones. If no part has them, the first `Y` is read
-//!   as grey.
+//! - The unnamed layer with `R G B` is read, else one that is named like a picture (`Combined`, `beauty`), else another one, else one that
+//!   is named like data; a layer may be asked for. If no part has `R G B`, `Y` is read as grey. Pixels that are not square are refused.
 //! - `chromaticities` other than Rec. 709 are converted.
 //! - Colours with alpha are premultiplied, as the format requires, and are kept so.
 //! - Of several resolution levels the largest is read. Deep data and chroma-subsampled channels are refused.
@@ -33,7 +33,7 @@ use crate::math::Mat3;
 
 /// Decodes the colours of an OpenEXR file.
 pub(super) fn decode(source: &Source<'_>) -> Result<Decoded, ImageError> {
-    let (layer, mut raster) = Raster::read(source, |parts| channels::select(parts, Wanted::Colours))?;
+    let (layer, mut raster) = Raster::read(source, |parts| channels::select(parts, Wanted::Colours, source.layer))?;
     let mut warnings = std::mem::take(&mut raster.warnings);
     warnings.extend(layer.warning.clone());
     let mut pixels = raster.pixels(&layer);
@@ -54,7 +54,7 @@ pub(super) fn decode(source: &Source<'_>) -> Result<Decoded, ImageError> {
 
 /// The channels of an OpenEXR file that may hold a mask: its colours, else its only channel.
 pub(super) fn mask_channels(source: &Source<'_>) -> Result<Channels, ImageError> {
-    let (layer, mut raster) = Raster::read(source, |parts| channels::select(parts, Wanted::Mask))?;
+    let (layer, mut raster) = Raster::read(source, |parts| channels::select(parts, Wanted::Mask, None))?;
     let colours = raster.pixels(&layer);
     let alpha = layer.alpha.map(|_| raster.planes.swap_remove(layer.colours.len()));
     Ok(Channels { width: raster.width, height: raster.height, alpha, colours })
@@ -62,7 +62,7 @@ pub(super) fn mask_channels(source: &Source<'_>) -> Result<Channels, ImageError>
 
 /// The normals of an OpenEXR file, unchecked.
 pub(super) fn normal_channels(source: &Source<'_>) -> Result<Image, ImageError> {
-    let (layer, raster) = Raster::read(source, |parts| channels::select(parts, Wanted::Normals))?;
+    let (layer, raster) = Raster::read(source, |parts| channels::select(parts, Wanted::Normals, None))?;
     Ok(Image::from_pixels(raster.width, raster.height, raster.pixels(&layer)))
 }
 

@@ -12,11 +12,11 @@ use exr::meta::header::Header;
 use exr::prelude::f16;
 use rayon::prelude::*;
 
-use super::channels::Layer;
+use super::channels::{Layer, Part};
 use super::header::FORMAT;
 use super::{block, header};
 use crate::image::error::ImageError;
-use crate::image::source::Source;
+use crate::image::source::{Source, check_pixel_aspect};
 
 /// The channels of one layer over the display window.
 #[derive(Debug)]
@@ -36,7 +36,7 @@ impl Raster {
     /// Reads the channels that `select` chooses from the channel names of all parts.
     pub(super) fn read(
         source: &Source<'_>,
-        select: impl Fn(&[Vec<String>]) -> Result<Layer, &'static str>,
+        select: impl Fn(&[Part]) -> Result<Layer, String>,
     ) -> Result<(Layer, Self), ImageError> {
         header::check(source)?;
         let fault = |error: exr::error::Error| match error {
@@ -46,12 +46,14 @@ impl Raster {
             other => source.malformed(FORMAT, other.to_string()),
         };
         let reader = exr::block::read(Cursor::new(source.bytes), false).map_err(fault)?;
-        let parts: Vec<Vec<String>> = reader.headers().iter().map(channel_names).collect();
+        let parts: Vec<Part> = reader.headers().iter().map(part).collect();
         let layer = select(&parts).map_err(|expected| ImageError::Channels {
             name: source.name.to_owned(),
             expected,
-            found: parts.concat().join(", "),
+            found: parts.iter().flat_map(|part| part.channels.clone()).collect::<Vec<_>>().join(", "),
         })?;
+        let aspect = f64::from(reader.headers()[layer.part].shared_attributes.pixel_aspect);
+        check_pixel_aspect(source, FORMAT, aspect)?;
         let mut raster = Self::prepare(source, &reader.headers()[layer.part], &layer)?;
         raster.fill(reader, &layer).map_err(|fill| match fill {
             Fill::Exr(error) => fault(error),
@@ -211,8 +213,11 @@ fn value(sample: &[u8], kind: SampleType) -> f32 {
     }
 }
 
-fn channel_names(header: &Header) -> Vec<String> {
-    header.channels.list.iter().map(|channel| channel.name.to_string()).collect()
+fn part(header: &Header) -> Part {
+    Part {
+        name: header.own_attributes.layer_name.as_ref().map(ToString::to_string),
+        channels: header.channels.list.iter().map(|channel| channel.name.to_string()).collect(),
+    }
 }
 
 /// Text and number attributes, sorted by name, because the crate stores them in hash maps.

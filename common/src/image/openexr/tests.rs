@@ -314,3 +314,20 @@ fn content_that_openexr_cannot_represent_is_refused() {
     assert!(super::write(&image, Some(&[1.0]), &[]).is_err());
     assert!(super::write(&Picture::new(0, 0), None, &[]).is_err());
 }
+
+#[test]
+fn pixels_that_are_not_square_are_refused() {
+    let layer = |aspect: f32| {
+        let channels = rgb().into_iter().map(|(name, samples)| AnyChannel::new(name, samples)).collect();
+        let encoding = Encoding::UNCOMPRESSED;
+        let mut image =
+            Image::from_layer(Layer::new(SIZE, LayerAttributes::default(), encoding, AnyChannels::sort(channels)));
+        image.attributes.pixel_aspect = aspect;
+        let mut bytes = std::io::Cursor::new(Vec::new());
+        image.write().to_buffered(&mut bytes).unwrap();
+        decode("a.exr", &bytes.into_inner())
+    };
+    let error = layer(2.0).unwrap_err();
+    assert!(matches!(error, ImageError::Unsupported { .. }) && error.to_string().contains("not square"), "{error}");
+    assert!(layer(1.001).is_ok());
+}

@@ -17,7 +17,7 @@ use super::decoded::{Decoded, Format};
 use super::error::ImageError;
 use super::icc;
 use super::ldr::Codes;
-use super::source::Source;
+use super::source::{Source, check_pixel_aspect};
 
 /// Decodes a PNG image.
 pub(super) fn decode(source: &Source<'_>) -> Result<Decoded, ImageError> {
@@ -51,7 +51,11 @@ fn read_info(source: &Source<'_>) -> Result<Info<'static>, ImageError> {
     source.check_size(width.into(), height.into(), FORMAT)?;
     let mut reader = decoder.read_info().map_err(fault)?;
     reader.finish().map_err(fault)?;
-    Ok(reader.info().clone())
+    let info = reader.info().clone();
+    if let Some(pixel) = info.pixel_dims.filter(|pixel| pixel.xppu > 0) {
+        check_pixel_aspect(source, FORMAT, f64::from(pixel.yppu) / f64::from(pixel.xppu))?;
+    }
+    Ok(info)
 }
 
 /// The contradiction to sRGB in the file's colour chunks, in words. The chunk of highest precedence decides.

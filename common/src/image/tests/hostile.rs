@@ -3,7 +3,7 @@
 use image::ExtendedColorType as Colour;
 use proptest::prelude::*;
 
-use super::{ldr, pfm, rgbe};
+use super::{ldr, pfm, rgbe, tiff};
 use crate::image::{Image, ImageError, Limits, Source, decode, openexr};
 
 fn samples() -> Vec<(&'static str, Vec<u8>)> {
@@ -18,6 +18,7 @@ fn samples() -> Vec<(&'static str, Vec<u8>)> {
         ("flat.hdr", rgbe::picture("", "-Y 2 +X 2", &[[128, 64, 32, 129]; 4])),
         ("a.pfm", pfm::map("PF\n2 2\n-1.0\n", &[1.0; 12], true)),
         ("a.png", ldr::png_of(&codes, 16, 16, Colour::Rgb8)),
+        ("a.tif", tiff::half(2, 2, &[0x3c00; 12])),
         ("a.jpg", ldr::jpeg_of(&codes, 16, 16, Colour::Rgb8)),
     ]
 }
@@ -82,7 +83,7 @@ fn sizes_beyond_the_limits_are_refused_before_allocation() {
 fn unknown_files_are_described() {
     for (bytes, words) in [
         (&b""[..], "an empty file"),
-        (b"II*\0", "TIFF"),
+        (b"BM\0\0", "BMP"),
         (b"RIFF\0\0\0\0WEBP", "WebP"),
         (b"PF4\n1 1\n", "PF4"),
         (b"P6\n1 1\n", "Netpbm"),
@@ -118,5 +119,23 @@ proptest! {
             bytes[at] = byte;
         }
         read_all(&bytes);
+    }
+}
+
+#[test]
+fn files_that_are_not_images_are_named() {
+    for (bytes, what) in [
+        (&b"version https://git-lfs.github.com/spec/v1\noid sha256:0\n"[..], "pointer of Git LFS"),
+        (b"\n<!DOCTYPE html>\n<html>", "an HTML page"),
+        (b"<HTML><HEAD>", "an HTML page"),
+        (b"\x1f\x8b\x08\0", "a gzip file"),
+        (b"tensor_file\0\x01\0", "a tensor file"),
+        (b"PK\x03\x04", "a zip archive"),
+        (b"../.git/annex/objects/aa", "pointer of git-annex"),
+        (b"8BPS\0\x01", "a Photoshop document"),
+        (b"II\x2b\0\x08\0", "BigTIFF"),
+    ] {
+        let error = decode("probe.hdr", bytes).unwrap_err().to_string();
+        assert!(error.starts_with("probe.hdr: expected") && error.contains(what), "{error}");
     }
 }

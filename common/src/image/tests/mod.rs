@@ -6,3 +6,4 @@ mod pfm;
 mod planes;
 mod probes;
 mod rgbe;
+mod tiff;

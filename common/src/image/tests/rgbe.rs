@@ -24,14 +24,9 @@ fn pixels_are_divided_by_the_product_of_all_exposures() {
     let decoded = decode("a.hdr", &picture(header, "-Y 1 +X 2", &TWO)).unwrap();
     assert_eq!(decoded.image.pixel(0, 0), [1.0 / 8.0, 0.5 / 4.0, 0.25 / 16.0]);
     assert!(decoded.metadata.contains(&("VIEW".to_owned(), "-vtv".to_owned())));
-    for bad in [
-        "EXPOSURE=0\n",
-        "EXPOSURE=-1\n",
-        "EXPOSURE=x\n",
-        "EXPOSURE=inf\n",
-        "COLORCORR=1 1\n",
-        "EXPOSURE=1e-200\nEXPOSURE=1e-200\n",
-    ] {
+    for bad in
+        ["EXPOSURE=-1\n", "EXPOSURE=x\n", "EXPOSURE=inf\n", "COLORCORR=1 1\n", "EXPOSURE=1e-200\nEXPOSURE=1e-200\n"]
+    {
         assert!(
             matches!(decode("a.hdr", &picture(bad, "-Y 1 +X 2", &TWO)), Err(ImageError::Malformed { .. })),
             "{bad}"
@@ -90,9 +85,31 @@ fn all_orientations_come_out_upright() {
 
 #[test]
 fn other_pixel_formats_and_broken_headers_are_refused() {
-    let xyze = b"#?RADIANCE\nFORMAT=32-bit_rle_xyze\n\n-Y 1 +X 1\n\0\0\0\0";
-    assert!(decode("a.hdr", xyze).unwrap_err().to_string().contains("ra_xyze"));
+    let other = b"#?RADIANCE\nFORMAT=32-bit_rle_luve\n\n-Y 1 +X 1\n\0\0\0\0";
+    assert!(decode("a.hdr", other).unwrap_err().to_string().contains("32-bit_rle_luve"));
+    let wide = decode("a.hdr", &picture("PIXASPECT=2\n", "-Y 1 +X 2", &TWO)).unwrap_err().to_string();
+    assert!(wide.contains("not square") && wide.contains('2'), "{wide}");
+    assert!(decode("a.hdr", &picture("PIXASPECT=1.0\n", "-Y 1 +X 2", &TWO)).is_ok());
     for resolution in ["-Y 1", "-Y 1 +Y 1", "Y 1 X 1", "-Y -1 +X 1", "-Y 0 +X 1", "1 1"] {
         assert!(decode("a.hdr", &picture("", resolution, &TWO)).is_err(), "{resolution}");
     }
+}
+
+/// FreeImage and GIMP write both lines.
+#[test]
+fn exposure_of_zero_is_ignored_with_a_warning() {
+    let decoded = decode("a.hdr", &picture("EXPOSURE=0\nGAMMA=1\n", "-Y 1 +X 2", &TWO)).unwrap();
+    assert_eq!((decoded.image.pixel(0, 0), decoded.warnings.len()), ([1.0, 0.5, 0.25], 1));
+    assert!(decoded.warnings[0].contains("EXPOSURE=0"), "{:?}", decoded.warnings);
+}
+
+/// White, and full red of Rec. 709, which is (.4384, .2228, .0173) adapted to the white of equal energy (Lindbloom, *Chromatic Adaptation*).
+#[test]
+fn pixels_in_xyz_are_converted() {
+    let xyze = b"#?RADIANCE\nPRIMARIES=.64 .33 .29 .6 .15 .06 .333 .333\nFORMAT=32-bit_rle_xyze\n\n-Y 1 +X 2\n";
+    let decoded = decode("a.hdr", &[&xyze[..], &[128, 128, 128, 129, 112, 57, 4, 128]].concat()).unwrap();
+    assert!(decoded.image.pixel(0, 0).iter().all(|value| (value - 1.0).abs() < 1e-6));
+    let [r, g, b] = decoded.image.pixel(1, 0);
+    assert!((r - 1.0).abs() < 0.005 && g.abs() < 0.005 && b.abs() < 0.005, "{r} {g} {b}");
+    assert!(decoded.warnings.iter().any(|text| text.contains("XYZ")), "{:?}", decoded.warnings);
 }
