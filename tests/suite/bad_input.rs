@@ -48,7 +48,7 @@ fn unusable_environment_maps_are_refused() {
         ("folder.exr", &["expected a file, found a folder"]),
         ("half.exr", &["not a valid OpenEXR file", "copy or export it again"]),
         ("empty.exr", &["found an empty file"]),
-        ("notes.txt", &["expected OpenEXR, Radiance HDR, PFM, PNG or JPEG"]),
+        ("notes.txt", &["expected OpenEXR, Radiance HDR, PFM, PNG, JPEG or TIFF"]),
         ("map.png", &["found display values (PNG)", "clipped", "use the HDR file"]),
         ("tiny.exr", &["size 1 x 1", "--env-mapping latlong, cross, angular or mirror-ball"]),
         ("square.exr", &["size 16 x 16", "--env-mapping"]),

@@ -7,7 +7,7 @@ use super::{
 use crate::settings::{CaptureSettings, EnvironmentSettings};
 use anyhow::Context;
 use lookalike::{
-    image::Encoding,
+    image::{Encoding, Image},
     light::Mapping,
     scene::{Capture, CaptureInput, CircleSource, Geometry, Mask, Placement, SceneError},
 };
@@ -72,12 +72,14 @@ pub fn load_capture_under(
     files: &CaptureSettings,
     light: impl FnOnce(&EnvironmentSettings) -> anyhow::Result<LoadedEnvironment>,
 ) -> anyhow::Result<LoadedCapture> {
-    let LoadedPhoto { image, clipped, encoding, source, mut warnings, .. } =
+    let LoadedPhoto { image, alpha, clipped, encoding, source, mut warnings, .. } =
         load_photo(&files.photo, files.layer.as_deref())?;
     let (width, height) = (image.width(), image.height());
     let mask = files.mask.as_deref().map(|path| same_size(path, width, height)).transpose()?;
     let mask_values = mask.as_ref().map(|loaded| &loaded.mask);
-    let (shape, placement) = shape(files, mask_values, width, height)?;
+    // Alpha that is no coverage tells nothing.
+    let alpha = alpha.and_then(|alpha| Mask::new(width, height, alpha).ok());
+    let (shape, placement) = shape(files, mask_values, alpha.as_ref(), &image)?;
     let LoadedEnvironment { environment, mapping, source: map, warnings: of_map } = light(&files.environment)?;
 
     warnings.extend(of_map);
@@ -117,12 +119,13 @@ fn same_size(path: &Path, width: usize, height: usize) -> anyhow::Result<LoadedM
 fn shape(
     files: &CaptureSettings,
     mask: Option<&Mask>,
-    width: usize,
-    height: usize,
+    alpha: Option<&Mask>,
+    photo: &Image,
 ) -> anyhow::Result<(LoadedGeometry, Option<Placement>)> {
+    let (width, height) = (photo.width(), photo.height());
     let Some(path) = &files.view.normals else {
         let place = || -> Result<(Geometry, Placement), SceneError> {
-            let placement = Placement::choose(files.sphere, mask, width, height)?;
+            let placement = Placement::choose(files.sphere, mask, alpha, photo)?;
             Ok((sphere_geometry(width, height, placement.circle, &files.view)?, placement))
         };
         let (geometry, placement) = place().context("cannot place the sphere in the photo")?;

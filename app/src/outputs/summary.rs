@@ -24,7 +24,11 @@ fn summary(record: &FitRecord<'_>, timing: &Timing, out: &str) -> String {
     let usable = record.capture.counts().usable;
     let mut text = format!("{} on {} of {usable} usable pixels", method.model.name(), method.samples);
     let gammas = counted(method.gammas.len(), "gamma");
-    let _ = writeln!(text, ", {gammas}, seed {}\n", method.seed);
+    let _ = writeln!(text, ", {gammas}, seed {}", method.seed);
+    if let Some(circle) = record.capture.geometry().circle() {
+        let _ = writeln!(text, "the sphere at {circle} in the photo");
+    }
+    text.push('\n');
     text.push_str(&aligned(&rows(method, outcome)));
     let _ = writeln!(text, "\n  {CSSIM_HINT}");
     let _ = writeln!(text, "\n{}", wrap(&verdict(record)));

@@ -19,7 +19,7 @@ pub struct CaptureSettings {
     pub environment: EnvironmentSettings,
     /// Camera and shape.
     pub view: ViewSettings,
-    /// The circle of the sphere. `None`: fitted to the mask, else the largest circle in the photo.
+    /// The circle of the sphere. `None`: found as [`Placement`](lookalike::scene::Placement) says.
     pub sphere: Option<Circle>,
 }
 
