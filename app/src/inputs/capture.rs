@@ -7,7 +7,7 @@ use super::{
 use crate::settings::{CaptureSettings, EnvironmentSettings};
 use anyhow::Context;
 use lookalike::{
-    image::{Encoding, Image},
+    image::Encoding,
     light::Mapping,
     scene::{Capture, CaptureInput, CircleSource, Geometry, Mask, Placement, SceneError},
 };
@@ -79,7 +79,7 @@ pub fn load_capture_under(
     let mask_values = mask.as_ref().map(|loaded| &loaded.mask);
     // Alpha that is no coverage tells nothing.
     let alpha = alpha.and_then(|alpha| Mask::new(width, height, alpha).ok());
-    let (shape, placement) = shape(files, mask_values, alpha.as_ref(), &image)?;
+    let (shape, placement) = shape(files, mask_values, alpha.as_ref(), (width, height))?;
     let LoadedEnvironment { environment, mapping, source: map, warnings: of_map } = light(&files.environment)?;
 
     warnings.extend(of_map);
@@ -120,12 +120,11 @@ fn shape(
     files: &CaptureSettings,
     mask: Option<&Mask>,
     alpha: Option<&Mask>,
-    photo: &Image,
+    (width, height): (usize, usize),
 ) -> anyhow::Result<(LoadedGeometry, Option<Placement>)> {
-    let (width, height) = (photo.width(), photo.height());
     let Some(path) = &files.view.normals else {
         let place = || -> Result<(Geometry, Placement), SceneError> {
-            let placement = Placement::choose(files.sphere, mask, alpha, photo)?;
+            let placement = Placement::choose(files.sphere, mask, alpha, (width, height))?;
             Ok((sphere_geometry(width, height, placement.circle, &files.view)?, placement))
         };
         let (geometry, placement) = place().context("cannot place the sphere in the photo")?;

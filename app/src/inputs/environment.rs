@@ -26,7 +26,7 @@ pub struct LoadedEnvironment {
 /// Reads the environment map: OpenEXR, Radiance HDR or PFM, in the given layout, or the one that its shape implies.
 ///
 /// # Errors
-/// If the file cannot be read or decoded, holds display values (PNG, JPEG), has an unknown layout or a texel that is negative or
+/// If the file cannot be read or decoded, holds display values (PNG, JPEG, integer TIFF), has an unknown layout or a texel that is negative or
 /// not finite, or contains no light.
 pub fn load_environment(settings: &EnvironmentSettings) -> anyhow::Result<LoadedEnvironment> {
     let path = &settings.path;
@@ -52,8 +52,8 @@ fn cut_off(map: &Image) -> Option<String> {
     let is_common = [1, 2].iter().all(|&c| plateau(map.pixels().iter().map(|texel| texel[c])) == Some(level));
     is_common.then(|| {
         format!(
-            "{count} texels have the same largest value {level} in all channels: lamps or the sun were probably cut off there, and \
-             highlights will look too strong for the light; use a map of full range"
+            "{count} texels have the same largest value {level} in all channels: if lamps or the sun were cut off there, highlights \
+             are too strong for this light, and a map of full range is needed"
         )
     })
 }

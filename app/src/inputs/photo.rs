@@ -16,7 +16,7 @@ pub struct LoadedPhoto {
     pub image: Image,
     /// Opacity of every pixel, if the file has it.
     pub alpha: Option<Vec<f32>>,
-    /// For PNG and JPEG, which pixels are clipped.
+    /// For PNG, JPEG and integer TIFF, which pixels are clipped.
     pub clipped: Option<Vec<bool>>,
     /// Whether the file held radiance or display values.
     pub encoding: Encoding,

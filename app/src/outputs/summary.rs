@@ -138,7 +138,7 @@ fn ranges(model: &dyn Model, entries: &[Known]) -> Vec<String> {
         column.push(match of_parameter {
             _ if are(Standing::Held) => "held".to_owned(),
             _ if are(Standing::Undetermined) => "undetermined".to_owned(),
-            [known] => format!("{:.3} to {:.3}", known.low, known.high),
+            [known] => format!("{:.4} to {:.4}", known.low, known.high),
             _ => format!("± {half:.3}"),
         });
     }

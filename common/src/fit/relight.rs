@@ -88,7 +88,8 @@ fn under(points: &[Point], geometry: &Geometry, pyramid: &LightPyramid) -> Resul
     let Some((matched, others)) = points.split_first() else { return Ok(Vec::new()) };
     let matched = render(matched);
     let scored: Vec<f32> = coverage.iter().map(|&share| if share > 0.0 { 1.0 } else { 0.0 }).collect();
-    let exposure = auto_exposure(&matched, &coverage)?;
+    // A black match has none.
+    let exposure = auto_exposure(&matched, &coverage).unwrap_or(1.0);
     let judge = Judge::new(&matched, &scored, exposure, &JudgeOptions::default())?;
     let scores = others.iter().map(|other| Ok(judge.score(&render(other))?.cssim_object));
     scores.collect()

@@ -1,4 +1,4 @@
-//! How well the photo determines the reported parameters (design section 2): the range of each one over which another match would look about
+//! How well the photo determines the reported parameters (docs/design.md section 1): the range of each one over which another match would look about
 //! as good.
 //!
 //! The range of a parameter holds the values for which CSSIM, at its minimum over all other parameters, stays within a share of the reached
@@ -65,7 +65,7 @@ pub struct Uncertainty {
 /// Ranges hold the values for which CSSIM rises by at most this share of the reached score.
 const SHARE: f64 = 0.002;
 
-/// What the error of tables costs at least, as if it were reached (it is what noise of .5 % costs: design sections 5 and 6).
+/// A lower score counts as this one: the error of tables may cost as much (design sections 5 and 6).
 const LEAST: f64 = 4e-4;
 
 /// Steps of the first differences raise CSSIM by about this much.
@@ -248,12 +248,12 @@ const BISECTIONS: usize = 20;
 /// The uncertainty of the match at `point`.
 ///
 /// # Errors
-/// If the bounds are not a valid box, or a picture near the match cannot be scored.
+/// If the bounds are not a valid box, a picture near the match cannot be scored, or `is_cancelled`.
 pub(crate) fn uncertainty(
     view: &FullView<'_>,
     judges: Judges<'_>,
-    ranges: &Ranges,
-    point: &[f64],
+    (ranges, point): (&Ranges, &[f64]),
+    is_cancelled: &dyn Fn() -> bool,
 ) -> Result<Uncertainty, SearchError> {
     let model = view.model;
     let bounds = visible_bounds(model, ranges)?;
@@ -266,8 +266,8 @@ pub(crate) fn uncertainty(
     };
     let inside: Vec<(f64, f64)> = (0..point.len()).map(limits).collect();
     let pick = |score: Score| judges.by.pick(score.cssim, score.cssim_object);
-    let roughly = |image: &Image| judges.searching.score(image).ok().map(pick);
-    let exactly = |image: &Image| judges.reporting.score(image).ok().map(pick);
+    let roughly = |image: &Image| judges.searching.score(image).ok().filter(|_| !is_cancelled()).map(pick);
+    let exactly = |image: &Image| judges.reporting.score(image).ok().filter(|_| !is_cancelled()).map(pick);
     let (bounds, inside) = (&bounds, &inside[..]);
     let around = |judge| Surroundings { view, renderer: Renderer::new(view), judge, bounds, inside };
     let near = around(&roughly);
@@ -323,7 +323,8 @@ impl Surroundings<'_> {
                     if matches!(entries[i].standing, Standing::Determined | Standing::AtBound)
                         && self.has_no_effect(i, &there, here, allowed)?
                     {
-                        entries[i].standing = Standing::Undetermined;
+                        let (low, high) = (self.bounds.lower()[i], self.bounds.upper()[i]);
+                        entries[i] = Known { low, high, standing: Standing::Undetermined };
                     }
                 }
             }
@@ -338,7 +339,7 @@ impl Surroundings<'_> {
             let way = (end - at[i]).abs();
             if way > 0.0 {
                 let rise = (self.moved(at, &[(i, end - at[i])])? - here).abs();
-                let share = MOVED.min(1.0 - MOVED) / way;
+                let share = MOVED / way;
                 if rise * (share * share).max(1.0) > allowed {
                     return Ok(false);
                 }

@@ -12,7 +12,7 @@ pub struct Decoded {
     pub image: Image,
     /// Opacity as stored, one value per pixel, nominally in [0, 1]; `None` if the file has none.
     pub alpha: Option<Vec<f32>>,
-    /// For PNG and JPEG, whether each pixel is overexposed: its red, green or blue is at the largest code. For JPEG
+    /// For PNG, JPEG and integer TIFF, whether each pixel is overexposed: its red, green or blue is at the largest code. For JPEG
     /// within two codes of it, because quantised DCT coefficients move a clipped value by as much. Black pixels are not
     /// marked: the error of code 0 is at most half a step, whereas that of the largest code is unlimited.
     pub clipped: Option<Vec<bool>>,

@@ -1,4 +1,4 @@
-//! Images of 8 or 16-bit codes (PNG, JPEG), and their conversion to linear radiance or to coverage.
+//! Images of 8 or 16-bit codes (PNG, JPEG, TIFF), and their conversion to linear radiance or to coverage.
 
 use image::{DynamicImage, ImageDecoder};
 

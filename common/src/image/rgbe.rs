@@ -22,7 +22,7 @@ use crate::math::{Mat3, to_f32};
 /// Decodes a Radiance picture.
 pub(super) fn decode(source: &Source<'_>) -> Result<Decoded, ImageError> {
     let mut reader = Reader { source, rest: source.bytes };
-    let header = Header::read(&mut reader)?;
+    let mut header = Header::read(&mut reader)?;
     let layout = Layout::read(&mut reader)?;
     let mut pixels = vec![[0.0f32; 3]; layout.width * layout.height];
     let scales: Vec<f64> = (0..=255u64).map(power_of_two).collect();
@@ -36,7 +36,7 @@ pub(super) fn decode(source: &Source<'_>) -> Result<Decoded, ImageError> {
             pixels[layout.target(index, position)] = [value(r, 0), value(g, 1), value(b, 2)];
         }
     }
-    if let Some(matrix) = header.to_rec709 {
+    if let Some(matrix) = header.conversion() {
         convert(&mut pixels, matrix);
     }
     Ok(Decoded {
@@ -55,13 +55,23 @@ pub(super) fn decode(source: &Source<'_>) -> Result<Decoded, ImageError> {
 struct Header {
     divisor: [f64; 3],
     to_rec709: Option<Mat3>,
+    /// The line of the primaries.
+    primaries: String,
+    is_xyz: bool,
     metadata: Vec<(String, String)>,
     warnings: Vec<String>,
 }
 
 impl Header {
     fn read(reader: &mut Reader<'_>) -> Result<Self, ImageError> {
-        let mut header = Self { divisor: [1.0; 3], to_rec709: None, metadata: Vec::new(), warnings: Vec::new() };
+        let mut header = Self {
+            divisor: [1.0; 3],
+            to_rec709: None,
+            primaries: String::new(),
+            is_xyz: false,
+            metadata: Vec::new(),
+            warnings: Vec::new(),
+        };
         reader.text_line()?;
         loop {
             let line = reader.text_line()?;
@@ -79,8 +89,7 @@ impl Header {
         match key {
             "FORMAT" if value == "32-bit_rle_rgbe" => return Ok(()),
             "FORMAT" if value == "32-bit_rle_xyze" => {
-                self.to_rec709 = Some(xyz_to_rec709(EQUAL_ENERGY));
-                self.warnings.push("colours converted from CIE XYZ (white: equal energy) to Rec. 709".to_owned());
+                self.is_xyz = true;
                 return Ok(());
             }
             "FORMAT" => {
@@ -95,7 +104,8 @@ impl Header {
                 self.warnings.push(format!("{key}={value} in the header is not a factor and is ignored"));
                 return Ok(());
             }
-            "PIXASPECT" => check_pixel_aspect(source, FORMAT, number(value).unwrap_or(f64::NAN))?,
+            // Height over width.
+            "PIXASPECT" => check_pixel_aspect(source, FORMAT, 1.0 / number(value).unwrap_or(1.0))?,
             "EXPOSURE" => {
                 let [exposure] = factors(key, value, source)?;
                 self.divisor = self.divisor.map(|d| d * exposure);
@@ -118,10 +128,6 @@ impl Header {
     }
 
     fn set_primaries(&mut self, value: &str, source: &Source<'_>) -> Result<(), ImageError> {
-        // The primaries of XYZ pixels are those of the display for which they were made.
-        if self.to_rec709 == Some(xyz_to_rec709(EQUAL_ENERGY)) {
-            return Ok(());
-        }
         let numbers: Option<[f64; 8]> = numbers(value);
         let Some(numbers) = numbers else {
             return Err(source.malformed(FORMAT, format!("expected eight numbers in PRIMARIES, found `{value}`")));
@@ -132,10 +138,20 @@ impl Header {
         self.to_rec709 = Primaries::from_array(numbers)
             .to_rec709()
             .map_err(|_| source.malformed(FORMAT, format!("PRIMARIES={value} are not colour primaries")))?;
-        if self.to_rec709.is_some() {
-            self.warnings.push(format!("colours converted from the file's primaries ({value}) to Rec. 709"));
-        }
+        self.primaries = value.to_owned();
         Ok(())
+    }
+
+    /// The conversion of the colours, which the whole header decides. The primaries of XYZ pixels are those of the display for which they were made.
+    fn conversion(&mut self) -> Option<Mat3> {
+        if self.is_xyz {
+            self.warnings.push("colours converted from CIE XYZ (white: equal energy) to Rec. 709".to_owned());
+            return Some(xyz_to_rec709(EQUAL_ENERGY));
+        }
+        if self.to_rec709.is_some() {
+            self.warnings.push(format!("colours converted from the file's primaries ({}) to Rec. 709", self.primaries));
+        }
+        self.to_rec709
     }
 }
 

@@ -85,7 +85,7 @@ impl<'a> Source<'a> {
     }
 }
 
-/// Refuses pixels that are not square: a sphere would be an ellipse. `NaN` means that the file says nothing sensible.
+/// Refuses pixels that are not square (`aspect` is their width over their height): a sphere would be an ellipse.
 pub(super) fn check_pixel_aspect(source: &Source<'_>, format: Format, aspect: f64) -> Result<(), ImageError> {
     // Some programs round.
     const SQUARE: f64 = 0.005;

@@ -1,15 +1,15 @@
-//! TIFF 6.0 by the `tiff` crate, its first image: grey or colour, with or without alpha (as stored), strips or tiles, without compression or with LZW, deflate
-//! or PackBits.
+//! TIFF 6.0 by the `tiff` crate, its first image: grey, or colour with or without straight alpha, strips or tiles, without compression or with LZW, deflate
+//! or PackBits. An ICC profile is compared with sRGB, as that of a PNG.
 //!
 //! Float and half samples are radiance: Photoshop, Hugin and PTGui write HDR images so. Integer samples are decoded from sRGB, as those of PNG.
 
 use super::Image;
 use super::decoded::{Decoded, Encoding, Format};
 use super::error::ImageError;
+use super::icc;
 use super::ldr::Codes;
 use super::mask_channels::Channels;
 use super::source::{Source, check_pixel_aspect};
-use crate::math::to_f32;
 use std::io::Cursor;
 use tiff::{
     ColorType, TiffError,
@@ -19,10 +19,28 @@ use tiff::{
 
 /// Decodes a TIFF image.
 pub(super) fn decode(source: &Source<'_>) -> Result<Decoded, ImageError> {
-    Ok(match read(source)? {
+    let mut decoded = match read(source)? {
         Content::Codes(codes) => codes.into_decoded(FORMAT, 0),
         Content::Radiance(decoded) => decoded,
-    })
+    };
+    let profile = profile(source);
+    let contradiction = profile.as_deref().and_then(icc::contradiction);
+    match (decoded.encoding, contradiction) {
+        (Encoding::Srgb, Some(found)) => {
+            decoded.warnings.push(format!("decoded from sRGB, but {found}: convert it to sRGB first"));
+        }
+        (Encoding::Linear, _) if profile.is_some() => {
+            decoded.warnings.push("its ICC profile is ignored: floats are taken as linear Rec. 709".to_owned());
+        }
+        _ => {}
+    }
+    Ok(decoded)
+}
+
+/// The bytes of the ICC profile.
+fn profile(source: &Source<'_>) -> Option<Vec<u8>> {
+    let mut decoder = Decoder::new(Cursor::new(source.bytes)).ok()?;
+    decoder.find_tag(Tag::IccProfile).ok()??.into_u8_vec().ok()
 }
 
 /// The channels of a TIFF image that may hold a mask.
@@ -50,9 +68,6 @@ fn read(source: &Source<'_>) -> Result<Content, ImageError> {
             Content::Radiance(shape.radiance(&halves.into_iter().map(f32::from).collect::<Vec<_>>()))
         }
         DecodingResult::F32(floats) => Content::Radiance(shape.radiance(&floats)),
-        DecodingResult::F64(doubles) => {
-            Content::Radiance(shape.radiance(&doubles.into_iter().map(to_f32).collect::<Vec<_>>()))
-        }
         _ => {
             let advice = "write it with 32-bit floats or 16 bits per channel";
             return Err(source.unsupported(FORMAT, "this type of samples", advice));
@@ -104,13 +119,10 @@ fn samples(source: &Source<'_>) -> Result<(DecodingResult, Shape), ImageError> {
         other => source.malformed(FORMAT, other.to_string()),
     };
     // The mark of Canon's raw files.
-    if source.bytes.get(8..10) == Some(b"CR") {
+    if source.bytes.get(8..12) == Some(b"CR\x02\0") {
         return Err(raw(source));
     }
-    let mut limits = Limits::default();
-    limits.decoding_buffer_size = source.limits.max_pixels.saturating_mul(MOST_BYTES);
-    limits.intermediate_buffer_size = limits.decoding_buffer_size;
-    let mut decoder = Decoder::new(Cursor::new(source.bytes)).map_err(fault)?.with_limits(limits);
+    let mut decoder = Decoder::new(Cursor::new(source.bytes)).map_err(fault)?;
     let (width, height) = decoder.dimensions().map_err(fault)?;
     let (width, height) = source.check_size(width.into(), height.into(), FORMAT)?;
     check_tags(source, &mut decoder).map_err(|error| match error {
@@ -120,14 +132,26 @@ fn samples(source: &Source<'_>) -> Result<(DecodingResult, Shape), ImageError> {
     let colour = decoder.colortype().map_err(fault)?;
     let (colours, has_alpha) = match colour {
         ColorType::Gray(_) => (1, false),
-        ColorType::GrayA(_) => (1, true),
         ColorType::RGB(_) => (3, false),
         ColorType::RGBA(_) => (3, true),
         other => {
             return Err(source.unsupported(FORMAT, format!("colours of type {other:?}"), "convert it to RGB"));
         }
     };
+    let bits = usize::from(colour.bit_depth());
+    if ![8, 16, 32].contains(&bits) {
+        let advice = "write it with 32-bit floats or 8 or 16 bits per channel";
+        return Err(source.unsupported(FORMAT, format!("{bits} bits per channel"), advice));
+    }
     let shape = Shape { width, height, colours, has_alpha };
+    if decoder.find_tag_unsigned::<u16>(Tag::SamplesPerPixel).map_err(fault)?.unwrap_or(1) != shape.channels() as u16 {
+        return Err(source.unsupported(FORMAT, "channels beside colour and alpha", "save it without them"));
+    }
+    // The sizes are known: nothing larger is decoded.
+    let mut limits = Limits::default();
+    limits.decoding_buffer_size = width * height * shape.channels() * bits / 8;
+    limits.intermediate_buffer_size = limits.decoding_buffer_size.max(limits.intermediate_buffer_size);
+    let mut decoder = decoder.with_limits(limits);
     let samples = decoder.read_image().map_err(fault)?;
     let (expected, found) = (width * height * shape.channels(), count(&samples));
     if found != expected {
@@ -159,6 +183,13 @@ fn check_tags(source: &Source<'_>, decoder: &mut Decoder<Cursor<&[u8]>>) -> Resu
     if is_preview || decoder.find_tag(Tag::Unknown(DNG_VERSION))?.is_some() {
         return Err(TagError::Image(raw(source)));
     }
+    let extra = decoder.find_tag_unsigned_vec::<u16>(Tag::ExtraSamples)?.unwrap_or_default();
+    if extra.first() == Some(&ASSOCIATED_ALPHA) {
+        return refused(
+            "colours that are multiplied by alpha",
+            "save it with straight alpha, or over black without alpha",
+        );
+    }
     if decoder.find_tag_unsigned::<u16>(Tag::Orientation)?.is_some_and(|orientation| orientation > 1) {
         return refused("an image that is not stored upright", "open it and save it upright");
     }
@@ -178,6 +209,9 @@ fn raw(source: &Source<'_>) -> ImageError {
     source.unsupported(FORMAT, "a camera's raw image", "develop it to linear OpenEXR, without a tone curve")
 }
 
+/// Of `ExtraSamples`: alpha by which the colours are multiplied.
+const ASSOCIATED_ALPHA: u16 = 1;
+
 /// The tag that every DNG has (Adobe, *Digital Negative Specification*).
 const DNG_VERSION: u16 = 50706;
 
@@ -187,12 +221,8 @@ fn count(samples: &DecodingResult) -> usize {
         DecodingResult::U16(samples) => samples.len(),
         DecodingResult::F16(samples) => samples.len(),
         DecodingResult::F32(samples) => samples.len(),
-        DecodingResult::F64(samples) => samples.len(),
         _ => 0,
     }
 }
 
 const FORMAT: Format = Format::Tiff;
-
-/// The most bytes of a pixel: four doubles.
-const MOST_BYTES: usize = 32;

@@ -40,11 +40,14 @@ impl UncertaintyWire {
             (low <= high && (high - low).is_finite()).then_some(Known { low, high, standing })
         };
         let entries = self.entries.into_iter().map(known).collect::<Option<Vec<_>>>()?;
-        let trade = |(a, b): (u32, u32)| {
-            let (a, b) = (a as usize, b as usize);
-            (a < entries.len() && b < entries.len()).then_some((a, b))
-        };
-        let trades = self.trades.into_iter().map(trade).collect::<Option<Vec<_>>>()?;
+        let mut trades: Vec<(usize, usize)> = Vec::new();
+        for (a, b) in self.trades {
+            let pair = (a as usize, b as usize);
+            if pair.0 >= pair.1 || pair.1 >= entries.len() || trades.contains(&pair) {
+                return None;
+            }
+            trades.push(pair);
+        }
         Some(fit::Uncertainty { entries, trades })
     }
 }
@@ -63,9 +66,37 @@ impl NodeType for Uncertainty {
         ranges.check(scene.model).map_err(|error| NodeFailure::new(error.to_string()))?;
         check_parameters("point", scene.model, &point)?;
         let searching = scene.view.searching()?;
-        let found = fit::uncertainty::uncertainty(&scene.full(), scene.view.judges(&searching), &ranges, &point)
-            .map_err(|error| NodeFailure::new(format!("uncertainty: {error}")))?;
+        let (judges, is_cancelled) = (scene.view.judges(&searching), || context.is_cancelled());
+        let found = fit::uncertainty::uncertainty(&scene.full(), judges, (&ranges, &point), &is_cancelled);
+        // A cancelled search has no result.
         context.check()?;
+        let found = found.map_err(|error| NodeFailure::new(format!("uncertainty: {error}")))?;
         write("uncertainty", &UncertaintyWire::of(&found))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_a_worker_sends_is_ranges_and_distinct_pairs() {
+        let wire = |low: f64, high: f64, number: u8, trades: &[(u32, u32)]| UncertaintyWire {
+            entries: vec![(low, high, number); 3],
+            trades: trades.to_vec(),
+        };
+        let sent = wire(0.1, 0.2, 2, &[(0, 2), (1, 2)]).uncertainty().unwrap();
+        assert_eq!(UncertaintyWire::of(&sent).uncertainty(), Some(sent));
+        for bad in [
+            wire(0.2, 0.1, 0, &[]),
+            wire(0.1, f64::NAN, 0, &[]),
+            wire(0.1, f64::INFINITY, 0, &[]),
+            wire(0.1, 0.2, 4, &[]),
+            wire(0.1, 0.2, 0, &[(1, 3)]),
+            wire(0.1, 0.2, 0, &[(1, 1)]),
+            wire(0.1, 0.2, 0, &[(0, 1), (0, 1)]),
+        ] {
+            assert_eq!(bad.uncertainty(), None);
+        }
     }
 }

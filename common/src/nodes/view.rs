@@ -1,4 +1,4 @@
-//! Common inputs of the nodes that render and score images (`select`, `explore`, `polish`, `report`, `brute-force`, `appraise`): the
+//! Common inputs of the nodes that render and score images (`select`, `explore`, `polish`, `report`, `uncertainty`, `brute-force`, `appraise`): the
 //! photo, the judge, and a table of the photo's pixels.
 //!
 //! Their inputs: the view; the shards of the table, in order.

@@ -454,6 +454,7 @@ impl FitPlanner {
         self.best.set(contender.score());
         let (contenders, methods) = (&self.contenders, &self.methods);
         self.conclusion = Some(Conclusion::new((tried, chosen), contenders, methods, &mut self.scene, graph)?);
+        self.scene.release_tables_but(&[self.contenders[chosen].spans_of_match()], graph);
         Ok(())
     }
 
@@ -515,13 +516,13 @@ impl Planner for FitPlanner {
             self.contenders[c].candidates.insert(place, candidate);
             return if self.searches.is_empty() { self.searched(graph) } else { Ok(()) };
         }
-        if let Some(mut conclusion) = self.conclusion.take() {
-            conclusion.takes(node, output, &self.contenders)?;
-            if conclusion.is_complete() {
-                return self.conclude(conclusion);
-            }
-            self.conclusion = Some(conclusion);
-            return Ok(());
+        if let Some(conclusion) = &mut self.conclusion
+            && conclusion.takes(node, output, &self.contenders)?
+        {
+            return match self.conclusion.take_if(|conclusion| conclusion.is_complete()) {
+                Some(conclusion) => self.conclude(conclusion),
+                None => Ok(()),
+            };
         }
         for c in 0..self.contenders.len() {
             if self.contenders[c].step == Step::Selecting(node) {

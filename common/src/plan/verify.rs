@@ -134,7 +134,8 @@ pub(super) fn explored(method: &Method, output: &Blob, most: usize) -> Result<(P
 pub(super) fn uncertainty(method: &Method, output: &Blob, point: &[f64]) -> Result<Uncertainty, PlanError> {
     let wire: UncertaintyWire =
         read("uncertainty", output).map_err(|failure| wrong("ranges of parameters", &failure))?;
-    let found = wire.uncertainty().ok_or_else(|| wrong("ranges of parameters", &"others"))?;
+    let sent = format!("{wire:?}");
+    let found = wire.uncertainty().ok_or_else(|| wrong("ranges of parameters", &sent))?;
     let (lower, upper) = method.ranges.bounds(method.model);
     let is_around = |(i, known): (usize, &Known)| {
         lower[i] <= known.low && known.low <= point[i] && point[i] <= known.high && known.high <= upper[i]

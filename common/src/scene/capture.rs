@@ -256,7 +256,12 @@ fn clip(photo: &Image, status: &mut [PixelStatus]) -> Option<f32> {
         let usable = photo.pixels().iter().zip(&*status).filter(|(_, status)| **status == PixelStatus::Usable);
         usable.map(move |(pixel, _)| pixel[c])
     };
-    let levels = [0, 1, 2].map(|c| plateau(values(c)));
+    let mut levels = [0, 1, 2].map(|c| plateau(values(c)));
+    // The even reflection of a lamp has other levels in each channel.
+    let found: Vec<f32> = levels.into_iter().flatten().collect();
+    if found.iter().any(|level| (level / found[0] - 1.0).abs() > SAME_LEVEL) {
+        levels = [None; 3];
+    }
     let was_marked = status.contains(&PixelStatus::Clipped);
     let is_cut_off =
         |pixel: &[f32; 3]| levels.iter().zip(pixel).any(|(level, x)| level.is_some_and(|level| *x >= level));
@@ -267,6 +272,9 @@ fn clip(photo: &Image, status: &mut [PixelStatus]) -> Option<f32> {
     }
     levels.into_iter().flatten().chain(was_marked.then_some(1.0)).reduce(f32::min)
 }
+
+/// Levels of channels that differ by up to this share are one level.
+const SAME_LEVEL: f32 = 1e-3;
 
 /// "1 pixel of the object is", "2 pixels of the object are".
 fn object_pixels(count: usize) -> String {

@@ -3,25 +3,35 @@
 /// Fewest equal values that are a plateau.
 const FEWEST: usize = 8;
 
-/// A plateau has more values than each of the next levels below it, by this factor. Around a smooth maximum that is stored in steps, levels have about
-/// as many values each.
-const ABOVE_OTHERS: usize = 4;
-
 /// The levels below the largest with which it is compared.
 const LEVELS: usize = 4;
 
-/// The largest of finite values, if so many share it that they were cut off there: at any level, 1 in a float file or the largest code of another. `None`
-/// too if most of the values are equal: then they may be so.
+/// The mean number of values at each of these levels is at most this: of values in coarse steps, such as 8-bit codes or half floats of a dull surface,
+/// many share the largest without being cut off.
+const MOST_BELOW: usize = 2;
+
+/// The largest of finite values, if so many share it that they were cut off there, at any level. `None` too if most of the values are equal: then they may
+/// be so.
 #[must_use]
 pub fn plateau(values: impl Iterator<Item = f32>) -> Option<f32> {
-    let mut sorted: Vec<f32> = values.filter(|x| x.is_finite()).collect();
-    sorted.sort_by(|a, b| b.total_cmp(a));
-    let level = *sorted.first().filter(|level| **level > 0.0)?;
-    let mut counts = sorted.chunk_by(|a, b| a == b).map(<[f32]>::len);
-    let at_level = counts.next()?;
-    let below: usize = counts.take(LEVELS).sum();
-    let stands_out = at_level >= FEWEST && at_level * LEVELS > ABOVE_OTHERS * below;
-    (stands_out && 2 * at_level < sorted.len()).then_some(level)
+    // The largest levels with the number of values at each, largest first.
+    let mut top: Vec<(f32, usize)> = Vec::with_capacity(LEVELS + 2);
+    let mut count = 0;
+    for x in values.filter(|x| x.is_finite()) {
+        count += 1;
+        if top.len() > LEVELS && top.last().is_some_and(|last| x < last.0) {
+            continue;
+        }
+        match top.iter().position(|(level, _)| x >= *level) {
+            Some(place) if top[place].0 == x => top[place].1 += 1,
+            place => top.insert(place.unwrap_or(top.len()), (x, 1)),
+        }
+        top.truncate(LEVELS + 1);
+    }
+    let (&(level, at_level), below) = top.split_first()?;
+    let below: usize = below.iter().map(|(_, count)| count).sum();
+    let stands_out = level > 0.0 && at_level >= FEWEST && below <= MOST_BELOW * LEVELS;
+    (stands_out && 2 * at_level < count).then_some(level)
 }
 
 #[cfg(test)]
@@ -40,13 +50,15 @@ mod tests {
         for level in [1.2, 1.35, 1.1998] {
             assert_eq!(plateau(hill(40).map(|x| x.min(level))), Some(level));
         }
-        assert_eq!(plateau(hill(40).map(|x| (x.min(1.25) * 200.0).round())), Some(250.0), "in steps");
+        // 16-bit codes.
+        assert_eq!(plateau(hill(40).map(|x| (x.min(1.25) * 52427.2).round())), Some(65534.0));
     }
 
     #[test]
     fn smooth_maxima_steps_and_even_light_are_no_plateaus() {
         assert_eq!(plateau(hill(40)), None);
         assert_eq!(plateau(hill(400).map(|x| (x * 100.0).round())), None, "in steps");
+        assert_eq!(plateau(hill(400).map(|x| (0.1 * x + 100.0).round())), None, "dull, in steps");
         assert_eq!(plateau([0.5; 100].into_iter()), None);
         assert_eq!(plateau([0.0; 100].into_iter().chain([-1.0])), None);
         assert_eq!(plateau([f32::NAN, f32::INFINITY].into_iter()), None);

@@ -96,7 +96,7 @@ impl ViewArgs {
 #[command(next_help_heading = "Geometry")]
 struct SphereArgs {
     /// Centre and radius of the sphere in the photo, in pixels from the top left corner, for example 128,128,100
-    /// [default: fitted to the mask, to the photo's alpha, or to its silhouette over black; else the largest circle in the photo]
+    /// [default: fitted to the mask or to the photo's alpha channel, else the largest circle in the photo]
     #[arg(long, value_name = "CX,CY,R", allow_hyphen_values = true)]
     sphere: Option<Circle>,
 }

@@ -66,12 +66,14 @@ pub(super) fn select(parts: &[Part], wanted: Wanted, asked: Option<&str>) -> Res
                 found.extend(layer.choose(p, names).filter(|_| is_asked).map(|layer| (layer, name.to_owned())));
             }
         }
-        found.sort_by_key(|(_, name)| Named::of(name));
+        let is_exact = |name: &str| asked.is_some_and(|asked| name.eq_ignore_ascii_case(asked));
+        let rank = |name: &str| if wanted == Wanted::Normals { Named::Not } else { Named::of(name) };
+        found.sort_by_key(|(_, name)| (!is_exact(name), rank(name)));
         if found.is_empty() {
             continue;
         }
         let (mut layer, name) = found.remove(0);
-        let is_alone = found.is_empty() || asked.is_some();
+        let is_alone = found.is_empty() || is_exact(&name);
         let others: Vec<String> = found.iter().map(|(other, name)| title(other.part, name)).collect();
         if Named::of(&name) == Named::LikeData && asked.is_none() && wanted == Wanted::Colours {
             layer.warning =

@@ -52,7 +52,7 @@ fn read_info(source: &Source<'_>) -> Result<Info<'static>, ImageError> {
     let mut reader = decoder.read_info().map_err(fault)?;
     reader.finish().map_err(fault)?;
     let info = reader.info().clone();
-    if let Some(pixel) = info.pixel_dims.filter(|pixel| pixel.xppu > 0) {
+    if let Some(pixel) = info.pixel_dims.filter(|pixel| pixel.xppu > 0 && pixel.yppu > 0) {
         check_pixel_aspect(source, FORMAT, f64::from(pixel.yppu) / f64::from(pixel.xppu))?;
     }
     Ok(info)

@@ -88,7 +88,7 @@ fn other_pixel_formats_and_broken_headers_are_refused() {
     let other = b"#?RADIANCE\nFORMAT=32-bit_rle_luve\n\n-Y 1 +X 1\n\0\0\0\0";
     assert!(decode("a.hdr", other).unwrap_err().to_string().contains("32-bit_rle_luve"));
     let wide = decode("a.hdr", &picture("PIXASPECT=2\n", "-Y 1 +X 2", &TWO)).unwrap_err().to_string();
-    assert!(wide.contains("not square") && wide.contains('2'), "{wide}");
+    assert!(wide.contains("not square") && wide.contains("0.5"), "{wide}");
     assert!(decode("a.hdr", &picture("PIXASPECT=1.0\n", "-Y 1 +X 2", &TWO)).is_ok());
     for resolution in ["-Y 1", "-Y 1 +Y 1", "Y 1 X 1", "-Y -1 +X 1", "-Y 0 +X 1", "1 1"] {
         assert!(decode("a.hdr", &picture("", resolution, &TWO)).is_err(), "{resolution}");
@@ -111,5 +111,5 @@ fn pixels_in_xyz_are_converted() {
     assert!(decoded.image.pixel(0, 0).iter().all(|value| (value - 1.0).abs() < 1e-6));
     let [r, g, b] = decoded.image.pixel(1, 0);
     assert!((r - 1.0).abs() < 0.005 && g.abs() < 0.005 && b.abs() < 0.005, "{r} {g} {b}");
-    assert!(decoded.warnings.iter().any(|text| text.contains("XYZ")), "{:?}", decoded.warnings);
+    assert!(decoded.warnings.len() == 1 && decoded.warnings[0].contains("XYZ"), "{:?}", decoded.warnings);
 }

@@ -1,8 +1,8 @@
-use crate::image::{Encoding, Format, ImageError, decode, decode_mask};
+use crate::image::{Encoding, Format, decode, decode_mask};
 use std::io::Cursor;
 use tiff::encoder::{
     TiffEncoder,
-    colortype::{ColorType, Gray8, RGB8, RGB32Float, RGBA16},
+    colortype::{ColorType, Gray8, RGB8, RGB32Float, RGB64Float, RGBA16},
 };
 
 fn tiff<C: ColorType>(width: u32, height: u32, samples: &[C::Inner]) -> Vec<u8>
@@ -19,7 +19,7 @@ pub(super) fn half(width: u16, height: u16, samples: &[u16]) -> Vec<u8> {
     half_with((width, height), samples, (274, 1))
 }
 
-/// As [`half`], with this short tag, between 273 and 277.
+/// As [`half`], with this short tag.
 fn half_with((width, height): (u16, u16), samples: &[u16], (tag, value): (u16, u32)) -> Vec<u8> {
     let mut bytes = b"II*\0\x08\0\0\0".to_vec();
     let (short, long) = (3_u16, 4_u16);
@@ -75,13 +75,22 @@ fn integers_are_decoded_from_srgb() {
 }
 
 #[test]
-fn other_colours_are_refused_by_name() {
-    let mut indexed = tiff::<Gray8>(1, 1, &[7]);
-    // The photometric interpretation: 5 is CMYK.
-    let at = indexed.windows(4).position(|bytes| bytes == [6, 1, 3, 0]).unwrap();
-    indexed[at + 8] = 5;
-    let error = decode("a.tif", &indexed).unwrap_err();
-    assert!(matches!(error, ImageError::Unsupported { .. } | ImageError::Malformed { .. }), "{error}");
+fn other_channels_are_refused_by_name() {
+    let error = |bytes: &[u8]| decode("a.tif", bytes).unwrap_err().to_string();
+    // Four samples per pixel, of which the last is nothing, or alpha by which the colours are multiplied.
+    let associated = {
+        let mut bytes = tiff::<RGBA16>(1, 1, &[1, 2, 3, 4]);
+        let at = bytes.windows(8).position(|bytes| bytes == [0x52, 1, 3, 0, 1, 0, 0, 0]).unwrap();
+        bytes[at + 8] = 1;
+        bytes
+    };
+    assert!(error(&associated).contains("multiplied by alpha"), "{}", error(&associated));
+    let mut unused = associated;
+    let at = unused.windows(8).position(|bytes| bytes == [0x52, 1, 3, 0, 1, 0, 0, 0]).unwrap();
+    unused[at + 8] = 0;
+    assert!(error(&unused).contains("beside colour and alpha"), "{}", error(&unused));
+    let doubles = tiff::<RGB64Float>(1, 1, &[0.0; 3]);
+    assert!(error(&doubles).contains("64 bits per channel"), "{}", error(&doubles));
 }
 
 #[test]
