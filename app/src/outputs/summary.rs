@@ -11,6 +11,7 @@ use lookalike::{
     fit::{Known, Method, Standing, Tried, Verdict, spread},
     light::FORMULA_LIGHTS,
     plan::FitOutcome,
+    scene::Circle,
 };
 use std::{fmt::Write as _, io};
 
@@ -25,8 +26,8 @@ fn summary(record: &FitRecord<'_>, timing: &Timing, out: &str) -> String {
     let mut text = format!("{} on {} of {usable} usable pixels", method.model.name(), method.samples);
     let gammas = counted(method.gammas.len(), "gamma");
     let _ = writeln!(text, ", {gammas}, seed {}", method.seed);
-    if let Some(circle) = record.capture.geometry().circle() {
-        let _ = writeln!(text, "the sphere at {circle} in the photo");
+    if let Some(Circle { x, y, radius }) = record.capture.geometry().circle() {
+        let _ = writeln!(text, "sphere at {x:.1},{y:.1} with radius {radius:.1} in the photo, in pixels");
     }
     text.push('\n');
     text.push_str(&aligned(&rows(method, outcome)));

@@ -63,8 +63,10 @@ impl Placement {
         let away = found.filter(|fit| is_disk(fit) && differs(fit.circle, inscribed));
         Ok(match away {
             Some(CircleFit { circle, .. }) => {
-                let warning =
-                    format!("the sphere is at {circle} by the photo's alpha channel; --sphere gives another circle");
+                let Circle { x, y, radius } = circle;
+                let warning = format!(
+                    "the sphere is at {x:.1},{y:.1},{radius:.1} by the photo's alpha channel; --sphere gives another circle"
+                );
                 Self { circle, source: CircleSource::Alpha, warning: Some(warning) }
             }
             None => Self { circle: inscribed, source: CircleSource::Inscribed, warning: None },

@@ -41,7 +41,7 @@ mod tests {
     fn hill(count: usize) -> impl Iterator<Item = f32> {
         (0..count * count).map(move |i| {
             let at = |k: usize| (k as f32 + 0.3) / count as f32 - 0.5;
-            1.5 - 3.0 * (at(i % count).powi(2) + at(i / count).powi(2))
+            1.5 - 3.0 * (at(i % count).powi(2) + 1.1 * at(i / count).powi(2))
         })
     }
 
