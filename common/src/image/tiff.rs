@@ -144,7 +144,8 @@ fn samples(source: &Source<'_>) -> Result<(DecodingResult, Shape), ImageError> {
         return Err(source.unsupported(FORMAT, format!("{bits} bits per channel"), advice));
     }
     let shape = Shape { width, height, colours, has_alpha };
-    if decoder.find_tag_unsigned::<u16>(Tag::SamplesPerPixel).map_err(fault)?.unwrap_or(1) != shape.channels() as u16 {
+    let stored = decoder.find_tag_unsigned::<u16>(Tag::SamplesPerPixel).map_err(fault)?.unwrap_or(1);
+    if usize::from(stored) != shape.channels() {
         return Err(source.unsupported(FORMAT, "channels beside colour and alpha", "save it without them"));
     }
     // The sizes are known: nothing larger is decoded.

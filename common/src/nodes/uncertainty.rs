@@ -27,9 +27,15 @@ const STANDINGS: [Standing; 4] = [Standing::Determined, Standing::AtBound, Stand
 
 impl UncertaintyWire {
     fn of(found: &fit::Uncertainty) -> Self {
-        let number = |of: Standing| STANDINGS.iter().position(|standing| *standing == of).unwrap_or(0) as u8;
+        let number = |of: Standing| match of {
+            Standing::Determined => 0,
+            Standing::AtBound => 1,
+            Standing::Undetermined => 2,
+            Standing::Held => 3,
+        };
+        let index = |i: usize| u32::try_from(i).unwrap_or(u32::MAX);
         let entries = found.entries.iter().map(|known| (known.low, known.high, number(known.standing)));
-        let trades = found.trades.iter().map(|&(a, b)| (a as u32, b as u32));
+        let trades = found.trades.iter().map(|&(a, b)| (index(a), index(b)));
         Self { entries: entries.collect(), trades: trades.collect() }
     }
 
