@@ -41,7 +41,7 @@ impl Planner for Three {
         for number in 0..3_u8 {
             graph.add_node(NodeSpec {
                 kind: "double".to_owned(),
-                label: format!("double {number}"),
+                label: format!("double {number}").into(),
                 parameters: vec![number],
                 inputs: Vec::new(),
                 placement: Placement::Coordinator,
