@@ -3,11 +3,11 @@
 //!
 //! The range of a parameter holds the values for which CSSIM, at its minimum over all other parameters, stays within a share of the reached
 //! score. That is a profile, as of a likelihood: the reached score is what the photo's noise and the error of the model leave, so it stands for the
-//! variance of the residuals. The share ([`SHARE`]) is set so that the ranges of synthetic photos hold the truth in about 95 of 100 cases
+//! variance of the residuals. The share ([`SHARE`]) is set so that the ranges of synthetic photos hold the truth in at least 95 of 100 cases
 //! (docs/accuracy.md); there is no theory that gives it, because the windows of CSSIM overlap.
 //!
-//! The profile is that of a quadratic, whose gradient and Hessian are differences of CSSIM over steps that raise it visibly, in the scaled
-//! parameters of polish. It knows the bounds: near one, a range has one side.
+//! The profile is that of a quadratic in the scaled parameters of polish: its Hessian is from differences of CSSIM over steps that raise it visibly,
+//! then slope and curvature are measured along each eigenvector. It knows the bounds: near one, a range has one side.
 //!
 //! A parameter may have an effect only where another one is not zero, such as the width of a haze whose strength may be 0. Where the range
 //! of a parameter reaches 0, the others are judged there too.
