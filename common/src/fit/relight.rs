@@ -6,7 +6,7 @@
 use super::{needed_span, ranges::Ranges, stage_two::FullView, verdict::Verdict};
 use crate::{
     brdf::Model,
-    light::{Environment, FORMULA_LIGHTS},
+    light::FORMULA_LIGHTS,
     metric::{Judge, JudgeOptions, MetricError, auto_exposure},
     render::{
         pyramid::LightPyramid,
@@ -15,8 +15,7 @@ use crate::{
     },
     scene::{Camera, Circle, Geometry, SceneError},
 };
-use rayon::prelude::*;
-use std::sync::Arc;
+use std::sync::{Arc, LazyLock};
 
 /// A match that the photo does not tell from the reported one.
 #[derive(Debug, Clone, PartialEq)]
@@ -38,10 +37,13 @@ pub fn spread(neighbours: &[Neighbour]) -> Option<Verdict> {
 pub(crate) type Point = (&'static dyn Model, Vec<f64>);
 
 /// Width and height of the picture.
-const SIZE: usize = 64;
+const SIZE: usize = 48;
 
 /// Knots per factor of two of width.
-const PER_OCTAVE: f64 = 4.0;
+const PER_OCTAVE: f64 = 3.0;
+
+/// About one position per pixel. Both pictures of a comparison are seen at the same positions, so that what lies between them does not matter.
+const ACCURACY: Accuracy = Accuracy { footprint: 40.0, ..Accuracy::COARSE };
 
 /// Why a match cannot be looked at under another light.
 #[derive(Debug, thiserror::Error)]
@@ -55,12 +57,15 @@ pub(crate) enum RelightError {
 /// CSSIM of each point after the first against the first, under each of [`FORMULA_LIGHTS`].
 pub(crate) fn relit(points: &[Point]) -> Result<Vec<Vec<f64>>, RelightError> {
     let geometry = Geometry::sphere(SIZE, SIZE, Circle::inscribed(SIZE, SIZE), Camera::Orthographic)?;
-    let under = |light: Environment| under(points, &geometry, &LightPyramid::new(light));
+    // They are the same for every fit.
+    static PYRAMIDS: LazyLock<Vec<LightPyramid>> =
+        LazyLock::new(|| FORMULA_LIGHTS.iter().map(|light| LightPyramid::new(light.environment())).collect());
     let by_light: Vec<Vec<f64>> =
-        FORMULA_LIGHTS.par_iter().map(|light| under(light.environment())).collect::<Result<_, _>>()?;
+        PYRAMIDS.iter().map(|pyramid| under(points, &geometry, pyramid)).collect::<Result<_, _>>()?;
     Ok((0..points.len().saturating_sub(1)).map(|n| by_light.iter().map(|scores| scores[n]).collect()).collect())
 }
 
+/// As [`relit`], under one light. All points share a table, so its errors are common to them.
 fn under(points: &[Point], geometry: &Geometry, pyramid: &LightPyramid) -> Result<Vec<f64>, RelightError> {
     let size = u32::try_from(SIZE).unwrap_or(u32::MAX);
     let all = (0..size).flat_map(|row| (0..size).map(move |column| [column, row]));
@@ -71,7 +76,7 @@ fn under(points: &[Point], geometry: &Geometry, pyramid: &LightPyramid) -> Resul
         Spans::of_model(*model, needed_span(*model, &Ranges::default(), std::iter::once(&point[..])))
     });
     let spans = spans.reduce(|joined, spans| joined.joined(&spans)).unwrap_or_default();
-    let plan = TransportPlan { lobes: spans.knots(PER_OCTAVE), accuracy: Accuracy::FULL };
+    let plan = TransportPlan { lobes: spans.knots(PER_OCTAVE), accuracy: ACCURACY };
     let table = [Arc::new(plan.integrate(geometry, pyramid, &pixels))];
     let render = |(model, point): &Point| {
         let view = FullView {

@@ -58,7 +58,7 @@ fn fits_end_in_about_their_order_and_events_report_it() {
     assert!(events.iter().all(|event| event["time_s"].is_number()), "{events:?}");
     let place =
         |name: &str, fit: &str| events.iter().position(|event| is(event, name) && event["fit"] == fit).expect(fit);
-    assert!(place("fit-finished", "a-photo-map-ggx") < place("fit-finished", "d-photo-map-ggx"));
+    assert!(place("fit-finished", "a-photo-map-ggx") < place("fit-started", "d-photo-map-ggx"));
     let ends: Vec<&Value> =
         events.iter().filter(|event| is(event, "fit-finished") || is(event, "fit-failed")).collect();
     assert_eq!(ends.len(), 12);
@@ -66,11 +66,10 @@ fn fits_end_in_about_their_order_and_events_report_it() {
         let fits = &event["fits"];
         assert_eq!(fits["done"].as_u64().unwrap() + fits["failed"].as_u64().unwrap(), count, "{event}");
     }
-    // Fits end in about their order. How far from it depends on the machine: the coordinator's steps of such small fits take longer than the searches, and
-    // those at the end of a fit run between those of the fits after it.
+    // Fits end in about their order: at most four places from their own, because only a few run at a time.
     for (place, event) in (0..).zip(&ends) {
         let number = event["number"].as_i64().unwrap();
-        assert!((number - place).abs() <= 8, "{event} as the {place}th");
+        assert!((number - place).abs() <= 4, "{event} as the {place}th");
     }
     let named = |event: &&Value| {
         is(event, "node-finished") && event["fit"] == "a-red-map-ggx" && event["label"] == "search gamma 1.5"
