@@ -27,7 +27,7 @@ use crate::{
     metric::Score,
     search::{Bounds, NormalEquations, SearchError, bvls, eigen},
 };
-use std::cmp::Ordering;
+use std::{cell::RefCell, cmp::Ordering};
 
 /// What the photo says of one entry of the flat parameter vector.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -96,13 +96,21 @@ struct Surroundings<'a> {
     bounds: &'a Bounds,
     /// Where it can be rendered, in scaled parameters: the table may not have all widths.
     inside: &'a [(f64, f64)],
+    /// Scores that are known: steps of different entries share their middle and ends.
+    known: RefCell<Vec<(Vec<f64>, f64)>>,
 }
 
 impl Surroundings<'_> {
     /// CSSIM at scaled parameters.
     fn score(&self, scaled: &[f64]) -> Result<f64, SearchError> {
+        if let Some((_, score)) = self.known.borrow().iter().find(|(known, _)| known == scaled) {
+            return Ok(*score);
+        }
         let point: Vec<f64> = scaled.iter().enumerate().map(|(i, &t)| self.bounds.to_natural(i, t)).collect();
-        (self.judge)(&self.renderer.render(&point)).ok_or(SearchError::NotFinite { what: "the CSSIM", point })
+        let score = (self.judge)(&self.renderer.render(&point));
+        let score = score.ok_or(SearchError::NotFinite { what: "the CSSIM", point })?;
+        self.known.borrow_mut().push((scaled.to_vec(), score));
+        Ok(score)
     }
 
     fn moved(&self, from: &[f64], steps: &[(usize, f64)]) -> Result<f64, SearchError> {
@@ -178,17 +186,17 @@ struct Step {
     above: f64,
 }
 
-/// A quadratic: its value above that in the middle is `x^T A x / 2 - b^T x` at x from the middle, with A and b of the normal equations.
+/// A quadratic around the match: its value above that there is `x^T A x / 2 - b^T x` at x from there, with A and b of the normal equations.
 struct Quadratic {
-    middle: Vec<f64>,
+    /// The match, in scaled parameters.
+    at: Vec<f64>,
     normal: NormalEquations,
 }
 
 impl Quadratic {
-    fn value(&self, at: &[f64]) -> f64 {
-        let x: Vec<f64> = at.iter().zip(&self.middle).map(|(t, middle)| t - middle).collect();
+    fn value(&self, x: &[f64]) -> f64 {
         let of = |(i, (x, ax)): (usize, (&f64, f64))| x * (0.5 * ax - self.normal.vector(i));
-        x.iter().zip(self.normal.times(&x)).enumerate().map(of).sum()
+        x.iter().zip(self.normal.times(x)).enumerate().map(of).sum()
     }
 
     /// The quadratic around `at` over the entries `free`, along the eigenvectors of the Hessian. Valleys are narrow and curved: the differences over
@@ -216,24 +224,23 @@ impl Quadratic {
                 (i..n).for_each(|j| normal.set_matrix(i, j, normal.matrix(i, j) + curvature * vector[i] * vector[j]));
             }
         }
-        Ok(Self { middle: free.iter().map(|&i| at[i]).collect(), normal })
+        Ok(Self { at: free.iter().map(|&i| at[i]).collect(), normal })
     }
 
     /// Its minimum over all entries in [0, 1] but entry `i`, which is `t`.
     fn profile(&self, i: usize, t: f64) -> Result<f64, SearchError> {
-        let mut lower: Vec<f64> = self.middle.iter().map(|middle| -middle).collect();
-        let mut upper: Vec<f64> = self.middle.iter().map(|middle| 1.0 - middle).collect();
-        (lower[i], upper[i]) = (t - self.middle[i], t - self.middle[i]);
-        let minimum = bvls::solve(&self.normal, &lower, &upper)?.point;
-        Ok(self.value(&minimum.iter().zip(&self.middle).map(|(x, middle)| x + middle).collect::<Vec<_>>()))
+        let mut lower: Vec<f64> = self.at.iter().map(|at| -at).collect();
+        let mut upper: Vec<f64> = self.at.iter().map(|at| 1.0 - at).collect();
+        (lower[i], upper[i]) = (t - self.at[i], t - self.at[i]);
+        Ok(self.value(&bvls::solve(&self.normal, &lower, &upper)?.point))
     }
 
     /// The end of the range of entry `i` towards `end`: where its profile rises above `limit`.
-    fn end(&self, i: usize, at: f64, end: f64, limit: f64) -> Result<f64, SearchError> {
+    fn end(&self, i: usize, end: f64, limit: f64) -> Result<f64, SearchError> {
         if self.profile(i, end)? <= limit {
             return Ok(end);
         }
-        let (mut within, mut beyond) = (at, end);
+        let (mut within, mut beyond) = (self.at[i], end);
         for _ in 0..BISECTIONS {
             let between = 0.5 * (within + beyond);
             if self.profile(i, between)? <= limit { within = between } else { beyond = between }
@@ -269,7 +276,10 @@ pub(crate) fn uncertainty(
     let roughly = |image: &Image| judges.searching.score(image).ok().filter(|_| !is_cancelled()).map(pick);
     let exactly = |image: &Image| judges.reporting.score(image).ok().filter(|_| !is_cancelled()).map(pick);
     let (bounds, inside) = (&bounds, &inside[..]);
-    let around = |judge| Surroundings { view, renderer: Renderer::new(view), judge, bounds, inside };
+    let around = |judge| {
+        let (renderer, known) = (Renderer::new(view), RefCell::default());
+        Surroundings { view, renderer, judge, bounds, inside, known }
+    };
     let near = around(&roughly);
     let reached = near.score(&scaled)?;
     let allowed = SHARE * reached.max(LEAST);
@@ -281,15 +291,13 @@ pub(crate) fn uncertainty(
     let hessian = near.hessian(&scaled, &free, allowed.max(RISE))?;
     let quadratic = Quadratic::along(&hessian, &around(&exactly), (&scaled, &free), allowed)?;
     judges.reporting.free_buffers();
-    let at: Vec<f64> = free.iter().map(|&i| scaled[i]).collect();
-    let limit = quadratic.value(&at) + allowed;
     // A narrower range of the search makes no value more certain.
     let of_model = search_bounds(model, &Ranges::default(), SearchKind::LeastSquares)?;
     for (k, &i) in free.iter().enumerate() {
-        let (low, high) = (quadratic.end(k, at[k], 0.0, limit)?, quadratic.end(k, at[k], 1.0, limit)?);
+        let (low, high) = (quadratic.end(k, 0.0, allowed)?, quadratic.end(k, 1.0, allowed)?);
         let (low, high) = (near.bounds.to_natural(i, low).min(point[i]), near.bounds.to_natural(i, high).max(point[i]));
         let share = of_model.to_scaled(i, high) - of_model.to_scaled(i, low);
-        let standing = match at[k] {
+        let standing = match scaled[i] {
             _ if share > LARGEST_SHARE => Standing::Undetermined,
             t if t <= AT_BOUND || t >= 1.0 - AT_BOUND => Standing::AtBound,
             _ => Standing::Determined,
