@@ -73,3 +73,20 @@ fn radiance(decoded: Decoded) -> anyhow::Result<Decoded> {
 }
 
 const ROLE: &str = "environment map";
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn map_that_ends_at_one_level_in_all_channels_gives_a_warning() {
+        let map = |level: f32, tint: [f32; 3]| {
+            let light = |k: usize| 0.01 * k as f32;
+            Image::from_pixels(32, 16, (0..512).map(|k| tint.map(|x| (x * light(k)).min(level))).collect())
+        };
+        let warning = cut_off(&map(4.0, [1.0, 1.2, 0.9])).unwrap();
+        assert!(warning.contains("67 texels have the same largest value 4 in all channels"), "{warning}");
+        assert_eq!(cut_off(&map(100.0, [1.0, 1.2, 0.9])), None);
+        assert_eq!(cut_off(&map(4.0, [1.0, 1.2, 0.1])), None, "one channel is below it");
+    }
+}

@@ -69,3 +69,21 @@ fn of_json(bytes: &[u8]) -> anyhow::Result<f64> {
 fn factor(value: f64) -> Option<f64> {
     (value > 0.0 && value.is_finite()).then_some(value)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn clipped_level_becomes_white_by_a_factor_of_four_at_most() {
+        let grey = Image::from_pixels(4, 1, vec![[0.9; 3]; 4]);
+        let auto = |clipped_at| resolve_display_exposure(&DisplayExposure::Auto, &grey, &[1.0; 4], clipped_at).unwrap();
+        let near = |found: f64, expected: f64| assert!((found / expected - 1.0).abs() < 1e-6, "{found} {expected}");
+        near(auto(None), 1.0);
+        near(auto(Some(2.0)), 1.0);
+        near(auto(Some(0.5)), 2.0);
+        near(auto(Some(0.01)), 4.0);
+        let asked = resolve_display_exposure(&DisplayExposure::Value(0.3), &grey, &[1.0; 4], Some(0.5)).unwrap();
+        near(asked, 0.3);
+    }
+}

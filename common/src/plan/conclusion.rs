@@ -106,3 +106,25 @@ fn neighbours(names: &[String], output: &Blob) -> Result<Vec<Neighbour>, PlanErr
     relit.iter().flatten().try_for_each(|score| verify::check_score(*score))?;
     Ok(names.iter().zip(relit).map(|(name, cssim)| Neighbour { name: name.clone(), cssim }).collect())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::nodes::wire::write;
+
+    #[test]
+    fn scores_under_other_lights_that_cannot_be_are_refused() {
+        let names = ["ggx".to_owned(), "gamma 2".to_owned()];
+        let of = |relit: Vec<Vec<f64>>| neighbours(&names, &Blob::new(write("scores", &RelitWire(relit)).unwrap()));
+        let known = of(vec![vec![0.1, 0.2, 0.3], vec![0.0; 3]]).unwrap();
+        assert_eq!((&*known[1].name, &known[0].cssim[..]), ("gamma 2", &[0.1, 0.2, 0.3][..]));
+        for bad in [
+            vec![vec![0.1; 3]],
+            vec![vec![0.1; 3], vec![0.1; 2]],
+            vec![vec![0.1; 3], vec![0.1, -0.1, 0.1]],
+            vec![vec![f64::NAN; 3]; 2],
+        ] {
+            assert!(matches!(of(bad), Err(PlanError::WrongOutput { .. })));
+        }
+    }
+}

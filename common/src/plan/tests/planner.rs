@@ -193,4 +193,26 @@ fn every_node_of_a_fit_is_work_of_its_stage() {
     assert_eq!(full.first(), Some(&Work::StageTwo));
     assert!(full.is_sorted_by_key(|work| *work == Work::StageThree), "{full:?}");
     assert!(of(nodes::REPORT).iter().all(|work| *work == Work::Pictures));
+    assert_eq!(of(nodes::UNCERTAINTY), [Work::Pictures]);
+}
+
+/// The planner's error when these entries are the ranges of the parameters.
+fn refused_ranges(entries: Vec<(f64, f64, u8)>) -> String {
+    let output = Blob::new(write("ranges", &(entries, Vec::<(u32, u32)>::new())).unwrap());
+    let changed = |spec: &NodeSpec, made: Blob| if spec.kind == nodes::UNCERTAINTY { output.clone() } else { made };
+    match Bench::default().run(planner(1), first, changed) {
+        Err(error @ PlanError::WrongOutput { .. }) => error.to_string(),
+        other => panic!("{:?}", other.map(|_| ())),
+    }
+}
+
+#[test]
+fn ranges_that_cannot_be_those_of_the_match_are_refused() {
+    // Too few; not around its values; beyond the bounds.
+    for entries in [vec![(0.0, 1.0, 0); 3], vec![(0.001, 0.0011, 0); 8], vec![(0.0, 100.0, 0); 8]] {
+        let said = refused_ranges(entries);
+        assert!(said.contains("ranges around"), "{said}");
+    }
+    let said = refused_ranges(vec![(0.0, 1.0, 9); 8]);
+    assert!(said.contains("ranges of parameters") && said.contains('9'), "{said}");
 }

@@ -143,3 +143,33 @@ fn faults_are_named() {
     let error = with(|input| input.clipped = Some(vec![true; SIZE * SIZE])).unwrap_err();
     assert!(matches!(error, SceneError::NothingUsable(counts) if counts.clipped > 600), "{error}");
 }
+
+/// A ball that is brightest in its middle, in all channels alike, cut off at a level.
+fn cut_off(level: f32, channels: [f32; 3]) -> Capture {
+    with(|input| {
+        for (k, pixel) in input.photo.pixels_mut().iter_mut().enumerate() {
+            let at = |k: usize| (k as f32 - 16.3) / 16.0;
+            let light = 2.0 - at(k % SIZE).powi(2) - 1.1 * at(k / SIZE).powi(2);
+            *pixel = channels.map(|channel| (channel * light).min(level).max(0.0));
+        }
+    })
+    .unwrap()
+}
+
+#[test]
+fn pixels_at_a_level_where_the_photo_was_cut_off_are_clipped() {
+    let capture = cut_off(1.8, [1.0, 0.99, 0.4]);
+    assert_eq!((capture.clipped_at(), capture.status()[MIDDLE]), (Some(1.8), PixelStatus::Clipped));
+    // About pi 16^2 (.2 / sqrt(1.1)) of them.
+    assert!((140..170).contains(&capture.counts().clipped), "{}", capture.counts());
+    assert!(capture.warnings().iter().any(|text| text.contains("the photo ends at 1.8")), "{:?}", capture.warnings());
+    let whole = cut_off(3.0, [1.0, 0.99, 0.4]);
+    assert_eq!((whole.clipped_at(), whole.counts().clipped), (None, 0));
+    // A reflection of constant radiance has another level in each channel.
+    let mut reflection = input();
+    for (k, pixel) in reflection.photo.pixels_mut().iter_mut().enumerate() {
+        let light = if k % SIZE < 18 && k % SIZE > 12 { 5.0 } else { 0.001 * k as f32 };
+        *pixel = [0.9, 0.6, 0.3].map(|f0| f0 * light);
+    }
+    assert_eq!(Capture::new(reflection).unwrap().clipped_at(), None);
+}
